@@ -1,0 +1,1 @@
+"""simnav: the open benchmark for marine integrated navigation."""

@@ -1,0 +1,78 @@
+"""What an estimator is, and how it is registered, found and made.
+
+An estimator is a class with two methods, `Estimator.reset` and `Estimator.update`. It becomes known
+by the decorator `register`, through the entry-point group ``simnav.estimators`` of an installed
+package, or by the path of its file (``my_filter.py`` or ``my_filter.py:MyFilter``).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
+
+if TYPE_CHECKING:
+    from simnav.recording import Recording
+
+__all__ = ["Estimator", "register"]
+
+
+class Estimator(ABC):
+    """Base class of all estimators.
+
+    The constructor takes the parameters, all with defaults, as keyword arguments; ``--set name=value``
+    on the command line sets them. One instance serves many runs, each begun by `reset`.
+
+    Attributes
+    ----------
+    name : str
+        Set by `register`.
+    reference : bool
+        True for rows that are told the truth (an oracle); they are marked and not ranked, and
+        `reveal` is called before `reset`.
+    """
+
+    name: ClassVar[str] = ""
+    reference: ClassVar[bool] = False
+
+    @abstractmethod
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run.
+
+        Parameters
+        ----------
+        start : InitialState
+            A state with errors drawn from its covariance.
+        instruments : Instruments
+            The datasheets, never the realised errors.
+
+        Raises
+        ------
+        UnsuitableScenario
+            If the estimator cannot work with these instruments; say what it needs.
+        """
+
+    @abstractmethod
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take what the instruments delivered in one step; return the estimate at its end."""
+
+    def smooth(self) -> NavigationStates | None:
+        """After the last update: the whole trajectory, smoothed, at the ends of all steps; or None."""
+        return None
+
+    def reveal(self, recording: Recording) -> None:
+        """Only for ``reference`` estimators: the recording with truth and labels, before `reset`."""
+
+
+class UnsuitableScenario(Exception):
+    """Raised by `Estimator.reset`: the instruments that this estimator needs are not there."""
+
+
+E = TypeVar("E", bound=type[Estimator])
+
+
+def register(name: str, *, aliases: tuple[str, ...] = ()) -> Callable[[E], E]:
+    """Class decorator: make an estimator known under a name."""
+    raise NotImplementedError

@@ -1,0 +1,395 @@
+"""What travels between the rooms of simnav: datasheets, measurements, estimates, states.
+
+SI units and radians throughout. Position is geodetic latitude [rad], longitude [rad] and height
+above the WGS-84 ellipsoid [m]; velocity is north-east-down [m/s]; attitude is roll, pitch, yaw
+[rad] (Z-Y-X) of the body axes (forward, starboard, down) relative to north-east-down.
+Covariances are over nine components: north-east-down position error [m], velocity error [m/s] and
+attitude error [rad], the rotation vector of C_est C_true^T resolved in north-east-down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "COMPONENTS",
+    "KINDS",
+    "Datasheet",
+    "Estimate",
+    "ImuDatasheet",
+    "ImuSamples",
+    "InitialState",
+    "Instruments",
+    "Kind",
+    "Measurement",
+    "Measurements",
+    "NavigationStates",
+    "TriadDatasheet",
+]
+
+Array = NDArray[np.float64]
+
+#: The nine error components of every covariance and every ``estimated`` mask, in order.
+COMPONENTS: tuple[str, ...] = (
+    "north",
+    "east",
+    "down",
+    "velocity_north",
+    "velocity_east",
+    "velocity_down",
+    "attitude_north",
+    "attitude_east",
+    "attitude_down",
+)
+
+
+class Kind(NamedTuple):
+    """What one kind of aiding instrument measures.
+
+    Attributes
+    ----------
+    quantity : str
+        What the value is, in words.
+    values : tuple of str
+        Name of each component of a measurement's value, SI units and radians.
+    errors : tuple of str
+        Name of each component of its error (and of ``Datasheet.sigma``). They differ for
+        positions only, whose values are in radians and whose errors are in metres.
+    """
+
+    quantity: str
+    values: tuple[str, ...]
+    errors: tuple[str, ...]
+
+
+#: Every kind of aiding instrument. A scenario may carry several instruments of one kind.
+KINDS: Mapping[str, Kind] = {
+    "gnss_position": Kind(
+        "position of the antenna",
+        ("latitude", "longitude", "height"),
+        ("north", "east", "down"),
+    ),
+    "gnss_velocity": Kind(
+        "velocity of the antenna",
+        ("velocity_north", "velocity_east", "velocity_down"),
+        ("velocity_north", "velocity_east", "velocity_down"),
+    ),
+    "dvl": Kind(
+        "velocity over the ground of the transducer, in body axes",
+        ("forward", "starboard", "down"),
+        ("forward", "starboard", "down"),
+    ),
+    "magnetic_compass": Kind("true heading", ("heading",), ("heading",)),
+    "gyrocompass": Kind("true heading", ("heading",), ("heading",)),
+    "speed_log": Kind("forward speed through the water", ("speed",), ("speed",)),
+    "depth": Kind("depth below the mean sea surface, positive down", ("depth",), ("depth",)),
+    "terrain_fix": Kind("horizontal position", ("latitude", "longitude"), ("north", "east")),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class TriadDatasheet:
+    """What the datasheet says of three gyroscopes or three accelerometers.
+
+    All figures are one sigma and equal on the three axes; ``x`` is rad/s for gyroscopes and
+    m/s^2 for accelerometers.
+
+    Attributes
+    ----------
+    bias : float
+        Turn-on bias [x].
+    bias_instability : float
+        Stationary sigma of the in-run (first-order Gauss-Markov) bias [x]; where
+        ``correlation_time`` is infinite it is a random walk of this many x per sqrt(s).
+    correlation_time : float
+        Of the in-run bias [s].
+    random_walk : float
+        White noise density [x/sqrt(Hz)] (angle or velocity random walk).
+    rate_random_walk : float
+        Random walk of the bias [x/sqrt(s)].
+    scale : float
+        Scale-factor error [-].
+    misalignment : float
+        Non-orthogonality of each axis [rad].
+    quantization : float
+        Step of the output increment [x s]; 0 for none.
+    range : float
+        Largest output [x]; inf for none.
+    """
+
+    bias: float = 0.0
+    bias_instability: float = 0.0
+    correlation_time: float = np.inf
+    random_walk: float = 0.0
+    rate_random_walk: float = 0.0
+    scale: float = 0.0
+    misalignment: float = 0.0
+    quantization: float = 0.0
+    range: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class ImuDatasheet:
+    """Datasheet of an inertial measurement unit.
+
+    Attributes
+    ----------
+    rate : float
+        Nominal sample rate [Hz].
+    gyroscope, accelerometer : TriadDatasheet
+    name : str
+    """
+
+    rate: float
+    gyroscope: TriadDatasheet
+    accelerometer: TriadDatasheet
+    name: str = "imu"
+
+
+def _zeros3() -> Array:
+    return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Datasheet:
+    """Datasheet of one aiding instrument, as an estimator sees it.
+
+    All error figures are one sigma, in the units of ``KINDS[kind].errors`` (d components).
+
+    Attributes
+    ----------
+    name, kind : str
+        ``name`` is unique in a scenario; ``kind`` is a key of `KINDS`.
+    rate, phase : float
+        Sample rate [Hz] and time of the first sample [s].
+    sigma : (d,) array
+        White noise of a measurement.
+    bias : (d,) array
+        Turn-on bias, constant in a run.
+    bias_instability : (d,) array
+        Stationary sigma of the in-run (first-order Gauss-Markov) bias.
+    correlation_time : float
+        Of the in-run bias [s]; where it is infinite, ``bias_instability`` is a random walk per
+        sqrt(s).
+    scale : float
+        Scale-factor error [-].
+    misalignment : (3,) array
+        Mounting misalignment about the body axes [rad].
+    lever_arm : (3,) array
+        From the IMU (or the vessel's reference point) to the instrument, body axes [m].
+    """
+
+    name: str
+    kind: str
+    rate: float
+    sigma: Array
+    phase: float = 0.0
+    bias: Array = field(default_factory=lambda: np.zeros(1))
+    bias_instability: Array = field(default_factory=lambda: np.zeros(1))
+    correlation_time: float = np.inf
+    scale: float = 0.0
+    misalignment: Array = field(default_factory=_zeros3)
+    lever_arm: Array = field(default_factory=_zeros3)
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"unknown kind of instrument {self.kind!r}; there are: {', '.join(KINDS)}")
+        d = len(KINDS[self.kind].errors)
+        for name in ("sigma", "bias", "bias_instability"):
+            value = np.broadcast_to(np.asarray(getattr(self, name), dtype=np.float64), (d,)).copy()
+            object.__setattr__(self, name, value)
+
+
+class Instruments(Mapping[str, Datasheet]):
+    """The datasheets of a run: a mapping from name to `Datasheet`, and the IMU's beside it.
+
+    Parameters
+    ----------
+    aids : sequence of Datasheet
+    imu : ImuDatasheet or None
+        None for a vessel without an IMU.
+    step : float
+        Seconds from one call of ``Estimator.update`` to the next.
+    """
+
+    def __init__(self, aids: Sequence[Datasheet] = (), imu: ImuDatasheet | None = None, step: float = 1.0):
+        self._aids = {a.name: a for a in aids}
+        if len(self._aids) != len(aids):
+            raise ValueError(f"two instruments share a name: {[a.name for a in aids]}")
+        self.imu = imu
+        self.step = step
+
+    def __getitem__(self, name: str) -> Datasheet:
+        return self._aids[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._aids)
+
+    def __len__(self) -> int:
+        return len(self._aids)
+
+    def of_kind(self, *kinds: str) -> list[Datasheet]:
+        """The datasheets of the given kinds, in the scenario's order."""
+        return [a for a in self._aids.values() if a.kind in kinds]
+
+
+@dataclass(frozen=True, eq=False)
+class ImuSamples:
+    """A run of n IMU samples: averages over the interval that ends at each sample's time.
+
+    Attributes
+    ----------
+    time, interval : (n,) array
+        End of the interval and its length [s].
+    angular_rate, specific_force : (n, 3) array
+        Mean over the interval, body axes [rad/s], [m/s^2]. The increment is mean x interval.
+    """
+
+    time: Array
+    interval: Array
+    angular_rate: Array
+    specific_force: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, index: slice) -> ImuSamples:
+        return ImuSamples(
+            self.time[index], self.interval[index], self.angular_rate[index], self.specific_force[index]
+        )
+
+
+class Measurement(NamedTuple):
+    """One measurement of an aiding instrument.
+
+    Attributes
+    ----------
+    time : float
+        Time of validity [s].
+    instrument, kind : str
+        Name in the scenario, and key of `KINDS`.
+    value : (d,) array
+        Components as in ``KINDS[kind].values``.
+    """
+
+    time: float
+    instrument: str
+    kind: str
+    value: Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Measurements:
+    """What the instruments delivered in one step, the interval (start, time].
+
+    Attributes
+    ----------
+    start, time : float
+        Begin and end of the step [s]; the estimate is wanted for ``time``.
+    imu : ImuSamples or None
+        None for a vessel without an IMU.
+    aids : list of Measurement
+        In order of time. Iterating over the packet iterates over them.
+    """
+
+    start: float
+    time: float
+    imu: ImuSamples | None
+    aids: list[Measurement]
+
+    def __iter__(self) -> Iterator[Measurement]:
+        return iter(self.aids)
+
+    def __len__(self) -> int:
+        return len(self.aids)
+
+    def latest(self, kind: str) -> Measurement | None:
+        """The newest measurement of a kind (or of an instrument's name), or None."""
+        for m in reversed(self.aids):
+            if m.kind == kind or m.instrument == kind:
+                return m
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class InitialState:
+    """Where an estimator starts: a state with errors drawn from ``covariance``.
+
+    Attributes
+    ----------
+    time : float
+    position, velocity, attitude : (3,) array
+        Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad].
+    covariance : (9, 9) array
+        Of the errors, in the order of `COMPONENTS`.
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    attitude: Array
+    covariance: Array
+
+
+@dataclass(eq=False, slots=True)
+class Estimate:
+    """A navigation estimate at one time.
+
+    Attributes
+    ----------
+    time : float
+    position, velocity, attitude : (3,) array or None
+        None for what is not estimated.
+    covariance : (9, 9) array or None
+        Over `COMPONENTS`; only the rows and columns of estimated components are read.
+    estimated : (9,) bool array or None
+        Which components are estimated, where part of a vector is not (a ship's filter estimates
+        no height, roll or pitch). None: all components of the vectors that are given.
+    diagnostics : dict
+        Named scalars or small arrays, recorded by epoch.
+    flagged : sequence of (instrument, time)
+        The measurements of this step that the estimator judged faulty; scored against the truth.
+    """
+
+    time: float
+    position: Array | None = None
+    velocity: Array | None = None
+    attitude: Array | None = None
+    covariance: Array | None = None
+    estimated: NDArray[np.bool_] | None = None
+    diagnostics: Mapping[str, float | Array] = field(default_factory=dict)
+    flagged: Sequence[tuple[str, float]] = ()
+
+    def mask(self) -> NDArray[np.bool_]:
+        """(9,) bool array: the components of `COMPONENTS` that this estimate holds."""
+        given = np.repeat([self.position is not None, self.velocity is not None, self.attitude is not None], 3)
+        return given if self.estimated is None else given & np.asarray(self.estimated, dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationStates:
+    """A series of n navigation states: the truth, a reference or a smoothed trajectory.
+
+    Attributes
+    ----------
+    time : (n,) array
+    position, velocity, attitude : (n, 3) array
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    attitude: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, index: slice) -> NavigationStates:
+        return NavigationStates(
+            self.time[index], self.position[index], self.velocity[index], self.attitude[index]
+        )
