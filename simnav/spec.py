@@ -9,6 +9,8 @@ written in TOML under its name with the unit as suffix, so that nobody has to gu
     Gyroscope.from_toml({"random_walk_deg_sqrt_h": 0.01}, source="my.toml")
 
 One definition thus serves the schema, its validation, its documentation and the simulation.
+`Spec.to_toml` is the way back. Not-a-number is refused everywhere, infinity wherever it is neither
+a time nor the field's own default.
 """
 
 from __future__ import annotations
@@ -32,7 +34,11 @@ __all__ = [
     "SpecError",
     "Vector",
     "closest",
+    "entries",
     "quantity",
+    "spec_types",
+    "toml_number",
+    "unit_of",
 ]
 
 _DEG = math.pi / 180.0
@@ -45,8 +51,11 @@ UNITS: Mapping[str, float] = {
     "h": 3600.0,
     "hz": 1.0,
     "m": 1.0,
+    "mm": 0.001,
     "cm": 0.01,
+    "km": 1000.0,
     "m_s": 1.0,
+    "mm_s": 0.001,
     "cm_s": 0.01,
     "kn": 1852.0 / 3600.0,
     "m_s2": 1.0,
@@ -57,6 +66,7 @@ UNITS: Mapping[str, float] = {
     "deg_sqrt_h": _DEG / 60.0,
     "deg_h_sqrt_h": _DEG / 3600.0 / 60.0,
     "deg_h_sqrt_s": _DEG / 3600.0,
+    "deg_sqrt_s": _DEG,
     "arcsec": _DEG / 3600.0,
     "ug": _G * 1e-6,
     "mg": _G * 1e-3,
@@ -66,6 +76,7 @@ UNITS: Mapping[str, float] = {
     "m_s_sqrt_h": 1.0 / 60.0,
     "m_s_sqrt_s": 1.0,
     "m_sqrt_s": 1.0,
+    "s2_m": 1.0,
     "ppm": 1e-6,
     "percent": 1e-2,
     "1_s": 1.0,
@@ -97,6 +108,11 @@ def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
     return Field(default, json_schema_extra={"unit": unit}, **kwargs)
 
 
+def entries(key: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
+    """Declare a field with a plural name whose TOML tables are called ``key``: ``[[fault]]`` for ``faults``."""
+    return Field(default, json_schema_extra={"key": key}, **kwargs)
+
+
 def closest(name: str, valid: Sequence[str]) -> str:
     """``"; did you mean 'x'?"``, or the list of valid names where none is near."""
     near = difflib.get_close_matches(name, valid, n=1, cutoff=0.6)
@@ -111,6 +127,32 @@ def unit_of(info: FieldInfo) -> str | None:
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
 
 
+def _key(name: str, info: FieldInfo) -> str:
+    extra = info.json_schema_extra
+    unit = unit_of(info)
+    if unit is not None:
+        return f"{name}_{unit}"
+    return str(extra["key"]) if isinstance(extra, dict) and "key" in extra else name
+
+
+def toml_number(value: float, unit: str) -> float:
+    """The shortest number that, read in ``unit``, is exactly ``value`` in SI.
+
+    >>> toml_number(math.radians(0.1), "deg")
+    0.1
+    """
+    factor = UNITS[unit]
+    near = value / factor
+    for candidate in (
+        *(float(f"{near:.{digits}g}") for digits in range(6, 18)),
+        math.nextafter(near, math.inf),
+        math.nextafter(near, -math.inf),
+    ):
+        if candidate * factor == value:
+            return candidate
+    return near
+
+
 class Spec(BaseModel):
     """Base of all specifications: immutable, strict about names, read from TOML by `from_toml`.
 
@@ -122,11 +164,7 @@ class Spec(BaseModel):
     @classmethod
     def toml_keys(cls) -> dict[str, tuple[str, FieldInfo]]:
         """TOML key -> (field name, field), in the order of declaration."""
-        keys = {}
-        for name, info in cls.model_fields.items():
-            unit = unit_of(info)
-            keys[name if unit is None else f"{name}_{unit}"] = (name, info)
-        return keys
+        return {_key(name, info): (name, info) for name, info in cls.model_fields.items()}
 
     @classmethod
     def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
@@ -154,15 +192,33 @@ class Spec(BaseModel):
                 raise SpecError(f"{source}: unknown key '{where}' (value {raw!r}){_hint(key, keys)}")
             name, info = keys[key]
             unit = unit_of(info)
-            values[name] = (
-                _convert(raw, UNITS[unit], source, where)
-                if unit is not None
-                else _descend(raw, info.annotation, source, where)
-            )
+            if unit is not None:
+                values[name] = _convert(raw, UNITS[unit], _may_be_infinite(info), source, where)
+            else:
+                values[name] = _descend(raw, info, source, where)
         try:
             return cls(**values)
         except ValidationError as error:
             raise SpecError(_sentence(cls, error, table, source, path)) from None
+
+    def to_toml(self) -> dict[str, Any]:
+        """The TOML table that `from_toml` reads back into an equal specification; defaults are written out."""
+        table = {}
+        for key, (name, info) in self.toml_keys().items():
+            value = getattr(self, name)
+            if value is not None:
+                table[key] = _plain(value, unit_of(info))
+        return table
+
+
+def _plain(value: Any, unit: str | None) -> Any:
+    if isinstance(value, Spec):
+        return value.to_toml()
+    if isinstance(value, (list, tuple)):
+        return [_plain(v, unit) for v in value]
+    if isinstance(value, Mapping):
+        return {k: _plain(v, unit) for k, v in value.items()}
+    return value if unit is None else toml_number(value, unit)
 
 
 def _hint(key: str, keys: Mapping[str, tuple[str, FieldInfo]]) -> str:
@@ -171,37 +227,59 @@ def _hint(key: str, keys: Mapping[str, tuple[str, FieldInfo]]) -> str:
         unit = unit_of(info)
         if unit is not None and (key == name or (key.startswith(name + "_") and key[len(name) + 1 :] in UNITS)):
             return f"; it is given in {unit}: '{valid}'"
+    for valid, (name, _) in keys.items():
+        if key in (name, valid + "s"):
+            return f"; did you mean {valid!r}?"
     return closest(key, list(keys))
 
 
-def _convert(raw: Any, factor: float, source: str, where: str) -> Any:
-    if isinstance(raw, bool) or not isinstance(raw, (int, float, list, tuple)):
-        raise SpecError(f"{source}: {where} = {raw!r} should be a number")
+def _may_be_infinite(info: FieldInfo) -> bool:
+    """A time may (a correlation time, the end of a fault), and whatever is infinite by default (a range)."""
+    defaults = info.default if isinstance(info.default, tuple) else (info.default,)
+    return unit_of(info) in ("s", "min", "h") or any(isinstance(d, float) and math.isinf(d) for d in defaults)
+
+
+def _convert(raw: Any, factor: float, infinite: bool, source: str, where: str) -> Any:
     if isinstance(raw, (list, tuple)):
-        return tuple(_convert(r, factor, source, where) for r in raw)
+        return tuple(_convert(r, factor, infinite, source, where) for r in raw)
+    if isinstance(raw, bool) or not isinstance(raw, (int, float)):
+        raise SpecError(f"{source}: {where} = {raw!r} should be a number")
+    if math.isnan(raw) or (math.isinf(raw) and not infinite):
+        raise SpecError(f"{source}: {where} = {raw!r} should be a finite number")
     return float(raw) * factor
 
 
-def _spec_types(annotation: Any) -> list[type[Spec]]:
+def spec_types(annotation: Any) -> list[type[Spec]]:
     """The Spec classes inside an annotation (unions, lists, dicts and Annotated are looked through)."""
-    if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
-        return [annotation] if issubclass(annotation, Spec) else []
-    return [s for a in typing.get_args(annotation) for s in _spec_types(a)]
+    if not typing.get_args(annotation):
+        return [annotation] if isinstance(annotation, type) and issubclass(annotation, Spec) else []
+    return [s for a in typing.get_args(annotation) for s in spec_types(a)]
 
 
-def _descend(raw: Any, annotation: Any, source: str, where: str) -> Any:
-    specs = _spec_types(annotation)
-    if not specs:
-        return raw
+def _containers(annotation: Any) -> set[Any]:
+    """The outermost types that the annotation allows (``| None`` is looked through)."""
     origin = typing.get_origin(annotation)
-    while origin is Annotated:
-        annotation = typing.get_args(annotation)[0]
-        origin = typing.get_origin(annotation)
-    if origin in (list, tuple):
+    if origin is Annotated:
+        return _containers(typing.get_args(annotation)[0])
+    if origin in (typing.Union, types.UnionType):
+        return {c for a in typing.get_args(annotation) for c in _containers(a)}
+    return {origin or annotation}
+
+
+def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
+    specs, top = spec_types(info.annotation), _containers(info.annotation)
+    if not specs:
+        # pydantic would read the text "3" as a number, and true as 1.
+        if isinstance(raw, float) and (math.isnan(raw) or (math.isinf(raw) and not _may_be_infinite(info))):
+            raise SpecError(f"{source}: {where} = {raw!r} should be a finite number")
+        if isinstance(raw, (str, bool)) and top & {int, float} and not top & {str, bool}:
+            raise SpecError(f"{source}: {where} = {raw!r} should be a number")
+        return raw
+    if top & {list, tuple}:
         if not isinstance(raw, list):
             raise SpecError(f"{source}: {where} = {raw!r} should be an array of tables ([[{where}]])")
         return tuple(_one(item, specs, source, f"{where}[{i}]") for i, item in enumerate(raw))
-    if origin is dict:
+    if dict in top:
         if not isinstance(raw, Mapping):
             raise SpecError(f"{source}: {where} = {raw!r} should be a table of tables ([{where}.name])")
         # A table that does not say its kind is of the kind that its name says.
@@ -220,7 +298,7 @@ def _one(raw: Any, specs: list[type[Spec]], source: str, where: str, default_kin
     if not isinstance(raw, Mapping):
         raise SpecError(f"{source}: {where} = {raw!r} should be a table")
     by_kind = {k: s for s in specs if (k := _kind(s)) is not None}
-    kind = raw.get("kind", default_kind)
+    kind = raw.get("kind", default_kind if default_kind in by_kind else None)
     if kind is None:
         raise SpecError(f"{source}: {where} has no key 'kind'; one of: {', '.join(by_kind)}")
     if kind not in by_kind:
@@ -228,16 +306,44 @@ def _one(raw: Any, specs: list[type[Spec]], source: str, where: str, default_kin
     return by_kind[kind].from_toml({**raw, "kind": kind}, source=source, path=where)
 
 
+_BOUNDS = {
+    "greater_than": ("gt", "should be greater than"),
+    "greater_than_equal": ("ge", "should be at least"),
+    "less_than": ("lt", "should be less than"),
+    "less_than_equal": ("le", "should be at most"),
+}
+
+
 def _sentence(cls: type[Spec], error: ValidationError, table: Mapping[str, Any], source: str, path: str) -> str:
-    """The first problem of a ValidationError, in the words of the TOML file."""
+    """The first problem of a ValidationError, in the words and units of the TOML file."""
     first = error.errors()[0]
-    names = {name: key for key, (name, _) in cls.toml_keys().items()}
-    location = [str(part) for part in first["loc"]]
-    key = names.get(location[0], location[0]) if location else ""
-    where = ".".join(part for part in (path, key) if part)
-    if first["type"] == "missing":
-        return f"{source}: required key '{where}' is missing"
+    location, context = first["loc"], first.get("ctx", {})
     message = str(first["msg"]).removeprefix("Value error, ").removeprefix("Input ")
     if not location:
-        return f"{source}: {path or 'the file'}: {message}"
+        return f"{source}: {path}: {message}" if path else f"{source}: {message}"
+    keys = {name: (key, info) for key, (name, info) in cls.toml_keys().items()}
+    key, info = keys.get(str(location[0]), (str(location[0]), None))
+    where = f"{path}.{key}" if path else key
+    if first["type"] == "missing" and len(location) == 1:
+        return f"{source}: required key '{where}' is missing"
+    if first["type"] in _BOUNDS:
+        name, words = _BOUNDS[first["type"]]
+        unit = unit_of(info) if info is not None else None
+        bound = float(context[name]) if unit is None else toml_number(float(context[name]), unit)
+        message = f"{words} {bound:g}"
+    elif first["type"] == "literal_error" and info is not None:
+        # repr of a str in pydantic's "expected": 'a', 'b' or 'c'
+        message += closest(
+            str(first["input"]), str(context["expected"]).replace("'", "").replace(" or ", ", ").split(", ")
+        )
+    elif first["type"] in ("missing", "too_long") and info is not None:
+        message = f"should have {_length(info.annotation)} numbers"
     return f"{source}: {where} = {table.get(key, first['input'])!r}: {message}"
+
+
+def _length(annotation: Any) -> str:
+    """Of the tuple inside an annotation."""
+    if typing.get_origin(annotation) is tuple:
+        return str(len(typing.get_args(annotation)))
+    inside = (_length(a) for a in typing.get_args(annotation))
+    return next((n for n in inside if n), "")
