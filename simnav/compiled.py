@@ -3,46 +3,68 @@
 Importing a module with kernels costs nothing: Numba itself is imported, and a kernel compiled or
 loaded from the cache, when the first kernel is called. Numba's own cache notices an edit of the
 file that holds a kernel, but not of a kernel that it calls in another file. Here every kernel's cache
-directory is named after a hash of its source, of all kernels and constants that it uses, directly
-or not, and of the versions of Numba and NumPy; an edit anywhere in that tree opens a new one.
+directory is named after a hash of its code, of all kernels and constants that it uses, directly
+or not, and of the versions of Python, Numba and NumPy; an edit anywhere in that tree opens a new one.
 """
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import hashlib
-import inspect
 import os
 import sys
 import tempfile
+import threading
+import time
 import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Kernel", "cache_directory", "kernel", "kernels"]
+__all__ = ["Kernel", "cache_directory", "kernel", "kernels", "prune"]
+
+#: Cache directories that were not used for this long are deleted by `prune` [s].
+KEEP = 60 * 86400.0
 
 _kernels: list[Kernel] = []
+_compiling = threading.RLock()  # Numba takes the cache directory from a global setting
 
 
-def cache_directory() -> Path:
-    """Where compiled kernels are kept: ``$SIMNAV_CACHE_DIR``, or the user's cache directory."""
-    chosen = os.environ.get("SIMNAV_CACHE_DIR")
-    if chosen:
-        return Path(chosen) / "kernels"
-    if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    elif os.name == "nt":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home()))
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    path = base / "simnav" / "kernels"
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        if os.access(path, os.W_OK):
-            return path
-    except OSError:
-        pass
-    return Path(tempfile.gettempdir()) / f"simnav-{os.getuid() if hasattr(os, 'getuid') else 'user'}" / "kernels"
+def cache_directory() -> Path | None:
+    """Where compiled kernels are kept: the first of these that can be written to.
+
+    ``$SIMNAV_CACHE_DIR``; the user's cache directory; a private directory among the temporary files.
+
+    Returns
+    -------
+    Path or None
+        None where nothing can be written at all: kernels are then compiled in every process.
+    """
+    return _cache_directory(os.environ.get("SIMNAV_CACHE_DIR", ""), os.environ.get("XDG_CACHE_HOME", ""))
+
+
+@functools.lru_cache
+def _cache_directory(chosen: str, xdg: str) -> Path | None:
+    candidates = [Path(chosen).expanduser()] if chosen else []
+    with contextlib.suppress(RuntimeError):  # no home directory
+        if sys.platform == "darwin":
+            candidates.append(Path.home() / "Library" / "Caches" / "simnav")
+        elif os.name == "nt":
+            candidates.append(Path(os.environ.get("LOCALAPPDATA") or Path.home()) / "simnav")
+        else:
+            candidates.append((Path(xdg) if xdg else Path.home() / ".cache") / "simnav")
+    user = str(os.getuid()) if hasattr(os, "getuid") else "user"
+    candidates.append(Path(tempfile.gettempdir()) / f"simnav-{user}")
+    for candidate in candidates:
+        path = candidate / "kernels"
+        with contextlib.suppress(OSError):
+            path.mkdir(parents=True, exist_ok=True, mode=0o700)
+            # The cache is unpickled, so it must be ours. (For root, permissions alone prove nothing: write.)
+            if not hasattr(os, "getuid") or path.stat().st_uid == os.getuid():
+                with tempfile.TemporaryFile(dir=path):
+                    return path
+    return None
 
 
 class Kernel:
@@ -57,7 +79,7 @@ class Kernel:
     fastmath : bool or set of str
     """
 
-    def __init__(self, function: Callable[..., Any], signature: str | None, fastmath: bool | set[str]):
+    def __init__(self, function: types.FunctionType, signature: str | None, fastmath: bool | set[str]):
         self.function = function
         self.signature = signature
         self.fastmath = fastmath
@@ -71,25 +93,15 @@ class Kernel:
     def __repr__(self) -> str:
         return f"<kernel {self.__module__}.{self.__name__}>"
 
-    def _names(self) -> Iterator[str]:
-        code = [self.function.__code__]
-        while code:
-            c = code.pop()
-            yield from c.co_names
-            code += [k for k in c.co_consts if isinstance(k, types.CodeType)]
-
-    def _uses(self) -> Iterator[tuple[str, Any]]:
-        namespace = self.function.__globals__
-        for name in dict.fromkeys(self._names()):
-            if name in namespace:
-                yield name, namespace[name]
+    def __reduce__(self) -> str:
+        return self.__qualname__  # pickled by name, like a function
 
     def fingerprint(self) -> str:
         """Hash of all that decides what this kernel computes (see the module)."""
         import numba
         import numpy as np
 
-        text: list[str] = [numba.__version__, np.__version__]
+        text = [str(sys.implementation.cache_tag), numba.__version__, np.__version__]
         seen: set[int] = set()
         todo: list[Kernel] = [self]
         while todo:
@@ -97,51 +109,141 @@ class Kernel:
             if id(k) in seen:
                 continue
             seen.add(id(k))
-            text += [k.__module__, repr(k.signature), repr(k.fastmath), inspect.getsource(k.function)]
-            for name, value in k._uses():
+            fastmath = sorted(k.fastmath) if isinstance(k.fastmath, set) else k.fastmath
+            text += [k.__module__, k.__qualname__, f"{k.signature!r} {fastmath!r}"]
+            # The code in memory is hashed, not the file: a file may be edited after it was imported.
+            text += _code_text(k.function.__code__)
+            text.append(repr(k.function.__defaults__))
+            for name, value in _uses(k.function):
                 if isinstance(value, Kernel):
                     todo.append(value)
-                elif isinstance(value, (bool, int, float, complex, str, tuple)):
-                    text.append(f"{name}={value!r}")
-                elif isinstance(value, np.ndarray):
-                    text.append(f"{name}={value.dtype}{value.shape}{value.tobytes()!r}")
-        return hashlib.blake2b("\0".join(text).encode(), digest_size=8).hexdigest()
+                else:
+                    text += [name, *_value_text(value)]
+        return hashlib.blake2b("\0".join(text).encode(errors="replace"), digest_size=8).hexdigest()
+
+    def directory(self) -> Path | None:
+        """The cache directory of this kernel as it is now, or None if there is no cache."""
+        root = cache_directory()
+        # Without a file (a notebook, a console) Numba would fall back on a cache that we do not control.
+        if root is None or not os.path.exists(self.function.__code__.co_filename):
+            return None
+        return root / self.fingerprint()
+
+    def cached(self) -> bool:
+        """Whether the cache holds this kernel (it has a signature)."""
+        directory = self.directory()
+        return directory is not None and any(directory.glob("*/*.nbi"))
 
     def compile(self) -> Callable[..., Any]:
         """Compile, or load from the cache, once; return the compiled function."""
-        if self._dispatcher is None:
-            import numba
-            from numba.core import config
+        with _compiling:
+            if self._dispatcher is None:
+                directory = self.directory()
+                if directory is not None:
+                    try:
+                        directory.mkdir(mode=0o700, exist_ok=True)
+                        os.utime(directory)  # in use: see `prune`
+                        self._dispatcher = self._jit(str(directory))
+                    except OSError:  # a full disk must not stop a run
+                        self._dispatcher = None
+                if self._dispatcher is None:
+                    self._dispatcher = self._jit(None)
+            return self._dispatcher
 
-            directory = cache_directory() / self.fingerprint()
-            namespace = dict(self.function.__globals__)
-            for name, value in self._uses():
-                if isinstance(value, Kernel):
-                    namespace[name] = value.compile()
-            function = types.FunctionType(
-                self.function.__code__,
-                namespace,
-                self.function.__name__,
-                self.function.__defaults__,
-                self.function.__closure__,
-            )
-            function.__qualname__ = self.function.__qualname__
-            function.__module__ = self.__module__
-            previous = config.CACHE_DIR
-            config.CACHE_DIR = str(directory)
-            try:
-                options = {"nopython": True, "cache": True, "fastmath": self.fastmath, "error_model": "numpy"}
-                decorate = numba.jit(**options) if self.signature is None else numba.jit(self.signature, **options)
-                self._dispatcher = decorate(function)
-            finally:
-                config.CACHE_DIR = previous
-        return self._dispatcher
+    def _jit(self, directory: str | None) -> Callable[..., Any]:
+        import numba
+        from numba.core import config as numba_config
+
+        config: Any = numba_config
+        original = self.function
+        namespace = dict(original.__globals__)
+        namespace.update(
+            {
+                name: value.compile()
+                for name, value in _uses(original)
+                if isinstance(value, Kernel) and value is not self
+            }
+        )
+        closure = original.__closure__
+        if closure is not None:
+            cells = [c.cell_contents for c in closure]
+            closure = tuple(types.CellType(v.compile() if isinstance(v, Kernel) else v) for v in cells)
+        function = types.FunctionType(original.__code__, namespace, original.__name__, original.__defaults__, closure)
+        function.__qualname__ = original.__qualname__
+        function.__module__ = self.__module__
+        options: dict[str, Any] = {"nopython": True, "cache": directory is not None, "error_model": "numpy"}
+        options["fastmath"] = self.fastmath
+        decorate = numba.jit(**options) if self.signature is None else numba.jit(self.signature, **options)
+        previous = config.CACHE_DIR
+        config.CACHE_DIR = directory or previous
+        try:
+            compiled: Callable[..., Any] = decorate(function)
+        finally:
+            config.CACHE_DIR = previous
+        return compiled
 
     def __call__(self, *args: Any) -> Any:
         return (self._dispatcher or self.compile())(*args)
 
 
-def kernel(signature: str | None = None, *, fastmath: bool | set[str] = False) -> Callable[[Callable[..., Any]], Kernel]:
+def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+    """A code object and those nested in it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _codes(constant)
+
+
+def _code_text(code: types.CodeType) -> Iterator[str]:
+    """All of a code object that decides what it does: not its lines, not its file."""
+    for c in _codes(code):
+        yield c.co_code.hex()
+        yield repr((c.co_argcount, c.co_names, c.co_varnames, c.co_freevars, c.co_cellvars))
+        for constant in c.co_consts:
+            if isinstance(constant, frozenset):
+                yield repr(sorted(map(repr, constant)))
+            elif not isinstance(constant, types.CodeType):
+                yield repr(constant)
+
+
+def _uses(function: types.FunctionType) -> Iterator[tuple[str, Any]]:
+    """The globals, closure variables and module attributes that a function names, and their values."""
+    namespace = function.__globals__
+    code: types.CodeType = function.__code__
+    names = list(dict.fromkeys(name for c in _codes(code) for name in c.co_names))
+    for name in names:
+        value = namespace.get(name)
+        if isinstance(value, types.ModuleType) and value.__name__.partition(".")[0] not in sys.stdlib_module_names:
+            if value.__name__.partition(".")[0] != "numpy":
+                yield from ((f"{name}.{n}", vars(value)[n]) for n in names if n in vars(value))
+        elif name in namespace:
+            yield name, value
+    for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
+
+
+def _value_text(value: Any) -> list[str]:
+    """A constant as text, whatever of it a compiled function freezes."""
+    import numpy as np
+
+    if isinstance(value, np.ndarray):
+        return [f"{value.dtype}{value.shape}", value.tobytes().hex()]
+    if isinstance(value, tuple):
+        return [type(value).__name__, *(t for v in value for t in _value_text(v)), ")"]
+    if isinstance(value, (bool, int, float, complex, str, bytes, np.generic)):
+        return [f"{type(value).__name__} {value!r}"]
+    plain = getattr(value, "py_func", None)  # a function compiled by Numba directly
+    if isinstance(plain, types.FunctionType):
+        inner = [(n, v) for n, v in _uses(plain) if v is not value]
+        return [*_code_text(plain.__code__), *(t for n, v in inner for t in [n, *_value_text(v)])]
+    if isinstance(value, type):
+        return [value.__qualname__, repr(getattr(value, "_fields", ()))]  # a named tuple
+    return []
+
+
+def kernel(
+    signature: str | None = None, *, fastmath: bool | set[str] = False
+) -> Callable[[Callable[..., Any]], Kernel]:
     """Make a function a `Kernel`.
 
     Parameters
@@ -154,6 +256,7 @@ def kernel(signature: str | None = None, *, fastmath: bool | set[str] = False) -
     """
 
     def wrap(function: Callable[..., Any]) -> Kernel:
+        assert isinstance(function, types.FunctionType)
         k = Kernel(function, signature, fastmath)
         _kernels.append(k)
         return k
@@ -164,3 +267,23 @@ def kernel(signature: str | None = None, *, fastmath: bool | set[str] = False) -
 def kernels() -> list[Kernel]:
     """All kernels of the modules imported so far that can be compiled ahead."""
     return [k for k in _kernels if k.signature is not None]
+
+
+def prune(older_than: float = KEEP) -> int:
+    """Delete the cached kernels that no process has used for a while; return how many.
+
+    Parameters
+    ----------
+    older_than : float
+        Seconds.
+    """
+    import shutil
+
+    root = cache_directory()
+    count = 0
+    for directory in [] if root is None else root.iterdir():
+        with contextlib.suppress(OSError):  # another process may prune, too
+            if directory.is_dir() and time.time() - directory.stat().st_mtime > older_than:
+                shutil.rmtree(directory, ignore_errors=True)
+                count += 1
+    return count

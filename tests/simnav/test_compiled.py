@@ -1,0 +1,196 @@
+"""Kernels: loaded late, cached, and never served stale."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from simnav import compiled
+
+HELPER = """
+from simnav.compiled import kernel
+OFFSET = {offset}
+
+@kernel()
+def helper(x):
+    return {factor} * x + OFFSET
+"""
+
+CALLER = """
+import numpy as np
+import {package}.inner as inner
+from simnav.compiled import kernel
+from {package}.inner import helper
+
+TABLE = np.array([{table}])
+
+@kernel("f8(f8)")
+def caller(x):
+    return helper(x) + TABLE[0] + inner.OFFSET
+"""
+
+RUN = """
+import sys, time
+sys.path.insert(0, {folder!r})
+from {package}.outer import caller
+assert "numba" not in sys.modules, "importing a kernel must not import numba"
+hit = caller.cached()
+print(caller(1.0), hit)
+"""
+
+
+def write(folder: Path, package: str = "pack", factor: float = 2.0, offset: float = 0.0, table: float = 0.0) -> None:
+    here = folder / package
+    here.mkdir(parents=True, exist_ok=True)
+    (here / "__init__.py").write_text("")
+    (here / "inner.py").write_text(HELPER.format(factor=factor, offset=offset))
+    (here / "outer.py").write_text(CALLER.format(package=package, table=table))
+
+
+def run(folder: Path, cache: Path, package: str = "pack", **env: str) -> tuple[float, bool]:
+    """Value of the kernel at 1, and whether it came from the cache, in a process of its own."""
+    code = RUN.format(folder=str(folder), package=package)
+    environment = os.environ | {"SIMNAV_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"} | env
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    value, hit = done.stdout.split()
+    return float(value), hit == "True"
+
+
+def test_edits_anywhere_below_a_kernel_are_noticed(tmp_path: Path) -> None:
+    """A callee in another file, a constant, a constant in an array, a constant reached through its module."""
+    source, cache = tmp_path / "source", tmp_path / "cache"
+    write(source)
+    assert run(source, cache) == (2.0, False)
+    assert run(source, cache) == (2.0, True)
+    write(source, factor=3.0)
+    assert run(source, cache) == (3.0, False)
+    write(source, factor=3.0, offset=10.0)  # used by the helper, and again through the module
+    assert run(source, cache) == (23.0, False)
+    write(source, factor=3.0, offset=10.0, table=0.5)
+    assert run(source, cache) == (23.5, False)
+    write(source)  # and back
+    assert run(source, cache)[0] == 2.0
+
+
+def test_an_installed_copy_and_its_source_do_not_share_what_differs(tmp_path: Path) -> None:
+    """A package copied elsewhere (as a wheel is) and then edited, with the same time stamps."""
+    source, installed, cache = tmp_path / "source", tmp_path / "site-packages", tmp_path / "cache"
+    write(source)
+    assert run(source, cache)[0] == 2.0
+    shutil.copytree(source, installed)
+    assert run(installed, cache)[0] == 2.0
+    stamp = (installed / "pack" / "inner.py").stat()
+    write(installed, factor=5.0)  # same length, same times
+    os.utime(installed / "pack" / "inner.py", ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+    assert (installed / "pack" / "inner.py").stat().st_size == stamp.st_size
+    assert run(installed, cache) == (5.0, False)
+    assert run(source, cache)[0] == 2.0
+
+
+def test_an_edit_between_import_and_compilation_does_not_poison_the_cache(tmp_path: Path) -> None:
+    source, cache = tmp_path / "source", tmp_path / "cache"
+    write(source, factor=2.0)
+    code = RUN.format(folder=str(source), package="pack").replace("hit =", "input(); hit =")
+    process = subprocess.Popen(
+        [sys.executable, "-c", code.replace("assert", "print('imported', flush=True); assert")],
+        env=os.environ | {"SIMNAV_CACHE_DIR": str(cache)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "imported\n"
+    write(source, factor=7.0)
+    out, _ = process.communicate("\n", timeout=60)
+    assert out.split()[0] == "2.0"
+    assert run(source, cache)[0] == 7.0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs /proc or permissions of POSIX")
+def test_a_cache_that_cannot_be_written_falls_back(tmp_path: Path) -> None:
+    """The chosen folder is a file: the user's cache directory is taken, and still never stale."""
+    source, blocked, home = tmp_path / "source", tmp_path / "blocked", tmp_path / "xdg"
+    blocked.write_text("a file, not a folder")
+    write(source)
+    assert run(source, blocked, XDG_CACHE_HOME=str(home)) == (2.0, False)
+    assert run(source, blocked, XDG_CACHE_HOME=str(home)) == (2.0, True)
+    write(source, factor=4.0)
+    assert run(source, blocked, XDG_CACHE_HOME=str(home)) == (4.0, False)
+    assert not list(source.rglob("*.nbi")), "nothing may be cached beside the source"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="mounts nothing elsewhere")
+def test_no_place_to_write_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocked = tmp_path / "blocked"
+    blocked.write_text("")
+    monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(blocked))
+    monkeypatch.setenv("SIMNAV_CACHE_DIR", str(blocked))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
+    assert compiled.cache_directory() is None
+    compiled._cache_directory.cache_clear()
+
+    @compiled.kernel("f8(f8)")
+    def twice(x: float) -> float:
+        return 2.0 * x
+
+    monkeypatch.setattr(compiled, "cache_directory", lambda: None)
+    assert twice(4.0) == 8.0
+    compiled._kernels.remove(twice)
+
+
+def test_a_full_disk_does_not_stop_a_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from numba.core import caching
+
+    def full(*args: object, **kwargs: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
+
+    @compiled.kernel("f8(f8)")
+    def thrice(x: float) -> float:
+        return 3.0 * x
+
+    assert thrice(4.0) == 12.0
+    compiled._kernels.remove(thrice)
+
+
+def test_prune_keeps_what_is_in_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
+    root = compiled.cache_directory()
+    assert root is not None
+    for name, days in (("old", 61), ("young", 59)):
+        (root / name / "sub").mkdir(parents=True)
+        (root / name / "sub" / "k.nbi").write_text("")
+        stamp = time.time() - days * 86400
+        os.utime(root / name, (stamp, stamp))
+    assert compiled.prune() == 1
+    assert [p.name for p in root.iterdir()] == ["young"]
+
+
+@compiled.kernel("f8(f8)")
+def at_module_level(x: float) -> float:
+    return x + 1.0
+
+
+def test_a_kernel_in_a_closure_and_its_pickle() -> None:
+    def make(inner: compiled.Kernel, scale: float) -> compiled.Kernel:
+        @compiled.kernel("f8(f8)")
+        def made(x: float) -> float:
+            return float(scale * inner(x))
+
+        compiled._kernels.remove(made)
+        return made
+
+    assert make(at_module_level, 2.0)(3.0) == 8.0
+    assert make(at_module_level, 3.0)(3.0) == 12.0
+    assert make(at_module_level, 2.0).fingerprint() != make(at_module_level, 3.0).fingerprint()
+    assert pickle.loads(pickle.dumps(at_module_level)) is at_module_level
