@@ -29,6 +29,7 @@ __all__ = [
     "Measurement",
     "Measurements",
     "NavigationStates",
+    "TapStates",
     "TriadDatasheet",
 ]
 
@@ -393,3 +394,19 @@ class NavigationStates:
         return NavigationStates(
             self.time[index], self.position[index], self.velocity[index], self.attitude[index]
         )
+
+
+@dataclass(frozen=True, eq=False)
+class TapStates(NavigationStates):
+    """The true states at the n sample times of one instrument: what its sensor model works on.
+
+    Attributes
+    ----------
+    angular_rate : (n, 3) array
+        Of the body relative to the Earth, body axes [rad/s].
+    water_velocity : (n, 3) array
+        The current at the vessel, north-east-down [m/s].
+    """
+
+    angular_rate: Array
+    water_velocity: Array

@@ -1,0 +1,174 @@
+"""The WGS-84 Earth: radii of curvature, normal gravity, Earth and transport rate.
+
+Sources: NIMA TR8350.2 (WGS-84); P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation
+Systems*, 2nd ed., Artech House 2013, chapter 2.
+
+The kernels take and return scalars and are used by other kernels; the plain functions beside them work on arrays.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.types import Array
+
+__all__ = [
+    "ECCENTRICITY_SQUARED",
+    "EQUATORIAL_GRAVITY",
+    "FLATTENING",
+    "GRAVITATIONAL_CONSTANT",
+    "ROTATION_RATE",
+    "SEMI_MAJOR_AXIS",
+    "SEMI_MINOR_AXIS",
+    "SOMIGLIANA",
+    "displace",
+    "earth_rate",
+    "gravity",
+    "gravity_scalar",
+    "principal_radii",
+    "radii_scalar",
+    "relative_position",
+]
+
+#: Equatorial radius [m].
+SEMI_MAJOR_AXIS = 6378137.0
+#: Flattening of the ellipsoid [-].
+FLATTENING = 1.0 / 298.257223563
+#: Polar radius [m].
+SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1.0 - FLATTENING)
+#: Square of the first eccentricity [-].
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+#: Rotation rate of the Earth [rad/s].
+ROTATION_RATE = 7.292115e-5
+#: Geocentric gravitational constant [m^3/s^2].
+GRAVITATIONAL_CONSTANT = 3.986004418e14
+#: Normal gravity at the equator [m/s^2].
+EQUATORIAL_GRAVITY = 9.7803253359
+#: Somigliana's constant [-].
+SOMIGLIANA = 0.00193185265241
+_M = ROTATION_RATE**2 * SEMI_MAJOR_AXIS**2 * SEMI_MINOR_AXIS / GRAVITATIONAL_CONSTANT
+_GRADIENT = 2.0 / SEMI_MAJOR_AXIS * (1.0 + FLATTENING + _M)
+_GRADIENT_SIN2 = 4.0 * FLATTENING / SEMI_MAJOR_AXIS
+_CURVATURE = 3.0 / SEMI_MAJOR_AXIS**2
+
+
+@kernel()
+def radii_scalar(sin_latitude):  # type: ignore[no-untyped-def]
+    """Meridian and prime-vertical radius [m] at a sine of latitude (Groves eqs. 2.105-2.106)."""
+    x = 1.0 - ECCENTRICITY_SQUARED * sin_latitude * sin_latitude
+    prime_vertical = SEMI_MAJOR_AXIS / sqrt(x)
+    return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x, prime_vertical
+
+
+@kernel()
+def gravity_scalar(sin_latitude, height):  # type: ignore[no-untyped-def]
+    """Normal gravity [m/s^2], positive down: Somigliana with height terms (Groves eqs. 2.134, 2.139)."""
+    s2 = sin_latitude * sin_latitude
+    surface = EQUATORIAL_GRAVITY * (1.0 + SOMIGLIANA * s2) / sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
+    return surface * (1.0 - (_GRADIENT - _GRADIENT_SIN2 * s2) * height + _CURVATURE * height * height)
+
+
+def principal_radii(latitude: Array | float) -> tuple[Array, Array]:
+    """Radii of curvature of the ellipsoid.
+
+    Parameters
+    ----------
+    latitude : array_like
+        Geodetic [rad].
+
+    Returns
+    -------
+    meridian, prime_vertical : array
+        R_M and R_N [m], the shape of ``latitude`` (Groves eqs. 2.105-2.106).
+    """
+    x = 1.0 - ECCENTRICITY_SQUARED * np.sin(latitude) ** 2
+    prime_vertical = SEMI_MAJOR_AXIS / np.sqrt(x)
+    return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x, prime_vertical
+
+
+def gravity(latitude: Array | float, height: Array | float = 0.0) -> Array:
+    """Normal gravity, positive down.
+
+    Parameters
+    ----------
+    latitude, height : array_like
+        Geodetic latitude [rad] and height above the ellipsoid [m].
+
+    Returns
+    -------
+    array
+        [m/s^2] (Groves eqs. 2.134, 2.139; the small north component at height is left out).
+    """
+    s2 = np.sin(latitude) ** 2
+    surface = EQUATORIAL_GRAVITY * (1.0 + SOMIGLIANA * s2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
+    h = np.asarray(height)
+    return np.asarray(surface * (1.0 - (_GRADIENT - _GRADIENT_SIN2 * s2) * h + _CURVATURE * h**2))
+
+
+def earth_rate(latitude: Array | float) -> Array:
+    """Rotation of the Earth in north-east-down axes.
+
+    Parameters
+    ----------
+    latitude : array_like
+        Geodetic [rad], shape (...).
+
+    Returns
+    -------
+    (..., 3) array
+        [rad/s] (Groves eq. 2.123).
+    """
+    latitude = np.asarray(latitude)
+    zero = np.zeros_like(latitude, dtype=np.float64)
+    return ROTATION_RATE * np.stack([np.cos(latitude), zero, -np.sin(latitude)], axis=-1)
+
+
+def displace(position: Array, offset: Array) -> Array:
+    """Move geodetic positions by small north-east-down offsets.
+
+    Parameters
+    ----------
+    position : (..., 3) array
+        Latitude, longitude [rad], height [m].
+    offset : (..., 3) array
+        North, east, down [m]; small against the Earth's radius.
+
+    Returns
+    -------
+    (..., 3) array
+    """
+    position, offset = np.asarray(position), np.asarray(offset)
+    meridian, prime_vertical = principal_radii(position[..., 0])
+    latitude = position[..., 0] + offset[..., 0] / (meridian + position[..., 2])
+    parallel = (prime_vertical + position[..., 2]) * np.cos(position[..., 0])
+    longitude = position[..., 1] + offset[..., 1] / parallel
+    return np.stack(np.broadcast_arrays(latitude, longitude, position[..., 2] - offset[..., 2]), axis=-1)
+
+
+def relative_position(position: Array, origin: Array) -> Array:
+    """North-east-down offset of geodetic positions from nearby origins: the inverse of `displace`.
+
+    Parameters
+    ----------
+    position, origin : (..., 3) array
+        Latitude, longitude [rad], height [m].
+
+    Returns
+    -------
+    (..., 3) array
+        North, east, down [m], with the radii at the origin; longitudes are compared modulo 2 pi.
+    """
+    position, origin = np.asarray(position), np.asarray(origin)
+    meridian, prime_vertical = principal_radii(origin[..., 0])
+    east = np.remainder(position[..., 1] - origin[..., 1] + np.pi, 2.0 * np.pi) - np.pi
+    return np.stack(
+        [
+            (position[..., 0] - origin[..., 0]) * (meridian + origin[..., 2]),
+            east * (prime_vertical + origin[..., 2]) * np.cos(origin[..., 0]),
+            origin[..., 2] - position[..., 2],
+        ],
+        axis=-1,
+    )

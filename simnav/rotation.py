@@ -1,0 +1,205 @@
+"""Rotations: direction cosine matrices, quaternions, rotation vectors and roll-pitch-yaw.
+
+A DCM here turns body vectors into north-east-down (``v_n = C v_b``). Roll-pitch-yaw is the Z-Y-X sequence, C = R_z(yaw)
+R_y(pitch) R_x(roll). Quaternions are scalar-first. Source: Groves 2013, chapter 2 and appendix E.
+
+The functions work on stacks of rotations and lean on `numpy`; the kernels work on scalars inside other kernels.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.types import Array
+
+__all__ = [
+    "cross",
+    "dcm_from_quaternion",
+    "dcm_from_rotation_vector",
+    "dcm_from_rpy",
+    "quaternion_from_dcm",
+    "rotation_coefficients",
+    "rotation_vector_from_dcm",
+    "rpy_from_dcm",
+    "skew",
+    "wrap_angle",
+]
+
+
+def wrap_angle(angle: Array | float) -> Array:
+    """Angles brought into [-pi, pi).
+
+    Examples
+    --------
+    >>> wrap_angle(np.array([0.0, 3 * np.pi / 2])) / np.pi
+    array([ 0. , -0.5])
+    """
+    return np.remainder(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi
+
+
+def skew(vector: Array) -> Array:
+    """Cross-product matrices: ``skew(a) @ b == cross(a, b)``.
+
+    Parameters
+    ----------
+    vector : (..., 3) array
+
+    Returns
+    -------
+    (..., 3, 3) array
+    """
+    v = np.asarray(vector, dtype=np.float64)
+    s = np.zeros((*v.shape, 3))
+    s[..., 0, 1], s[..., 0, 2], s[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    s[..., 1, 0], s[..., 2, 0], s[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return s
+
+
+def dcm_from_rpy(rpy: Array) -> Array:
+    """DCM body to north-east-down of roll, pitch, yaw.
+
+    Parameters
+    ----------
+    rpy : (..., 3) array
+        [rad].
+
+    Returns
+    -------
+    (..., 3, 3) array
+        Groves eq. 2.22, transposed.
+    """
+    rpy = np.asarray(rpy, dtype=np.float64)
+    (sr, sp, sy), (cr, cp, cy) = np.moveaxis(np.sin(rpy), -1, 0), np.moveaxis(np.cos(rpy), -1, 0)
+    rows = [
+        [cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy],
+        [cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy],
+        [-sp, sr * cp, cr * cp],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def rpy_from_dcm(dcm: Array) -> Array:
+    """Roll, pitch, yaw of a DCM body to north-east-down.
+
+    Parameters
+    ----------
+    dcm : (..., 3, 3) array
+
+    Returns
+    -------
+    (..., 3) array
+        [rad]; pitch in [-pi/2, pi/2] (Groves eq. 2.23).
+    """
+    c = np.asarray(dcm)
+    pitch = np.arctan2(-c[..., 2, 0], np.hypot(c[..., 2, 1], c[..., 2, 2]))
+    roll = np.arctan2(c[..., 2, 1], c[..., 2, 2])
+    yaw = np.arctan2(c[..., 1, 0], c[..., 0, 0])
+    return np.stack([roll, pitch, yaw], axis=-1)
+
+
+def dcm_from_rotation_vector(vector: Array) -> Array:
+    """Matrix exponential of ``skew(vector)`` (Rodrigues' formula).
+
+    Parameters
+    ----------
+    vector : (..., 3) array
+        [rad].
+
+    Returns
+    -------
+    (..., 3, 3) array
+    """
+    v = np.asarray(vector, dtype=np.float64)
+    angle2 = np.sum(v * v, axis=-1)[..., None, None]
+    angle = np.sqrt(angle2)
+    s = skew(v)
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    return np.eye(3) + a * s + b * (s @ s)
+
+
+def rotation_vector_from_dcm(dcm: Array) -> Array:
+    """Rotation vector of a DCM: the inverse of `dcm_from_rotation_vector`, accurate up to pi.
+
+    Parameters
+    ----------
+    dcm : (..., 3, 3) array
+
+    Returns
+    -------
+    (..., 3) array
+        [rad], of length in [0, pi].
+    """
+    q = quaternion_from_dcm(dcm)
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    half = np.arctan2(sine, q[..., :1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        factor = np.where(sine > 1e-12, 2.0 * half / sine, 2.0)
+    return factor * q[..., 1:]
+
+
+def quaternion_from_dcm(dcm: Array) -> Array:
+    """Unit quaternion, scalar first, of a DCM (Shepperd's method: the largest component is divided by).
+
+    Parameters
+    ----------
+    dcm : (..., 3, 3) array
+
+    Returns
+    -------
+    (..., 4) array
+    """
+    c = np.asarray(dcm, dtype=np.float64)
+    d0, d1, d2 = c[..., 0, 0], c[..., 1, 1], c[..., 2, 2]
+    squares = np.stack([1 + d0 + d1 + d2, 1 + d0 - d1 - d2, 1 - d0 + d1 - d2, 1 - d0 - d1 + d2], axis=-1)
+    x, y, z = c[..., 2, 1] - c[..., 1, 2], c[..., 0, 2] - c[..., 2, 0], c[..., 1, 0] - c[..., 0, 1]
+    xy, xz, yz = c[..., 1, 0] + c[..., 0, 1], c[..., 0, 2] + c[..., 2, 0], c[..., 2, 1] + c[..., 1, 2]
+    candidates = np.stack(
+        [
+            np.stack([squares[..., 0], x, y, z], axis=-1),
+            np.stack([x, squares[..., 1], xy, xz], axis=-1),
+            np.stack([y, xy, squares[..., 2], yz], axis=-1),
+            np.stack([z, xz, yz, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(squares, axis=-1)[..., None, None]
+    q = np.take_along_axis(candidates, largest, axis=-2)[..., 0, :]
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def dcm_from_quaternion(quaternion: Array) -> Array:
+    """DCM of a unit quaternion, scalar first (Groves eq. 2.34, transposed).
+
+    Parameters
+    ----------
+    quaternion : (..., 4) array
+
+    Returns
+    -------
+    (..., 3, 3) array
+    """
+    q = np.asarray(quaternion, dtype=np.float64)
+    w, s = q[..., 0, None, None], skew(q[..., 1:])
+    return np.eye(3) + 2.0 * (w * s + s @ s)
+
+
+@kernel()
+def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+    """Vector product of two 3-vectors of scalars."""
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+
+
+@kernel()
+def rotation_coefficients(angle2):  # type: ignore[no-untyped-def]
+    """sin(x)/x and (1 - cos(x))/x^2 for x^2 = ``angle2``, good to rounding."""
+    if angle2 < 1e-3:
+        a = 1.0 - angle2 / 6.0 * (1.0 - angle2 / 20.0 * (1.0 - angle2 / 42.0))
+        b = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0 * (1.0 - angle2 / 56.0))
+        return a, b
+    angle = sqrt(angle2)
+    return sin(angle) / angle, (1.0 - cos(angle)) / angle2

@@ -1,0 +1,374 @@
+"""Strapdown inertial mechanization in north-east-down, and its exact inverse.
+
+`mechanize` integrates IMU samples (means over their intervals) to position, velocity and attitude; `increments` goes
+the other way, from a trajectory to the samples that perfect instruments deliver. Both use one set of equations, so that
+the samples of `increments` re-integrate to the trajectory up to rounding.
+
+With the angle and velocity increments alpha, nu of an interval and alpha', nu' of the one before it:
+
+- rotation vector of the body, with the two-sample coning correction (Savage 1998, part 1, eqs. 39-40)
+  ``phi = alpha + alpha' x alpha / 12``
+- velocity change in the axes at the start of the interval, with rotation and sculling (Savage 1998, part 2, eqs. 22-30)
+  ``dv = nu + b phi x nu + c phi x (phi x nu) + (alpha' x nu + nu' x alpha) / 12``
+  where b = (1 - cos|phi|)/|phi|^2 and c = (1 - sin|phi|/|phi|)/|phi|^2
+- ``v+ = v + (I - zeta x / 2) C dv + (g - (2 w_ie + w_en) x vm) dt`` with zeta = (w_ie + w_en) dt (Groves eq. 5.53)
+- ``p+ = p + T(pm) vm dt``, trapezoidal in velocity (Groves eq. 5.56)
+- ``C+ = exp(-zeta x) C exp(phi x)``
+
+where vm is the mean of the velocities at both ends, and gravity, radii and rates are taken at the middle of the
+interval. The mean angular rate and specific force of `increments` differ from the true means over an interval by a term of
+third order in dt.
+
+References: P. G. Savage, *Strapdown inertial navigation integration algorithm design*, J. Guidance, Control and Dynamics
+21(1) and 21(2), 1998. P. D. Groves 2013, chapter 5.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
+from simnav.rotation import cross, dcm_from_rpy, rotation_coefficients, rpy_from_dcm
+from simnav.types import Array, ImuSamples, NavigationStates
+
+__all__ = ["increments", "integrate", "mechanize", "mechanize_step", "sample_from_motion"]
+
+
+@kernel()
+def local_rates(latitude, height, vm0, vm1, vm2, dt):  # type: ignore[no-untyped-def]
+    """Earth and transport rate, gravity and radii at the middle of an interval that starts at a latitude and height.
+
+    Returns
+    -------
+    tuple of 9 floats
+        w_ie north and down, w_en north, east, down [rad/s], gravity [m/s^2], d(latitude)/d(north) and
+        d(longitude)/d(east) [rad/m], height in the middle [m].
+    """
+    middle = latitude + 0.5 * dt * vm0 / SEMI_MAJOR_AXIS
+    hm = height - 0.5 * dt * vm2
+    s, c = sin(middle), cos(middle)
+    meridian, prime_vertical = radii_scalar(s)
+    per_north = 1.0 / (meridian + hm)
+    per_east = 1.0 / (prime_vertical + hm)
+    return (
+        ROTATION_RATE * c,
+        -ROTATION_RATE * s,
+        vm1 * per_east,
+        -vm0 * per_north,
+        -vm1 * per_east * s / c,
+        gravity_scalar(s, hm),
+        per_north,
+        per_east / c,
+        hm,
+    )
+
+
+@kernel()
+def mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt):  # type: ignore[no-untyped-def]
+    """One interval of the mechanization (equations in the module), in place.
+
+    Parameters
+    ----------
+    position, velocity : (3,) arrays
+    dcm : (3, 3) array
+        Body to north-east-down.
+    memory : (6,) array
+        Angle and velocity increments of the interval before; zeros at the start.
+    w0, w1, w2, f0, f1, f2, dt : float
+        Mean angular rate, mean specific force, length of the interval.
+    """
+    a0, a1, a2 = w0 * dt, w1 * dt, w2 * dt
+    n0, n1, n2 = f0 * dt, f1 * dt, f2 * dt
+    q0, q1, q2 = cross(memory[0], memory[1], memory[2], a0, a1, a2)
+    r0, r1, r2 = a0 + q0 / 12.0, a1 + q1 / 12.0, a2 + q2 / 12.0
+    angle2 = r0 * r0 + r1 * r1 + r2 * r2
+    sa, b = rotation_coefficients(angle2)
+    c = 1.0 / 6.0 - angle2 / 120.0 if angle2 < 1e-3 else (1.0 - sa) / angle2
+    x0, x1, x2 = cross(r0, r1, r2, n0, n1, n2)
+    y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
+    s0, s1, s2 = cross(memory[0], memory[1], memory[2], n0, n1, n2)
+    t0, t1, t2 = cross(memory[3], memory[4], memory[5], a0, a1, a2)
+    d0 = n0 + b * x0 + c * y0 + (s0 + t0) / 12.0
+    d1 = n1 + b * x1 + c * y1 + (s1 + t1) / 12.0
+    d2 = n2 + b * x2 + c * y2 + (s2 + t2) / 12.0
+    memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a0, a1, a2, n0, n1, n2
+    u0 = dcm[0, 0] * d0 + dcm[0, 1] * d1 + dcm[0, 2] * d2
+    u1 = dcm[1, 0] * d0 + dcm[1, 1] * d1 + dcm[1, 2] * d2
+    u2 = dcm[2, 0] * d0 + dcm[2, 1] * d1 + dcm[2, 2] * d2
+    v0, v1, v2 = velocity[0], velocity[1], velocity[2]
+    # The mean velocity is implicit; each pass gains six digits, so that the second is exact to rounding.
+    m0, m1, m2 = v0 + 0.5 * u0, v1 + 0.5 * u1, v2 + 0.5 * (u2 + 9.8 * dt)
+    e0, e2, _, _, _, g, per_north, per_east, hm = local_rates(position[0], position[2], m0, m1, m2, dt)
+    tangent = -e2 / e0
+    z0, z1, z2 = 0.0, 0.0, 0.0
+    for _ in range(3):
+        k0, k1 = m1 * per_east * e0 / ROTATION_RATE, -m0 * per_north
+        k2 = -k0 * tangent
+        z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
+        x0, x1, x2 = cross(z0, z1, z2, u0, u1, u2)
+        y0, y1, y2 = cross(2.0 * e0 + k0, k1, 2.0 * e2 + k2, m0, m1, m2)
+        velocity[0] = v0 + u0 - 0.5 * x0 - dt * y0
+        velocity[1] = v1 + u1 - 0.5 * x1 - dt * y1
+        velocity[2] = v2 + u2 - 0.5 * x2 - dt * y2 + dt * g
+        m0, m1, m2 = 0.5 * (v0 + velocity[0]), 0.5 * (v1 + velocity[1]), 0.5 * (v2 + velocity[2])
+    position[0] += dt * m0 * per_north
+    position[1] += dt * m1 * per_east
+    position[2] -= dt * m2
+    rotate_right(dcm, r0, r1, r2, sa, b)
+    sz, bz = rotation_coefficients(z0 * z0 + z1 * z1 + z2 * z2)
+    for j in range(3):
+        c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
+        x0, x1, x2 = cross(z0, z1, z2, c0, c1, c2)
+        y0, y1, y2 = cross(z0, z1, z2, x0, x1, x2)
+        dcm[0, j] = c0 - sz * x0 + bz * y0
+        dcm[1, j] = c1 - sz * x1 + bz * y1
+        dcm[2, j] = c2 - sz * x2 + bz * y2
+
+
+@kernel()
+def rotate_right(dcm, r0, r1, r2, a, b):  # type: ignore[no-untyped-def]
+    """``dcm = dcm exp(r x)`` in place, with the coefficients a, b of `rotation_coefficients`."""
+    for i in range(3):
+        c0, c1, c2 = dcm[i, 0], dcm[i, 1], dcm[i, 2]
+        # A row times [r x] is row x r.
+        x0, x1, x2 = cross(c0, c1, c2, r0, r1, r2)
+        y0, y1, y2 = cross(x0, x1, x2, r0, r1, r2)
+        dcm[i, 0] = c0 + a * x0 + b * y0
+        dcm[i, 1] = c1 + a * x1 + b * y1
+        dcm[i, 2] = c2 + a * x2 + b * y2
+
+
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
+def mechanize(position, velocity, dcm, memory, angular_rate, specific_force, interval):  # type: ignore[no-untyped-def]
+    """Integrate n IMU samples, in place.
+
+    Parameters
+    ----------
+    position, velocity : (3,) arrays
+        Geodetic [rad, rad, m] and north-east-down [m/s]; updated.
+    dcm : (3, 3) array
+        Body to north-east-down; updated.
+    memory : (6,) array
+        Increments of the sample before (zeros at the start of a run); updated.
+    angular_rate, specific_force : (n, 3) arrays
+        Means over the intervals [rad/s], [m/s^2].
+    interval : (n,) array
+        [s].
+    """
+    for k in range(interval.size):
+        mechanize_step(
+            position, velocity, dcm, memory,
+            angular_rate[k, 0], angular_rate[k, 1], angular_rate[k, 2],
+            specific_force[k, 0], specific_force[k, 1], specific_force[k, 2],
+            interval[k],
+        )  # fmt: skip
+
+
+@kernel(
+    "void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
+)
+def _integrate(position, velocity, dcm, angular_rate, specific_force, interval, positions, velocities, dcms):  # type: ignore[no-untyped-def]
+    memory = np.zeros(6)
+    for k in range(interval.size):
+        mechanize_step(
+            position, velocity, dcm, memory,
+            angular_rate[k, 0], angular_rate[k, 1], angular_rate[k, 2],
+            specific_force[k, 0], specific_force[k, 1], specific_force[k, 2],
+            interval[k],
+        )  # fmt: skip
+        positions[k] = position
+        velocities[k] = velocity
+        dcms[k] = dcm
+
+
+def integrate(position: Array, velocity: Array, attitude: Array, samples: ImuSamples) -> NavigationStates:
+    """Free inertial navigation through n IMU samples.
+
+    Parameters
+    ----------
+    position, velocity, attitude : (3,) arrays
+        The state at the start of the first interval; roll, pitch, yaw.
+    samples : ImuSamples
+
+    Returns
+    -------
+    NavigationStates
+        At the n sample times.
+    """
+    n = len(samples)
+    positions, velocities, dcms = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3, 3))
+    _integrate(
+        np.array(position, dtype=np.float64),
+        np.array(velocity, dtype=np.float64),
+        dcm_from_rpy(attitude),
+        np.ascontiguousarray(samples.angular_rate),
+        np.ascontiguousarray(samples.specific_force),
+        np.ascontiguousarray(samples.interval),
+        positions,
+        velocities,
+        dcms,
+    )
+    return NavigationStates(samples.time, positions, velocities, rpy_from_dcm(dcms))
+
+
+@kernel()
+def sample_from_motion(latitude, height, v, w, c, d, memory, dt):  # type: ignore[no-untyped-def]
+    """What perfect instruments deliver over one interval: the exact inverse of `mechanize_step`.
+
+    Parameters
+    ----------
+    latitude, height : float
+        At the start of the interval.
+    v, w : tuples of 3 floats
+        Velocity at the start and at the end.
+    c, d : tuples of 9 floats
+        DCM body to north-east-down at the start and at the end, row by row.
+    memory : (6,) array
+        Increments of the interval before; updated.
+    dt : float
+
+    Returns
+    -------
+    tuple of 9 floats
+        Mean angular rate and specific force; latitude and longitude change [rad] and height change [m].
+    """
+    m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
+    e0, e2, k0, k1, k2, g, per_north, per_east, _ = local_rates(latitude, height, m0, m1, m2, dt)
+    z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
+    # Body rotation: exp(phi x) = C' exp(zeta x) D
+    sz, bz = rotation_coefficients(z0 * z0 + z1 * z1 + z2 * z2)
+    b00, b10, b20 = _rotated(z0, z1, z2, sz, bz, d[0], d[3], d[6])
+    b01, b11, b21 = _rotated(z0, z1, z2, sz, bz, d[1], d[4], d[7])
+    b02, b12, b22 = _rotated(z0, z1, z2, sz, bz, d[2], d[5], d[8])
+    # Twice the sine of the angle times its axis, from the skew part; and twice the cosine plus one from the trace.
+    x0 = (c[2] * b01 + c[5] * b11 + c[8] * b21) - (c[1] * b02 + c[4] * b12 + c[7] * b22)
+    x1 = (c[0] * b02 + c[3] * b12 + c[6] * b22) - (c[2] * b00 + c[5] * b10 + c[8] * b20)
+    x2 = (c[1] * b00 + c[4] * b10 + c[7] * b20) - (c[0] * b01 + c[3] * b11 + c[6] * b21)
+    sine2 = 0.25 * (x0 * x0 + x1 * x1 + x2 * x2)
+    # asin(s)/s: a sample turns by far less than a quarter turn
+    if sine2 < 1e-3:
+        ratio = 1.0 + sine2 * (1.0 / 6.0 + sine2 * (3.0 / 40.0 + sine2 * (15.0 / 336.0 + sine2 * (105.0 / 3456.0))))
+    else:
+        ratio = np.arcsin(min(1.0, sqrt(sine2))) / sqrt(sine2)
+    r0, r1, r2 = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
+    # alpha from phi = (I + [alpha'/12 x]) alpha
+    h0, h1, h2 = memory[0] / 12.0, memory[1] / 12.0, memory[2] / 12.0
+    norm2 = h0 * h0 + h1 * h1 + h2 * h2
+    dot = h0 * r0 + h1 * r1 + h2 * r2
+    q0, q1, q2 = cross(h0, h1, h2, r0, r1, r2)
+    a0 = (r0 - q0 + h0 * dot) / (1.0 + norm2)
+    a1 = (r1 - q1 + h1 * dot) / (1.0 + norm2)
+    a2 = (r2 - q2 + h2 * dot) / (1.0 + norm2)
+    # Velocity change in the axes at the start: u = C dv, from v+ - v = (I - zeta x / 2) u + gravity and Coriolis
+    y0, y1, y2 = cross(2.0 * e0 + k0, k1, 2.0 * e2 + k2, m0, m1, m2)
+    p0, p1, p2 = w[0] - v[0] + dt * y0, w[1] - v[1] + dt * y1, w[2] - v[2] + dt * y2 - dt * g
+    l0, l1, l2 = -0.5 * z0, -0.5 * z1, -0.5 * z2
+    norm2 = l0 * l0 + l1 * l1 + l2 * l2
+    dot = l0 * p0 + l1 * p1 + l2 * p2
+    q0, q1, q2 = cross(l0, l1, l2, p0, p1, p2)
+    u0 = (p0 - q0 + l0 * dot) / (1.0 + norm2)
+    u1 = (p1 - q1 + l1 * dot) / (1.0 + norm2)
+    u2 = (p2 - q2 + l2 * dot) / (1.0 + norm2)
+    t0, t1, t2 = cross(memory[3], memory[4], memory[5], a0, a1, a2)
+    d0 = c[0] * u0 + c[3] * u1 + c[6] * u2 - t0 / 12.0
+    d1 = c[1] * u0 + c[4] * u1 + c[7] * u2 - t1 / 12.0
+    d2 = c[2] * u0 + c[5] * u1 + c[8] * u2 - t2 / 12.0
+    # nu from (I + b phi x + c (phi x)^2 + alpha'/12 x) nu = d: diagonally dominant, by Cramer's rule
+    angle2 = r0 * r0 + r1 * r1 + r2 * r2
+    sa, b = rotation_coefficients(angle2)
+    k = 1.0 / 6.0 - angle2 / 120.0 if angle2 < 1e-3 else (1.0 - sa) / angle2
+    g0, g1, g2 = b * r0 + h0, b * r1 + h1, b * r2 + h2
+    m00, m11, m22 = 1.0 + k * (r0 * r0 - angle2), 1.0 + k * (r1 * r1 - angle2), 1.0 + k * (r2 * r2 - angle2)
+    m01, m10 = k * r0 * r1 - g2, k * r0 * r1 + g2
+    m02, m20 = k * r0 * r2 + g1, k * r0 * r2 - g1
+    m12, m21 = k * r1 * r2 - g0, k * r1 * r2 + g0
+    x0, x1, x2 = cross(m01, m11, m21, m02, m12, m22)
+    determinant = m00 * x0 + m10 * x1 + m20 * x2
+    n0 = (d0 * x0 + d1 * x1 + d2 * x2) / determinant
+    y0, y1, y2 = cross(m02, m12, m22, m00, m10, m20)
+    n1 = (d0 * y0 + d1 * y1 + d2 * y2) / determinant
+    t0, t1, t2 = cross(m00, m10, m20, m01, m11, m21)
+    n2 = (d0 * t0 + d1 * t1 + d2 * t2) / determinant
+    memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a0, a1, a2, n0, n1, n2
+    return (
+        a0 / dt, a1 / dt, a2 / dt, n0 / dt, n1 / dt, n2 / dt,
+        dt * m0 * per_north, dt * m1 * per_east, -dt * m2,
+    )  # fmt: skip
+
+
+@kernel()
+def _rotated(z0, z1, z2, a, b, c0, c1, c2):  # type: ignore[no-untyped-def]
+    """``exp(z x) c`` with the coefficients a, b of `rotation_coefficients`."""
+    x0, x1, x2 = cross(z0, z1, z2, c0, c1, c2)
+    y0, y1, y2 = cross(z0, z1, z2, x0, x1, x2)
+    return c0 + a * x0 + b * y0, c1 + a * x1 + b * y1, c2 + a * x2 + b * y2
+
+
+@kernel("void(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _increments(time, velocity, dcm, memory, position, angular_rate, specific_force):  # type: ignore[no-untyped-def]
+    for k in range(time.size - 1):
+        dt = time[k + 1] - time[k]
+        a, b = dcm[k], dcm[k + 1]
+        out = sample_from_motion(
+            position[k, 0],
+            position[k, 2],
+            (velocity[k, 0], velocity[k, 1], velocity[k, 2]),
+            (velocity[k + 1, 0], velocity[k + 1, 1], velocity[k + 1, 2]),
+            (a[0, 0], a[0, 1], a[0, 2], a[1, 0], a[1, 1], a[1, 2], a[2, 0], a[2, 1], a[2, 2]),
+            (b[0, 0], b[0, 1], b[0, 2], b[1, 0], b[1, 1], b[1, 2], b[2, 0], b[2, 1], b[2, 2]),
+            memory,
+            dt,
+        )
+        angular_rate[k, 0], angular_rate[k, 1], angular_rate[k, 2] = out[0], out[1], out[2]
+        specific_force[k, 0], specific_force[k, 1], specific_force[k, 2] = out[3], out[4], out[5]
+        position[k + 1, 0] = position[k, 0] + out[6]
+        position[k + 1, 1] = position[k, 1] + out[7]
+        position[k + 1, 2] = position[k, 2] + out[8]
+
+
+def increments(time: Array, position: Array, velocity: Array, attitude: Array) -> tuple[ImuSamples, Array]:
+    """What perfect instruments deliver on a trajectory: the exact inverse of `integrate`.
+
+    Parameters
+    ----------
+    time : (n + 1,) array
+        Ascending [s].
+    position : (3,) array
+        Geodetic, at the first time; the others follow from the velocity, as the mechanization integrates it.
+    velocity : (n + 1, 3) array
+        North-east-down [m/s].
+    attitude : (n + 1, 3) array
+        Roll, pitch, yaw [rad]; less than a quarter turn a sample.
+
+    Returns
+    -------
+    samples : ImuSamples
+        n samples, at ``time[1:]``.
+    positions : (n + 1, 3) array
+
+    Raises
+    ------
+    ValueError
+        If the times do not ascend.
+    """
+    time = np.ascontiguousarray(time, dtype=np.float64)
+    interval = np.diff(time)
+    if not np.all(interval > 0.0):
+        raise ValueError(f"times must ascend; they do not at index {int(np.argmin(interval > 0.0)) + 1}")
+    n = len(interval)
+    positions = np.empty((n + 1, 3))
+    positions[0] = position
+    rate, force = np.empty((n, 3)), np.empty((n, 3))
+    _increments(
+        time,
+        np.ascontiguousarray(velocity, dtype=np.float64),
+        dcm_from_rpy(attitude),
+        np.zeros(6),
+        positions,
+        rate,
+        force,
+    )
+    return ImuSamples(time[1:], interval, rate, force), positions

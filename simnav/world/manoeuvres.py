@@ -1,0 +1,171 @@
+"""Manoeuvres: what the vessel is told to do, one after the other.
+
+Each is a `Spec`; `table` turns a list of them into the numeric rows that the motion kernel walks through. After the last one
+the vessel holds its course, speed and depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from simnav.spec import NonNegative, Positive, Spec, quantity
+from simnav.types import Array
+
+__all__ = ["Accelerate", "Dive", "Hold", "LawnMower", "Manoeuvre", "Surface", "Turn", "Waypoints", "ZigZag", "table"]
+
+HOLD, ACCELERATE, TURN, ZIGZAG, WAYPOINTS, DEPTH = range(6)
+#: Columns of a row: kind, duration, and four parameters that depend on the kind.
+COLUMNS = 6
+
+Angle = Annotated[float, Field(gt=0.0, lt=1.5707963267948966)]
+Point = tuple[float, float]
+
+
+class Hold(Spec):
+    """Hold course, speed and depth for a time."""
+
+    kind: Literal["hold"] = "hold"
+    duration: Positive = quantity("s")
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row."""
+        return [HOLD, self.duration, 0.0, 0.0, 0.0, 0.0]
+
+
+class Accelerate(Spec):
+    """Change to a speed, at a constant acceleration or as fast as the vessel answers; hold it if a duration is left."""
+
+    kind: Literal["accelerate"] = "accelerate"
+    speed: NonNegative = quantity("m_s")
+    acceleration: Positive | None = quantity("m_s2", None)
+    duration: Positive | None = quantity("s", None)
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row."""
+        return [ACCELERATE, self.duration or inf, self.speed, self.acceleration or inf, 0.0, 0.0]
+
+
+class Turn(Spec):
+    """Turn by an angle (positive to starboard) or for a time, at a rate or on a radius.
+
+    Without rate and radius the vessel's own turn rate holds; with a duration alone the sign of the rate decides.
+    """
+
+    kind: Literal["turn"] = "turn"
+    angle: float | None = quantity("deg", None)
+    rate: float | None = quantity("deg_s", None)
+    radius: Positive | None = quantity("m", None)
+    duration: Positive | None = quantity("s", None)
+
+    @model_validator(mode="after")
+    def _determined(self) -> Self:
+        if self.rate is not None and self.radius is not None:
+            raise ValueError("a turn has rate_deg_s or radius_m, not both")
+        if self.rate == 0.0:
+            raise ValueError("rate_deg_s = 0 does not turn; use a hold")
+        if (self.angle is None) == (self.duration is None):
+            raise ValueError("a turn has angle_deg or duration_s, one of the two")
+        if self.angle == 0.0:
+            raise ValueError("angle_deg = 0 does not turn; use a hold")
+        return self
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row."""
+        sign = -1.0 if (self.angle if self.angle is not None else self.rate or 1.0) < 0.0 else 1.0
+        angle = sign * inf if self.angle is None else self.angle
+        return [TURN, self.duration or inf, angle, abs(self.rate or 0.0), self.radius or 0.0, 0.0]
+
+
+class ZigZag(Spec):
+    """Swing to either side of the course: turn until the heading is off by the angle, then the other way."""
+
+    kind: Literal["zigzag"] = "zigzag"
+    angle: Angle = quantity("deg")
+    rate: Positive | None = quantity("deg_s", None)
+    duration: Positive = quantity("s")
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row."""
+        return [ZIGZAG, self.duration, self.angle, self.rate or 0.0, 0.0, 0.0]
+
+
+class Waypoints(Spec):
+    """Steer for points (north, east of the start) one after the other; a point counts as reached inside the radius."""
+
+    kind: Literal["waypoints"] = "waypoints"
+    points: Annotated[tuple[Point, ...], Field(min_length=1)] = quantity("m")
+    acceptance_radius: Positive = quantity("m", 50.0)
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row; appends the points."""
+        first = len(points)
+        points.extend(self.points)
+        return [WAYPOINTS, inf, float(first), float(len(points)), self.acceptance_radius, 0.0]
+
+
+class LawnMower(Spec):
+    """Survey parallel legs, from where the vessel is and along its heading."""
+
+    kind: Literal["lawn_mower"] = "lawn_mower"
+    leg: Positive = quantity("m")
+    spacing: Positive = quantity("m")
+    legs: Annotated[int, Field(ge=1)] = 4
+    first_turn: Literal["starboard", "port"] = "starboard"
+    acceptance_radius: Positive = quantity("m", 10.0)
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row; appends the ends of the legs, in the axes of the vessel at the start of the survey."""
+        first = len(points)
+        side = self.spacing if self.first_turn == "starboard" else -self.spacing
+        for i in range(self.legs):
+            ends = (0.0, self.leg) if i % 2 == 0 else (self.leg, 0.0)
+            points.extend((end, i * side) for end in ends)
+        del points[first]  # the vessel is there
+        return [WAYPOINTS, inf, float(first), float(len(points)), self.acceptance_radius, 1.0]
+
+
+class Dive(Spec):
+    """Go to a depth at a path angle, and hold it."""
+
+    kind: Literal["dive"] = "dive"
+    depth: NonNegative = quantity("m")
+    angle: Angle = quantity("deg", 0.2617993877991494)
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row."""
+        return [DEPTH, inf, self.depth, self.angle, 0.0, 0.0]
+
+
+class Surface(Spec):
+    """Come up to the surface at a path angle."""
+
+    kind: Literal["surface"] = "surface"
+    angle: Angle = quantity("deg", 0.2617993877991494)
+
+    def row(self, points: list[Point]) -> list[float]:
+        """The kernel's row."""
+        return [DEPTH, inf, 0.0, self.angle, 0.0, 0.0]
+
+
+Manoeuvre = Hold | Accelerate | Turn | ZigZag | Waypoints | LawnMower | Dive | Surface
+
+
+def table(manoeuvres: Sequence[Manoeuvre]) -> tuple[Array, Array]:
+    """Rows and points for the motion kernel.
+
+    Returns
+    -------
+    rows : (n, 6) array
+    points : (m, 2) array
+    """
+    points: list[Point] = []
+    rows = [m.row(points) for m in manoeuvres]
+    return (
+        np.array(rows, dtype=np.float64).reshape(-1, COLUMNS),
+        np.array(points, dtype=np.float64).reshape(-1, 2),
+    )

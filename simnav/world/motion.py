@@ -1,0 +1,299 @@
+"""The motion kernel: commands, vessel dynamics, waves and current to a smooth truth and ideal inertial samples.
+
+Per sample it walks the manoeuvre table (guidance), advances speed, yaw rate and flight-path angle through critically damped lags,
+turns the wave components by their encounter phase, composes velocity and attitude, and inverts the strapdown equations to
+what perfect instruments deliver (`simnav.strapdown.sample_from_motion`), so that truth and samples agree to rounding.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, exp, inf, sin
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.earth import ROTATION_RATE
+from simnav.strapdown import sample_from_motion
+from simnav.world.manoeuvres import ACCELERATE, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
+
+__all__ = ["PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "initialise"]
+
+# Where things stand in the state vector.
+U, DU, R, DR, PSI, GAMMA, DGAMMA, DEPTH_CALM, NORTH, EAST = range(10)
+LATITUDE, LONGITUDE, HEIGHT = 10, 11, 12
+V = 13
+C = 16
+MEMORY = 25
+SPEED_COMMAND, SPEED_TARGET, SPEED_SLEW, PSI_REFERENCE, RATE_LIMIT, DEPTH_REFERENCE, GAMMA_LIMIT = range(31, 38)
+SEGMENT_TIME, SEGMENT_PSI, SEGMENT_SIGN, SEGMENT_NORTH, SEGMENT_EAST = range(38, 43)
+BODY_RATE = 43
+ERROR_NORTH, ERROR_EAST = 46, 47
+ROLL, PITCH = 48, 49
+STATE = 50
+# ... in the integer state: sample, segment, waypoint, whether the segment has begun
+# ... and in the parameters.
+DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)
+PARAMETERS = 11
+#: Columns of a tap: position 0:3, velocity 3:6, roll, pitch, yaw 6:9, angular rate 9:12, current north, east 12:14.
+TAP_COLUMNS = 14
+
+
+@kernel(fastmath={"reassoc", "contract", "nsz", "arcp"})
+def _waves(phase, table, north, east, dt):  # type: ignore[no-untyped-def]
+    """Turn the components' phases by one step (velocity through the water north, east) and sum the seven responses."""
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
+    for i in range(phase.shape[1]):
+        rate = table[0, i] - table[1, i] * north - table[2, i] * east
+        d = rate * dt
+        d2 = d * d
+        # Encounter phases turn by less than 0.2 rad a sample; the series are good to rounding there.
+        sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
+        cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
+        c0, c1 = phase[0, i], phase[1, i]
+        c = c0 * cd - c1 * sd
+        s = c1 * cd + c0 * sd
+        phase[0, i] = c
+        phase[1, i] = s
+        s0 += rate * (table[4, i] * c - table[3, i] * s)
+        s1 += rate * (table[6, i] * c - table[5, i] * s)
+        s2 += rate * (table[8, i] * c - table[7, i] * s)
+        s3 += table[9, i] * c + table[10, i] * s
+        s4 += table[11, i] * c + table[12, i] * s
+        s5 += table[13, i] * c + table[14, i] * s
+        s6 += table[15, i] * c + table[16, i] * s
+    return s0, s1, s2, s3, s4, s5, s6
+
+
+@kernel()
+def _lag(x, dx, command, dt, tau, decay):  # type: ignore[no-untyped-def]
+    """Exact step of a critically damped second-order lag under a constant command; ``decay`` is exp(-dt/tau)."""
+    y = x - command
+    b = dx + y / tau
+    return command + (y + b * dt) * decay, (dx - b * dt / tau) * decay
+
+
+@kernel()
+def _wrap(angle):  # type: ignore[no-untyped-def]
+    return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+
+
+@kernel()
+def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
+    """Walk the manoeuvre table; leave the references in the state and return the commanded yaw rate."""
+    psi = x[PSI]
+    # Where the heading would come to rest if the rate were commanded to zero now.
+    rest = psi + 2.0 * p[TAU_R] * x[R] + p[TAU_R] ** 2 * x[DR]
+    direct = inf  # a rate commanded past the heading loop
+    for _ in range(rows.shape[0] + 1):
+        i = index[1]
+        if i >= rows.shape[0]:
+            break
+        kind = int(rows[i, 0])
+        if index[3] == 0:
+            index[3] = 1
+            x[SEGMENT_TIME] = time
+            x[SEGMENT_PSI] = x[PSI_REFERENCE]
+            x[SEGMENT_NORTH], x[SEGMENT_EAST] = x[NORTH], x[EAST]
+            x[RATE_LIMIT] = p[TURN_RATE]
+            if kind == ACCELERATE:
+                x[SPEED_TARGET], x[SPEED_SLEW] = rows[i, 2], rows[i, 3]
+            elif kind == TURN:
+                x[SEGMENT_SIGN] = 1.0 if rows[i, 2] > 0.0 else -1.0
+                if abs(rows[i, 2]) < inf:
+                    x[PSI_REFERENCE] += rows[i, 2]
+            elif kind == ZIGZAG:
+                x[SEGMENT_SIGN] = 1.0
+            elif kind == WAYPOINTS:
+                index[2] = int(rows[i, 2])
+            elif kind == DEPTH:
+                x[DEPTH_REFERENCE], x[GAMMA_LIMIT] = rows[i, 2], rows[i, 3]
+        done = time - x[SEGMENT_TIME] >= rows[i, 1] - 1e-9
+        if kind == HOLD:
+            pass
+        elif kind == ACCELERATE:
+            reached = abs(x[U] - rows[i, 2]) < 0.01 * max(1.0, rows[i, 2]) and abs(x[DU]) < 1e-3
+            done = done or (rows[i, 1] == inf and reached)
+        elif kind == TURN:
+            rate = rows[i, 3]
+            if rows[i, 4] > 0.0:
+                rate = x[U] / rows[i, 4]
+            if rate <= 0.0:
+                rate = p[TURN_RATE]
+            x[RATE_LIMIT] = rate
+            if abs(rows[i, 2]) < inf:
+                done = done or (abs(x[PSI_REFERENCE] - psi) < 0.005 and abs(x[R]) < 5e-4)
+            elif done:
+                x[PSI_REFERENCE] = rest
+            else:
+                direct = x[SEGMENT_SIGN] * rate
+        elif kind == ZIGZAG:
+            rate = rows[i, 3] if rows[i, 3] > 0.0 else p[TURN_RATE]
+            if x[SEGMENT_SIGN] * (psi - x[SEGMENT_PSI]) >= rows[i, 2]:
+                x[SEGMENT_SIGN] = -x[SEGMENT_SIGN]
+            if not done:
+                direct = x[SEGMENT_SIGN] * rate
+        elif kind == WAYPOINTS:
+            # Steered by where the navigator believes the vessel to be.
+            north, east = x[NORTH] + x[ERROR_NORTH], x[EAST] + x[ERROR_EAST]
+            while True:
+                j = index[2]
+                if j >= int(rows[i, 3]):
+                    done = True
+                    break
+                a, b = points[j, 0], points[j, 1]
+                if rows[i, 5] > 0.0:
+                    c, s = cos(x[SEGMENT_PSI]), sin(x[SEGMENT_PSI])
+                    a, b = x[SEGMENT_NORTH] + c * a - s * b, x[SEGMENT_EAST] + s * a + c * b
+                if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2:
+                    x[PSI_REFERENCE] = psi + _wrap(atan2(b - east, a - north) - psi)
+                    break
+                index[2] += 1
+        elif kind == DEPTH:
+            done = done or (abs(x[DEPTH_CALM] - rows[i, 2]) < 0.5 and abs(x[GAMMA]) < 0.02)
+        if not done:
+            break
+        index[1] += 1
+        index[3] = 0
+        direct = inf
+    if direct < inf:
+        return direct
+    wanted = (x[PSI_REFERENCE] - psi) / (4.0 * p[TAU_R])
+    return min(max(wanted, -x[RATE_LIMIT]), x[RATE_LIMIT])
+
+
+@kernel()
+def _compose(x, p, w0, w1, w2, w3, w4, w5, w6):  # type: ignore[no-untyped-def]
+    """Velocity (3), DCM (9), roll and pitch of the state with the wave responses w0 ... w6 on top."""
+    cp, sp = cos(x[PSI]), sin(x[PSI])
+    cg, sg = cos(x[GAMMA]), sin(x[GAMMA])
+    shade = exp(-p[ATTENUATION] * max(0.0, x[DEPTH_CALM]))
+    flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
+    v0 = x[U] * cg * cp + flow * p[CURRENT_N] + shade * w0
+    v1 = x[U] * cg * sp + flow * p[CURRENT_E] + shade * w1
+    v2 = -x[U] * sg + shade * w2
+    roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * x[U] * x[R] / 9.81
+    pitch = x[GAMMA] + shade * (w5 * cp + w6 * sp)
+    cr, sr = cos(roll), sin(roll)
+    ct, st = cos(pitch), sin(pitch)
+    return (
+        (v0, v1, v2),
+        (
+            ct * cp, sr * st * cp - cr * sp, cr * st * cp + sr * sp,
+            ct * sp, sr * st * sp + cr * cp, cr * st * sp - sr * cp,
+            -st, sr * ct, cr * ct,
+        ),
+        roll,
+        pitch,
+    )  # fmt: skip
+
+
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def initialise(x, p, phase, table):  # type: ignore[no-untyped-def]
+    """Complete the state at time 0: velocity and attitude with the waves as they are then."""
+    w = _waves(phase, table, x[U] * cos(x[GAMMA]) * cos(x[PSI]), x[U] * cos(x[GAMMA]) * sin(x[PSI]), 0.0)
+    v, c, roll, pitch = _compose(x, p, w[0], w[1], w[2], w[3], w[4], w[5], w[6])
+    x[V], x[V + 1], x[V + 2] = v
+    for i in range(9):
+        x[C + i] = c[i]
+    x[ROLL], x[PITCH] = roll, pitch
+
+
+@kernel(
+    "void(f8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+)
+def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force):  # type: ignore[no-untyped-def]
+    """Advance the world by n samples.
+
+    Parameters
+    ----------
+    x : (50,) array
+        State; updated.
+    index : (4,) int array
+        Sample, segment, waypoint, whether the segment has begun; updated.
+    p : (11,) array
+        Parameters.
+    rows, points : arrays
+        The manoeuvre table.
+    phase, table : arrays
+        The wave components (`simnav.world.sea.components`); the phases are updated.
+    tap_time : (m,) array
+        Ascending times within the block at which the state is wanted [s].
+    taps : (m, 14) array
+        Filled with the states at those times.
+    rate, force : (n, 3) arrays
+        Filled with the ideal mean angular rate and specific force.
+    """
+    dt = p[DT]
+    decay_u, decay_r, decay_g = exp(-dt / p[TAU_U]), exp(-dt / p[TAU_R]), exp(-dt / p[TAU_G])
+    memory = x[MEMORY : MEMORY + 6]
+    tap = 0
+    for k in range(rate.shape[0]):
+        t0, t1 = index[0] * dt, (index[0] + 1) * dt
+        index[0] += 1
+        # Guidance and vessel dynamics
+        rate_command = _guide(x, index, p, rows, points, t0)
+        step = x[SPEED_SLEW] * dt
+        x[SPEED_COMMAND] = min(max(x[SPEED_TARGET], x[SPEED_COMMAND] - step), x[SPEED_COMMAND] + step)
+        x[U], x[DU] = _lag(x[U], x[DU], x[SPEED_COMMAND], dt, p[TAU_U], decay_u)
+        r, dr = x[R], x[DR]
+        x[R], x[DR] = _lag(r, dr, rate_command, dt, p[TAU_R], decay_r)
+        # Hermite's rule: of fourth order, and as smooth as the rate
+        x[PSI] += 0.5 * dt * (r + x[R]) + dt * dt / 12.0 * (dr - x[DR])
+        if p[DIVES] > 0.0:
+            climb = (x[DEPTH_CALM] - x[DEPTH_REFERENCE]) / (max(x[U], 0.3) * 5.0 * p[TAU_G])
+            climb = min(max(climb, -x[GAMMA_LIMIT]), x[GAMMA_LIMIT])
+            sink = -x[U] * sin(x[GAMMA])
+            x[GAMMA], x[DGAMMA] = _lag(x[GAMMA], x[DGAMMA], climb, dt, p[TAU_G], decay_g)
+            x[DEPTH_CALM] += 0.5 * dt * (sink - x[U] * sin(x[GAMMA]))
+        # Waves, met at the speed through the water
+        ahead = x[U] * cos(x[GAMMA])
+        w0, w1, w2, w3, w4, w5, w6 = _waves(phase, table, ahead * cos(x[PSI]), ahead * sin(x[PSI]), dt)
+        v, c, roll, pitch = _compose(x, p, w0, w1, w2, w3, w4, w5, w6)
+        # Ideal instruments
+        u = (x[V], x[V + 1], x[V + 2])
+        b = (x[C], x[C + 1], x[C + 2], x[C + 3], x[C + 4], x[C + 5], x[C + 6], x[C + 7], x[C + 8])
+        out = sample_from_motion(x[LATITUDE], x[HEIGHT], u, v, b, c, memory, dt)
+        rate[k, 0], rate[k, 1], rate[k, 2] = out[0], out[1], out[2]
+        force[k, 0], force[k, 1], force[k, 2] = out[3], out[4], out[5]
+        # Taps between the old state, still in x, and the new one
+        while tap < tap_time.size and (tap_time[tap] <= t1 or k == rate.shape[0] - 1):
+            _tap(taps[tap], min((tap_time[tap] - t0) / dt, 1.0), x, p, v, roll, pitch, out, c)
+            tap += 1
+        cl, sl = cos(x[LATITUDE]), sin(x[LATITUDE])
+        x[BODY_RATE] = out[0] - ROTATION_RATE * (c[0] * cl - c[6] * sl)
+        x[BODY_RATE + 1] = out[1] - ROTATION_RATE * (c[1] * cl - c[7] * sl)
+        x[BODY_RATE + 2] = out[2] - ROTATION_RATE * (c[2] * cl - c[8] * sl)
+        x[LATITUDE] += out[6]
+        x[LONGITUDE] += out[7]
+        x[HEIGHT] += out[8]
+        x[NORTH] += 0.5 * dt * (u[0] + v[0])
+        x[EAST] += 0.5 * dt * (u[1] + v[1])
+        x[V], x[V + 1], x[V + 2] = v
+        for i in range(9):
+            x[C + i] = c[i]
+        x[ROLL], x[PITCH] = roll, pitch
+
+
+@kernel()
+def _tap(out, a, x, p, v, roll, pitch, sample, c):  # type: ignore[no-untyped-def]
+    """State at the fraction a of a sample interval: velocity and angles linear, position accordingly."""
+    yaw = atan2(x[C + 3], x[C])
+    new_yaw = atan2(c[3], c[0])
+    # The position's share of the interval under a linear velocity
+    for i in range(3):
+        mean = 0.5 * (x[V + i] + v[i])
+        gained = x[V + i] * a + 0.5 * (v[i] - x[V + i]) * a * a
+        scale = gained / mean if abs(mean) > 1e-9 else a
+        out[i] = x[LATITUDE + i] + sample[6 + i] * (1.0 if a >= 1.0 else scale)
+        out[3 + i] = x[V + i] + a * (v[i] - x[V + i])
+    out[6] = x[ROLL] + a * (roll - x[ROLL])
+    out[7] = x[PITCH] + a * (pitch - x[PITCH])
+    out[8] = _wrap(yaw + a * _wrap(new_yaw - yaw))
+    # Angular rate at the instant, extrapolated from the means over this interval and the one before
+    cl, sl = cos(x[LATITUDE]), sin(x[LATITUDE])
+    for i in range(3):
+        now = sample[i] - ROTATION_RATE * (c[i] * cl - c[6 + i] * sl)
+        out[9 + i] = now + (a - 0.5) * (now - x[BODY_RATE + i])
+    flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
+    out[12] = flow * p[CURRENT_N]
+    out[13] = flow * p[CURRENT_E]

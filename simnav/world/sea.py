@@ -1,0 +1,150 @@
+"""The sea: a wave spectrum, and the motions that it gives a vessel.
+
+The surface is a sum of long-crested components, each with its own frequency and direction. The vessel answers to
+the elevation (heave), the slope (roll, pitch) and the orbital motion (surge, sway) of each through a second-order response, and
+meets each at its encounter frequency, which follows from the vessel's own speed and course. Sources: DNV-RP-C205 section 3.5
+(spectra); T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, Wiley 2011, chapters 8 and 10.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from simnav.spec import NonNegative, Positive, Spec, quantity
+from simnav.streams import stream
+from simnav.types import Array
+
+__all__ = ["Sea", "components", "spectrum"]
+
+_G = 9.81
+#: Rows of the component table: phase rate, wave number north and east, and cosine and sine gains of seven responses.
+ROWS = 17
+
+
+class Sea(Spec):
+    """A sea state and the vessel's response to it.
+
+    Attributes
+    ----------
+    spectrum : str
+        ``jonswap`` or ``pierson_moskowitz`` (which is JONSWAP with peakedness 1).
+    significant_height, peak_period : float
+        Of the waves [m], [s].
+    peakedness : float
+        JONSWAP's gamma.
+    direction : float
+        From which the waves come [rad].
+    spreading : float
+        Standard deviation of the components' directions [rad].
+    components : int
+        Number of components, each of the same energy.
+    heave_period, roll_period, pitch_period : float
+        Natural periods of the responses [s].
+    roll_damping, pitch_damping : float
+        Damping ratios.
+    roll_gain, pitch_gain, drift_gain : float
+        Response to the wave slope (roll, pitch) and to the orbital motion (surge, sway) well below resonance; a hull that spans
+        several wave lengths averages them, so its gains are below 1.
+    """
+
+    spectrum: Literal["jonswap", "pierson_moskowitz"] = "jonswap"
+    significant_height: NonNegative = quantity("m")
+    peak_period: Annotated[float, Field(ge=1.0, le=30.0)] = quantity("s")
+    peakedness: Annotated[float, Field(ge=1.0, le=10.0)] = 3.3
+    direction: Annotated[float, Field(ge=-6.2832, le=6.2832)] = quantity("deg", 0.0)
+    spreading: NonNegative = quantity("deg", 0.4363323129985824)
+    components: Annotated[int, Field(ge=4, le=256)] = 24
+    heave_period: Positive = quantity("s", 6.0)
+    roll_period: Positive = quantity("s", 9.0)
+    pitch_period: Positive = quantity("s", 6.0)
+    roll_damping: Annotated[float, Field(gt=0.02, le=2.0)] = 0.15
+    pitch_damping: Annotated[float, Field(gt=0.02, le=2.0)] = 0.5
+    roll_gain: NonNegative = 0.6
+    pitch_gain: NonNegative = 0.4
+    drift_gain: NonNegative = 0.5
+
+
+def spectrum(sea: Sea, omega: Array) -> Array:
+    """Spectral density of the elevation.
+
+    Parameters
+    ----------
+    sea : Sea
+    omega : (n,) array
+        Angular frequency [rad/s], positive.
+
+    Returns
+    -------
+    (n,) array
+        [m^2 s/rad]; its integral is ``significant_height**2 / 16`` (DNV-RP-C205 eqs. 3.5.5.1-3.5.5.3; JONSWAP is
+        normalized numerically rather than by the approximate factor printed there).
+    """
+    peak = 2.0 * np.pi / sea.peak_period
+    gamma = sea.peakedness if sea.spectrum == "jonswap" else 1.0
+
+    def shape(w: Array) -> Array:
+        width = np.where(w <= peak, 0.07, 0.09)
+        ratio = peak / w
+        return ratio**5 * np.exp(-1.25 * ratio**4) * gamma ** np.exp(-0.5 * ((w / peak - 1.0) / width) ** 2)
+
+    grid = peak * np.geomspace(0.3, 40.0, 8000)
+    values = shape(grid)
+    area = float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(grid)))
+    density: Array = shape(np.asarray(omega, dtype=np.float64)) * (sea.significant_height**2 / 16.0 / area)
+    return density
+
+
+def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
+    """Draw the wave components of one run.
+
+    Parameters
+    ----------
+    sea : Sea or None
+        None is a flat sea.
+    seed : int
+
+    Returns
+    -------
+    phase : (2, n) array
+        Cosine and sine of the phase at time 0 at the start position.
+    table : (17, n) array
+        Frequency [rad/s], wave number north and east [rad/m]; then pairs of cosine and sine gains of the displacements north, east,
+        down [m], and of the slope responses roll-north, roll-east, pitch-north, pitch-east [rad]: the vessel's roll is
+        the projection of (roll-north, roll-east) on its axes, and pitch likewise.
+    """
+    if sea is None or sea.significant_height == 0.0:
+        return np.zeros((2, 0)), np.zeros((ROWS, 0))
+    rng = stream(seed, "sea")
+    n = sea.components
+    peak = 2.0 * np.pi / sea.peak_period
+    # Components of equal energy, one at random within each quantile: the variance is exact in every run and no
+    # two runs, and no two hours, repeat.
+    grid = peak * np.geomspace(0.4, 4.0, 4000)
+    cumulative = np.concatenate([[0.0], np.cumsum(np.diff(grid) * 0.5 * (spectrum(sea, grid)[1:] + spectrum(sea, grid)[:-1]))])
+    quantile = (np.arange(n) + rng.random(n)) / n
+    omega = np.interp(quantile * cumulative[-1], cumulative, grid)
+    amplitude = np.sqrt(2.0 * sea.significant_height**2 / 16.0 / n)
+    heading = sea.direction + np.pi + sea.spreading * rng.standard_normal(n)
+    phase = 2.0 * np.pi * rng.random(n)
+    number = omega**2 / _G
+    north, east = np.cos(heading), np.sin(heading)
+
+    def response(period: float, damping: float) -> Array:
+        natural = 2.0 * np.pi / period
+        value: Array = natural**2 / (natural**2 - omega**2 - 2j * damping * natural * omega)
+        return value
+
+    # With the phase theta = omega t - k x and a complex gain G, a response is Re(G e^{-i theta}) =
+    # Re(G) cos(theta) + Im(G) sin(theta): elevation has G = a, horizontal displacement i a, slope i a k.
+    heave = amplitude * response(sea.heave_period, 0.4)
+    orbit = 1j * amplitude * sea.drift_gain
+    roll = 1j * amplitude * number * sea.roll_gain * response(sea.roll_period, sea.roll_damping)
+    pitch = 1j * amplitude * number * sea.pitch_gain * response(sea.pitch_period, sea.pitch_damping)
+    gains = [orbit * north, orbit * east, -heave, roll * north, roll * east, pitch * north, pitch * east]
+    rows = [omega, number * north, number * east]
+    for g in gains:
+        rows += [np.real(g), np.imag(g)]
+    return np.stack([np.cos(phase), np.sin(phase)]), np.ascontiguousarray(np.stack(rows))

@@ -1,0 +1,150 @@
+"""The world as a state machine: advanced in blocks of any length, in constant memory, always the same numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from simnav.rotation import wrap_angle
+from simnav.types import Array, ImuSamples, NavigationStates, TapStates
+from simnav.world import motion
+from simnav.world.current import Current
+from simnav.world.manoeuvres import Manoeuvre, table
+from simnav.world.sea import Sea, components
+from simnav.world.vessel import Start, Vessel
+
+__all__ = ["World", "WorldBlock"]
+
+
+@dataclass(frozen=True, eq=False)
+class WorldBlock:
+    """The truth over a stretch of time.
+
+    Attributes
+    ----------
+    imu : ImuSamples
+        What a perfect IMU delivers.
+    taps : dict of str to TapStates
+        The states at the times that were asked for.
+    """
+
+    imu: ImuSamples
+    taps: dict[str, TapStates]
+
+
+class World:
+    """A vessel in its sea.
+
+    Parameters
+    ----------
+    start : Start
+    vessel : Vessel
+    manoeuvres : sequence of Manoeuvre
+    sea : Sea or None
+    current : Current or None
+    rate : float
+        Samples of the ideal IMU per second [Hz].
+    seed : int
+        Of the wave components.
+    """
+
+    def __init__(
+        self,
+        start: Start,
+        vessel: Vessel,
+        manoeuvres: Sequence[Manoeuvre] = (),
+        sea: Sea | None = None,
+        current: Current | None = None,
+        *,
+        rate: float,
+        seed: int,
+    ):
+        if not rate > 0.0:
+            raise ValueError(f"rate = {rate!r} Hz should be positive")
+        self.rate = float(rate)
+        p = np.zeros(motion.PARAMETERS)
+        p[motion.DT] = 1.0 / rate
+        p[motion.TAU_U], p[motion.TAU_R] = vessel.speed_time_constant, vessel.turn_time_constant
+        p[motion.TAU_G], p[motion.TURN_RATE] = vessel.climb_time_constant, vessel.turn_rate
+        p[motion.HEEL], p[motion.DIVES] = vessel.heel, float(vessel.kind == "uuv")
+        if current is not None and current.speed > 0.0:
+            p[motion.CURRENT_N] = current.speed * np.cos(current.direction)
+            p[motion.CURRENT_E] = current.speed * np.sin(current.direction)
+            p[motion.SHEAR] = current.shear / current.speed
+        if sea is not None and vessel.kind == "uuv":
+            # Waves die off as exp(-k z); the wave number at the peak stands for all, to keep the motion smooth.
+            p[motion.ATTENUATION] = (2.0 * np.pi / sea.peak_period) ** 2 / 9.81
+        x = np.zeros(motion.STATE)
+        x[motion.U] = x[motion.SPEED_COMMAND] = x[motion.SPEED_TARGET] = start.speed
+        x[motion.SPEED_SLEW] = np.inf
+        x[motion.PSI] = x[motion.PSI_REFERENCE] = wrap_angle(start.heading)
+        x[motion.RATE_LIMIT] = vessel.turn_rate
+        x[motion.GAMMA_LIMIT] = 0.26
+        x[motion.LATITUDE], x[motion.LONGITUDE], x[motion.HEIGHT] = start.latitude, start.longitude, start.altitude
+        x[motion.DEPTH_CALM] = x[motion.DEPTH_REFERENCE] = -start.altitude if vessel.kind == "uuv" else 0.0
+        self._x, self._p = x, p
+        self._index = np.zeros(4, dtype=np.int64)
+        self._rows, self._points = table(manoeuvres)
+        self._phase, self._waves = components(sea, seed)
+        motion.initialise(self._x, self._p, self._phase, self._waves)
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start."""
+        return int(self._index[0]) / self.rate
+
+    def state(self) -> NavigationStates:
+        """The present state, a series of one."""
+        x = self._x
+        position = x[motion.LATITUDE : motion.HEIGHT + 1]
+        yaw = np.arctan2(x[motion.C + 3], x[motion.C])
+        attitude = np.array([x[motion.ROLL], x[motion.PITCH], yaw])
+        velocity = x[motion.V : motion.V + 3]
+        return NavigationStates(
+            np.array([self.time]), position[None].copy(), velocity[None].copy(), attitude[None]
+        )
+
+    def steer_by(self, north: float, east: float) -> None:
+        """Let the guidance see a position that is off by this much [m] from now on (closed loop)."""
+        self._x[motion.ERROR_NORTH], self._x[motion.ERROR_EAST] = north, east
+
+    def advance(self, until: float, taps: Mapping[str, Array]) -> WorldBlock:
+        """Advance to a time.
+
+        Parameters
+        ----------
+        until : float
+            A multiple of the sample interval [s].
+        taps : mapping of str to (m,) array
+            Ascending times within (now, until] at which states are wanted.
+
+        Returns
+        -------
+        WorldBlock
+        """
+        first = int(self._index[0])
+        n = round(until * self.rate) - first
+        if n < 0:
+            raise ValueError(f"the world is at {self.time} s and does not go back to {until} s")
+        rate, force = np.empty((n, 3)), np.empty((n, 3))
+        times = np.concatenate([np.empty(0), *taps.values()])
+        order = np.argsort(times, kind="stable")
+        sorted_states = np.empty((len(times), motion.TAP_COLUMNS))
+        motion.advance(
+            self._x, self._index, self._p, self._rows, self._points, self._phase, self._waves,
+            times[order], sorted_states, rate, force,
+        )  # fmt: skip
+        states = np.empty_like(sorted_states)
+        states[order] = sorted_states
+        out, i = {}, 0
+        for name, t in taps.items():
+            s = states[i : i + len(t)]
+            i += len(t)
+            water = np.zeros((len(t), 3))
+            water[:, :2] = s[:, 12:14]
+            out[name] = TapStates(t, s[:, 0:3], s[:, 3:6], s[:, 6:9], s[:, 9:12], water)
+        # Divided, not multiplied by the interval: 2.29 s is then the float that a person writes.
+        time = np.arange(first + 1, first + n + 1) / self.rate
+        return WorldBlock(ImuSamples(time, np.full(n, 1.0 / self.rate), rate, force), out)
