@@ -1,1 +1,124 @@
-"""simnav: the open benchmark for marine integrated navigation."""
+"""simnav: the open benchmark for marine integrated navigation.
+
+Importing it registers every scenario of the catalogue with Gymnasium, so that
+``gymnasium.make("simnav:simnav/OpenSea-v1")`` works. The public names load with their first use, so that the import
+itself stays quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from gymnasium.envs.registration import register as _register_env
+from gymnasium.envs.registration import registry as _registry
+
+from simnav.catalogue import headers as _headers
+
+if TYPE_CHECKING:
+    from simnav.environment import EstimatorAgent, NavigationEnv
+    from simnav.estimator import Estimator, UnsuitableScenario, register
+    from simnav.recording import Recording
+    from simnav.scenario import Scenario
+    from simnav.scoring import score
+    from simnav.source import open_source, record
+    from simnav.trial import Trial, run_trial
+    from simnav.types import (
+        COMPONENTS,
+        KINDS,
+        Datasheet,
+        Estimate,
+        ImuDatasheet,
+        ImuSamples,
+        InitialState,
+        Instruments,
+        Measurement,
+        Measurements,
+        NavigationStates,
+        TriadDatasheet,
+    )
+    from simnav.vector import NavigationVectorEnv
+
+__all__ = [
+    "COMPONENTS",
+    "KINDS",
+    "Datasheet",
+    "Estimate",
+    "Estimator",
+    "EstimatorAgent",
+    "ImuDatasheet",
+    "ImuSamples",
+    "InitialState",
+    "Instruments",
+    "Measurement",
+    "Measurements",
+    "NavigationEnv",
+    "NavigationStates",
+    "NavigationVectorEnv",
+    "Recording",
+    "Scenario",
+    "TriadDatasheet",
+    "Trial",
+    "UnsuitableScenario",
+    "open_source",
+    "record",
+    "register",
+    "run_trial",
+    "score",
+]
+
+_HOMES = {
+    "environment": ("EstimatorAgent", "NavigationEnv"),
+    "estimator": ("Estimator", "UnsuitableScenario", "register"),
+    "recording": ("Recording",),
+    "scenario": ("Scenario",),
+    "scoring": ("score",),
+    "source": ("open_source", "record"),
+    "trial": ("Trial", "run_trial"),
+    "types": (
+        "COMPONENTS",
+        "KINDS",
+        "Datasheet",
+        "Estimate",
+        "ImuDatasheet",
+        "ImuSamples",
+        "InitialState",
+        "Instruments",
+        "Measurement",
+        "Measurements",
+        "NavigationStates",
+        "TriadDatasheet",
+    ),
+    "vector": ("NavigationVectorEnv",),
+}
+_home_of = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("simnav")
+    if name not in _home_of:
+        raise AttributeError(f"module 'simnav' has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f"simnav.{_home_of[name]}"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _register_scenarios() -> None:
+    """Give every scenario of the catalogue its Gymnasium id."""
+    for header in _headers():
+        if header.gym_id not in _registry:
+            _register_env(
+                id=header.gym_id,
+                entry_point="simnav.environment:NavigationEnv",
+                vector_entry_point="simnav.vector:NavigationVectorEnv",
+                kwargs={"scenario": header.id},
+            )
+
+
+_register_scenarios()

@@ -1,0 +1,538 @@
+"""The Gymnasium environment: the agent is the navigator.
+
+An observation is what the instruments delivered in one step, the action is the navigation estimate at its end, the
+reward is minus the error of that estimate. `NavigationEnv` is an adapter over the same sources of data that every
+campaign uses; `EstimatorAgent` is the bridge the other way, from an estimator to an agent.
+
+One episode of n steps, from reset to truncation::
+
+    observation, info = env.reset(seed=7)       # the measurements of step 1; info: initial state, datasheets
+    while not truncated:
+        action = agent(observation)             # the estimate at observation["interval"][1]
+        observation, reward, terminated, truncated, info = env.step(action)
+
+so that every step is estimated and scored exactly once; the observation that comes with the truncation is empty.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from simnav.earth import principal_radii
+from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.types import KINDS, Array, Estimate, ImuSamples, InitialState, Instruments, Measurement, Measurements
+
+if TYPE_CHECKING:
+    from simnav.estimator import Estimator
+    from simnav.recording import AidStream, Block
+    from simnav.rendering import Chart
+    from simnav.scenario import Scenario
+
+__all__ = ["REWARDS", "EstimatorAgent", "NavigationEnv", "Observation", "unpack"]
+
+Observation = dict[str, Any]
+
+#: What a reward can weigh: horizontal and vertical position error and its 3-D norm [m], norm of the velocity error
+#: [m/s], angle of the attitude error [rad].
+REWARDS: tuple[str, ...] = ("horizontal", "vertical", "position", "velocity", "attitude")
+
+#: Bound of every observed quantity. Gymnasium asks for finite bounds; no instrument reaches this one.
+_LIMIT = 1e9
+_ACTION_LIMIT = np.array([[np.pi / 2, np.pi, 1e5], [100.0, 100.0, 100.0], [np.pi, np.pi, 2 * np.pi]])
+
+# The source is advanced this many steps ahead, doubling as the episode goes on: short episodes start at once, long
+# ones spread the fixed cost of a block over many steps. The data are the same whatever the blocks (bit for bit).
+_FIRST_STRETCH, _LONGEST_STRETCH = 8, 256
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """S steps of a run as padded arrays, ready to be handed out row by row."""
+
+    intervals: Array  # (S, 2)
+    columns: dict[str, dict[str, NDArray[Any]]]  # instrument -> entry -> (S, K, ...)
+    truth: Array  # (S, 3, 3): rows position, velocity, attitude
+    rows: list[list[float]]  # latitude, longitude, height, metres per radian of latitude and of longitude
+    aids: dict[str, AidStream]
+    cuts: dict[str, NDArray[np.intp]]  # instrument -> (S + 1,) bounds of each step's measurements in its stream
+
+
+class NavigationEnv(gymnasium.Env[Observation, Array]):
+    """Navigate one scenario.
+
+    Observation (`gymnasium.spaces.Dict`, float64; all entries are zero where ``valid`` is 0, never NaN; K is the most
+    samples that one step can bring):
+
+    ========================= ============ ==========================================================
+    entry                     shape
+    ========================= ============ ==========================================================
+    ``interval``              (2,)         begin and end of the step [s]
+    ``imu`` ``time``          (K,)         ends of the sample intervals [s]
+    ``imu`` ``length``        (K,)         their lengths [s]
+    ``imu`` ``valid``         (K,) int8    1 where there is a sample
+    ``imu`` ``angular_rate``  (K, 3)       mean over the interval, body axes [rad/s]
+    ``imu`` ``specific_force`` (K, 3)      likewise [m/s^2]
+    *name* ``time``           (K,)         times of validity of the instrument's measurements [s]
+    *name* ``valid``          (K,) int8
+    *name* ``value``          (K, d)       components of ``KINDS[kind].values`` [SI, rad]
+    ========================= ============ ==========================================================
+
+    Action: (3, 3) array, the estimate at the end of the interval: row 0 latitude [rad], longitude [rad], height [m];
+    row 1 velocity north, east, down [m/s]; row 2 roll, pitch, yaw [rad]. Any finite estimate is taken; the bounds of
+    the space are for sampling.
+
+    Reward: minus the error, by default the horizontal position error in metres. ``terminated`` is never true;
+    ``truncated`` is true with the last step of the run.
+
+    Info: `reset` gives ``seed`` (of the run: `simnav run --seed` repeats it), ``start`` (`InitialState`, with its
+    errors and their covariance) and ``instruments`` (`Instruments`, the datasheets). With ``reveal_truth`` every info
+    holds ``truth``, the (3, 3) array that would be the perfect answer to the observation beside it.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        A scenario, its name in the catalogue, or a TOML file.
+    reward : str or mapping of str to float
+        One of `REWARDS`, or weights of several of them.
+    reveal_truth : bool
+        Put the truth into ``info``.
+    closed_loop : bool
+        The vessel steers by the estimate: a wrong one puts it off its track. Simulated scenarios only.
+    render_mode : {"human", "rgb_array"}, optional
+
+    Raises
+    ------
+    ValueError
+        If an argument is not valid.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
+
+    def __init__(
+        self,
+        scenario: Scenario | str | Path,
+        *,
+        reward: str | Mapping[str, float] = "horizontal",
+        reveal_truth: bool = False,
+        closed_loop: bool = False,
+        render_mode: str | None = None,
+    ):
+        if isinstance(scenario, (str, Path)):
+            from simnav.scenario import load
+
+            scenario = load(scenario)
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode is 'human', 'rgb_array' or None, not {render_mode!r}")
+        self.scenario = scenario
+        self.reveal_truth = reveal_truth
+        self.closed_loop = closed_loop
+        self.render_mode = render_mode
+        self._weights = _weights(reward)
+        self._most = _most_samples(scenario)
+        instruments = scenario.instruments_sheet()
+        self._widths = {name: len(KINDS[sheet.kind].values) for name, sheet in instruments.items()}
+        self.observation_space = _observation_space(self._most, self._widths)
+        self.action_space = spaces.Box(-_ACTION_LIMIT, _ACTION_LIMIT, dtype=np.float64)
+        self._source: Any = None
+        self._stretch: _Stretch | None = None
+        self._row = 0
+        self._size = _FIRST_STRETCH
+        self._steps = 0  # steps that the source has been advanced by
+        self._chart: Chart | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin a run.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of the run; without one, a fresh one is drawn from `np_random`.
+        options : dict, optional
+            None is known; ignored.
+
+        Returns
+        -------
+        observation : dict
+            The measurements of the first step.
+        info : dict
+            ``seed``, ``start``, ``instruments`` (and ``truth``).
+        """
+        super().reset(seed=seed)
+        if seed is None:
+            seed = int(self.np_random.integers(2**63 - 1))
+        self._source = _open(self.scenario, seed)
+        self._steps, self._size = 0, 1 if self.closed_loop else _FIRST_STRETCH
+        start: InitialState = self._source.start
+        if self.closed_loop:
+            truth = self._source.initial_truth
+            row = _rows(truth.position)[0]
+            self._steer(*_horizontal(start.position.tolist(), row))
+        if not self._load():
+            raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
+        if self.render_mode is not None:
+            if self._chart is None:
+                from simnav.rendering import Chart
+
+                self._chart = Chart(self.scenario.id, self._source.duration, human=self.render_mode == "human")
+            self._chart.clear()
+            if self.render_mode == "human":
+                self._chart.show()
+        info = {"seed": seed, "start": start, "instruments": self._source.instruments}
+        return self._observation(), self._reveal(info)
+
+    def step(self, action: Array) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Answer the last observation with an estimate; get its reward and the next observation.
+
+        Parameters
+        ----------
+        action : (3, 3) array
+            Position, velocity, attitude: see the class.
+
+        Raises
+        ------
+        ValueError
+            If the action has another shape or is not finite.
+        gymnasium.error.ResetNeeded
+            If the run is over or has not begun.
+        """
+        estimate = checked_action(action)
+        stretch = self._stretch
+        if stretch is None:
+            raise gymnasium.error.ResetNeeded("no run is under way: call reset() first")
+        row = stretch.rows[self._row]
+        north, east = _horizontal(estimate, row)
+        reward = -self._error(estimate, north, east, row)
+        if self._chart is not None:
+            self._draw(self._chart, estimate)
+        if self.closed_loop:
+            self._steer(north, east)
+        self._row += 1
+        if self._row < len(stretch.rows) or self._load():
+            return self._observation(), reward, False, False, self._reveal({})
+        observation = self._empty(float(stretch.intervals[-1, 1]))
+        info = {"truth": stretch.truth[-1].copy()} if self.reveal_truth else {}
+        self._stretch = None
+        return observation, reward, False, True, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The chart so far: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window is up to date."""
+        if self._chart is None:
+            if self.render_mode is None:
+                gymnasium.logger.warn("render() shows nothing: make the environment with render_mode='rgb_array'")
+                return None
+            raise gymnasium.error.ResetNeeded("there is nothing to render yet: call reset() first")
+        return self._chart.frame() if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Close the window and forget the run."""
+        if self._chart is not None:
+            self._chart.close()
+        self._chart = self._source = self._stretch = None
+
+    # ------------------------------------------------------------------------------------------- the run
+
+    def _load(self) -> bool:
+        """Advance the source by a stretch of steps; False where the run is over."""
+        source = self._source
+        while True:
+            total = int(source.duration / source.step + 1e-6)
+            if self._steps >= total:
+                return False
+            begin = self._steps
+            self._steps = min(total, begin + self._size)
+            if not self.closed_loop:
+                self._size = min(2 * self._size, _LONGEST_STRETCH)
+            block = source.advance(source.duration if self._steps == total else self._steps * source.step)
+            if len(block.truth):
+                self._stretch, self._row = _pack(block, self._most), 0
+                return True
+
+    def _steer(self, north: float, east: float) -> None:
+        steer = getattr(self._source, "steer_by", None)
+        if steer is None:
+            raise ValueError(
+                f"scenario {self.scenario.id} is a recorded log: its vessel cannot steer by the estimate; "
+                "leave closed_loop out"
+            )
+        steer(north, east)
+
+    def _observation(self) -> Observation:
+        stretch, i = self._stretch, self._row
+        assert stretch is not None
+        observation: Observation = {"interval": stretch.intervals[i]}
+        for name, columns in stretch.columns.items():
+            observation[name] = {key: array[i] for key, array in columns.items()}
+        return observation
+
+    def _empty(self, time: float) -> Observation:
+        observation: Observation = {}
+        for name, space in self.observation_space.items():  # type: ignore[attr-defined]
+            if isinstance(space, spaces.Dict):
+                observation[name] = {key: np.zeros(s.shape, s.dtype) for key, s in space.items()}
+        observation["interval"] = np.array([time, time])
+        return observation
+
+    def _reveal(self, info: dict[str, Any]) -> dict[str, Any]:
+        if self.reveal_truth and self._stretch is not None:
+            info["truth"] = self._stretch.truth[self._row].copy()
+        return info
+
+    def _error(self, estimate: list[float], north: float, east: float, row: list[float]) -> float:
+        if self._weights is None:
+            return math.hypot(north, east)
+        assert self._stretch is not None
+        truth = self._stretch.truth[self._row]
+        down = row[2] - estimate[2]
+        measures: dict[str, Callable[[], float]] = {
+            "horizontal": lambda: math.hypot(north, east),
+            "vertical": lambda: abs(down),
+            "position": lambda: math.hypot(north, east, down),
+            "velocity": lambda: math.dist(estimate[3:6], truth[1].tolist()),
+            "attitude": lambda: _attitude_angle(np.array(estimate[6:]), truth[2]),
+        }
+        return sum(weight * measures[name]() for name, weight in self._weights.items())
+
+    def _draw(self, chart: Chart, estimate: list[float]) -> None:
+        stretch, i = self._stretch, self._row
+        assert stretch is not None
+        for name, stream in stretch.aids.items():
+            if stream.kind in ("gnss_position", "terrain_fix"):
+                cut = slice(*stretch.cuts[name][i : i + 2])
+                chart.add_fixes(stream.value[cut, :2], stream.faults[cut] != 0)
+        chart.add(float(stretch.intervals[i, 1]), stretch.truth[i, 0], np.array(estimate[:3]))
+        if self.render_mode == "human":
+            chart.show()
+
+
+def _open(scenario: Scenario, seed: int) -> Any:
+    from simnav.source import open_source
+
+    return open_source(scenario, seed)
+
+
+# ------------------------------------------------------------------------------------------------- spaces
+
+
+def _most_samples(scenario: Scenario) -> dict[str, int]:
+    """Per instrument (and ``imu``) the most samples that one step can bring."""
+    instruments, step = scenario.instruments_sheet(), scenario.step
+    rates = {name: sheet.rate for name, sheet in instruments.items()}
+    if clash := {"imu", "interval"} & set(rates):
+        raise ValueError(f"scenario {scenario.id}: {clash.pop()!r} is no name for an aiding instrument")
+    if instruments.imu is not None:
+        rates = {"imu": instruments.imu.rate, **rates}
+    return {name: max(1, math.ceil(rate * step - 1e-6)) for name, rate in rates.items()}
+
+
+def _observation_space(most: Mapping[str, int], widths: Mapping[str, int]) -> spaces.Dict:
+    def box(*shape: int) -> spaces.Box:
+        return spaces.Box(-_LIMIT, _LIMIT, shape, dtype=np.float64)
+
+    entries: dict[str, spaces.Space[Any]] = {"interval": box(2)}
+    for name, k in most.items():
+        entry: dict[str, spaces.Space[Any]] = {"time": box(k), "valid": spaces.MultiBinary(k)}
+        if name == "imu":
+            entry |= {"length": box(k), "angular_rate": box(k, 3), "specific_force": box(k, 3)}
+        else:
+            entry["value"] = box(k, widths[name])
+        entries[name] = spaces.Dict(entry)
+    return spaces.Dict(entries)
+
+
+def checked_action(action: Any) -> list[float]:
+    """The nine numbers of an action, row by row.
+
+    Raises
+    ------
+    ValueError
+        If it has another shape than (3, 3) or is not finite.
+    """
+    try:
+        array = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"an action is a (3, 3) array of numbers, not {action!r}") from None
+    if array.shape != (3, 3):
+        raise ValueError(
+            "an action is a (3, 3) array (latitude, longitude, height; velocity north, east, down; roll, pitch, yaw), "
+            f"not one of shape {array.shape}"
+        )
+    values: list[float] = array.ravel().tolist()
+    if not math.isfinite(sum(values)) and not np.isfinite(array).all():
+        raise ValueError(f"an action must be finite, not {array.tolist()}")
+    return values
+
+
+def _weights(reward: str | Mapping[str, float]) -> dict[str, float] | None:
+    """Weights of the error measures; None for the usual one, the horizontal error."""
+    weights = {reward: 1.0} if isinstance(reward, str) else dict(reward)
+    for name, weight in weights.items():
+        if name not in REWARDS:
+            raise ValueError(f"reward is one of {', '.join(REWARDS)} or weights of them; {name!r} is unknown")
+        if not math.isfinite(weight):
+            raise ValueError(f"the weight of {name!r} in the reward should be finite, not {weight!r}")
+    if not weights:
+        raise ValueError(f"reward is one of {', '.join(REWARDS)} or weights of them, not an empty mapping")
+    return None if weights == {"horizontal": 1.0} else weights
+
+
+# ------------------------------------------------------------------------------------------------- data
+
+
+def _pack(block: Block, most: Mapping[str, int]) -> _Stretch:
+    """Sort the data of a block into its steps."""
+    truth, n = block.truth, len(block.truth)
+    edges = truth.time + 0.5e-6  # as `simnav.recording.packets`
+    columns: dict[str, dict[str, NDArray[Any]]] = {}
+    cuts: dict[str, NDArray[np.intp]] = {}
+    parts: dict[str, tuple[Array, dict[str, Array]]] = {}
+    if block.imu is not None:
+        imu = block.imu
+        parts["imu"] = (
+            imu.time,
+            {
+                "time": imu.time,
+                "length": imu.interval,
+                "angular_rate": imu.angular_rate,
+                "specific_force": imu.specific_force,
+            },
+        )
+    parts |= {name: (s.time, {"time": s.time, "value": s.value}) for name, s in block.aids.items()}
+    for name, (time, arrays) in parts.items():
+        cuts[name] = cut = np.concatenate(([0], np.searchsorted(time, edges, side="right")))
+        counts, k = np.diff(cut), most[name]
+        if (counts == k).all():  # the usual case needs no copy
+            columns[name] = {key: a[: n * k].reshape(n, k, *a.shape[1:]) for key, a in arrays.items()}
+            columns[name]["valid"] = np.ones((n, k), np.int8)
+            continue
+        if counts.max() > k:
+            raise ValueError(
+                f"{name} delivered {counts.max()} samples in one step at {truth.time[counts.argmax()]:.3f} s, its "
+                f"datasheet's rate allows {k}"
+            )
+        row = np.repeat(np.arange(n), counts)
+        where = row, np.arange(cut[-1]) - cut[row]
+        arrays["valid"] = np.ones(len(time), np.int8)
+        columns[name] = {}
+        for key, a in arrays.items():
+            columns[name][key] = out = np.zeros((n, k, *a.shape[1:]), a.dtype)
+            out[where] = a[: cut[-1]]
+    intervals = np.stack([np.concatenate(([block.start], truth.time[:-1])), truth.time], axis=1)
+    states = np.stack([truth.position, truth.velocity, truth.attitude], axis=1)
+    return _Stretch(intervals, columns, states, _rows(truth.position), block.aids, cuts)
+
+
+def _rows(position: Array) -> list[list[float]]:
+    """Per position: latitude, longitude, height, and metres per radian of latitude and of longitude."""
+    meridian, prime_vertical = principal_radii(position[:, 0])
+    height = position[:, 2]
+    scale = np.stack([meridian + height, (prime_vertical + height) * np.cos(position[:, 0])], axis=1)
+    rows: list[list[float]] = np.concatenate([position, scale], axis=1).tolist()
+    return rows
+
+
+def _horizontal(estimate: list[float], row: list[float]) -> tuple[float, float]:
+    """North and east error [m] (as `simnav.earth.relative_position`, in plain floats: once a step)."""
+    east = math.remainder(estimate[1] - row[1], math.tau)
+    return (estimate[0] - row[0]) * row[3], east * row[4]
+
+
+def _attitude_angle(estimate: Array, truth: Array) -> float:
+    error = dcm_from_rpy(estimate) @ dcm_from_rpy(truth).T
+    return float(np.linalg.norm(rotation_vector_from_dcm(error)))
+
+
+# ------------------------------------------------------------------------------------------------- estimators as agents
+
+
+def unpack(observation: Mapping[str, Any], instruments: Instruments) -> Measurements:
+    """The packet that an estimator is fed, from an observation.
+
+    Parameters
+    ----------
+    observation : dict
+        Of a `NavigationEnv`.
+    instruments : Instruments
+        From the info of `NavigationEnv.reset`.
+
+    Returns
+    -------
+    Measurements
+        The same numbers, in the same order, as `Recording.steps` gives.
+    """
+    start, time = observation["interval"].tolist()
+    imu = None
+    if instruments.imu is not None:
+        entry = observation["imu"]
+        n = int(entry["valid"].sum())
+        imu = ImuSamples(entry["time"][:n], entry["length"][:n], entry["angular_rate"][:n], entry["specific_force"][:n])
+    aids = []
+    for name, sheet in instruments.items():
+        entry = observation[name]
+        for i in range(int(entry["valid"].sum())):
+            aids.append(Measurement(float(entry["time"][i]), name, sheet.kind, entry["value"][i]))
+    aids.sort(key=lambda m: m.time)
+    return Measurements(start, time, imu, aids)
+
+
+class EstimatorAgent:
+    """An estimator as the agent of a `NavigationEnv`: it gives the numbers that it gives outside.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        Not one that is told the truth (``reference``): the environment does not tell it.
+
+    Attributes
+    ----------
+    estimate : Estimate or None
+        The last one, with its covariance and diagnostics, which the action does not carry.
+
+    Raises
+    ------
+    ValueError
+        If the estimator is a reference that needs the truth.
+    """
+
+    def __init__(self, estimator: Estimator):
+        if estimator.reference:
+            raise ValueError(
+                f"estimator {estimator.name or type(estimator).__name__!r} is a reference that is told the truth; "
+                "an environment does not tell it"
+            )
+        self.estimator = estimator
+        self.estimate: Estimate | None = None
+
+    def reset(self, info: Mapping[str, Any]) -> None:
+        """Begin a run, with the info of the environment's reset."""
+        start: InitialState = info["start"]
+        self._instruments: Instruments = info["instruments"]
+        self._start = np.stack([start.position, start.velocity, start.attitude])
+        self.estimate = None
+        self.estimator.reset(start, self._instruments)
+
+    def act(self, observation: Mapping[str, Any]) -> Array:
+        """The action: the estimate, with the initial state in place of what is not estimated.
+
+        Parameters
+        ----------
+        observation : dict
+
+        Returns
+        -------
+        (3, 3) array
+        """
+        self.estimate = estimate = self.estimator.update(unpack(observation, self._instruments))
+        vectors = (estimate.position, estimate.velocity, estimate.attitude)
+        given = np.stack([self._start[i] if v is None else v for i, v in enumerate(vectors)])
+        return np.where(estimate.mask().reshape(3, 3), given, self._start)

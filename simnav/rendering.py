@@ -1,0 +1,311 @@
+"""The chart of a run as it goes: truth, fixes and estimate in the plane, and the error over time below.
+
+For people, so the truth is in it. Memory is bounded: when a trace is full, every second point goes. Matplotlib is
+imported with this module's first `Chart` and not before.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.earth import relative_position
+from simnav.types import Array
+
+__all__ = ["Chart", "Trace"]
+
+_log = logging.getLogger("simnav")
+
+_INK, _GRID = "#33414e", "#dde3e8"
+_TRUTH, _ESTIMATE, _FIX, _FAULT = "#33414e", "#d1495b", "#6aa9d8", "#edae49"
+
+
+class Trace:
+    """A series of points in bounded memory: when it is full, every second point goes.
+
+    Parameters
+    ----------
+    width : int
+        Numbers per point.
+    capacity : int
+        Most points that are kept; even.
+    largest : int, optional
+        A column of which the largest value between two kept points is kept, so that no peak is lost.
+    """
+
+    def __init__(self, width: int, capacity: int = 2048, largest: int | None = None):
+        self._data = np.empty((capacity, width))
+        self._n = 0
+        self._stride = 1
+        self._skipped = 0
+        self._largest = largest
+
+    def __len__(self) -> int:
+        return self._n
+
+    @property
+    def points(self) -> Array:
+        """(n, width) array: what is kept."""
+        return self._data[: self._n]
+
+    def add(self, *point: float) -> None:
+        """Append a point."""
+        if self._skipped:
+            if self._largest is not None:
+                last = self._data[self._n - 1]
+                last[self._largest] = max(last[self._largest], point[self._largest])
+            self._skipped -= 1
+            return
+        if self._n == len(self._data):
+            data, c = self._data, self._largest
+            if c is not None:
+                data[::2, c] = np.maximum(data[::2, c], data[1::2, c])
+            data[: self._n // 2] = data[::2]
+            self._n //= 2
+            self._stride *= 2
+        self._data[self._n] = point
+        self._n += 1
+        self._skipped = self._stride - 1
+
+    def clear(self) -> None:
+        """Forget all points."""
+        self._n, self._stride, self._skipped = 0, 1, 0
+
+
+class Chart:
+    """The picture of one run.
+
+    Parameters
+    ----------
+    title : str
+    duration : float
+        Of the run [s].
+    human : bool
+        Show it in a window, where there is a display.
+    """
+
+    def __init__(self, title: str, duration: float, *, human: bool = False):
+        self.title = title
+        self._duration = duration
+        self._truth, self._estimate = Trace(2), Trace(2)
+        self._fixes, self._faults = Trace(2), Trace(2)
+        self._error = Trace(2, largest=1)
+        self._origin: Array | None = None
+        self._pending: list[tuple[Array, NDArray[np.bool_]]] = []
+        self._now = (0.0, 0.0)
+        self._window: Any = None
+        self._figure: Any = None
+        self._background: Any = None  # axes, ticks and words: drawn anew only when the limits change
+        self._silent = False
+        if human:
+            self._window = _open_window()
+            self._silent = self._window is None
+            self._figure = self._window
+        if not self._silent:
+            self._build()
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin a new run."""
+        for trace in (self._truth, self._estimate, self._fixes, self._faults, self._error):
+            trace.clear()
+        self._origin, self._pending, self._now = None, [], (0.0, 0.0)
+        self._view: tuple[Array, Array] | None = None
+        self._span, self._top = 0.0, 0.0
+
+    def add_fixes(self, position: Array, faulty: NDArray[np.bool_]) -> None:
+        """Add position fixes of the step that the next `add` ends.
+
+        Parameters
+        ----------
+        position : (k, 2) array
+            Latitude and longitude [rad].
+        faulty : (k,) bool array
+        """
+        if len(position) and not self._silent:
+            self._pending.append((position, faulty))
+
+    def add(self, time: float, truth: Array, estimate: Array) -> None:
+        """Add the end of a step.
+
+        Parameters
+        ----------
+        time : float
+        truth, estimate : (3,) array
+            Geodetic [rad, rad, m].
+        """
+        if self._silent:
+            return
+        if self._origin is None:
+            self._origin = truth.copy()
+        north, east, _ = relative_position(np.stack([truth, estimate]), self._origin).T.tolist()
+        error = relative_position(estimate, truth)
+        self._truth.add(east[0], north[0])
+        self._estimate.add(east[1], north[1])
+        self._now = (time, math.hypot(error[0], error[1]))
+        self._error.add(*self._now)
+        for position, faulty in self._pending:
+            flat = np.concatenate([position, np.full((len(position), 1), self._origin[2])], axis=1)
+            offsets = relative_position(flat, self._origin)
+            for (n, e, _), bad in zip(offsets.tolist(), faulty.tolist(), strict=True):
+                (self._faults if bad else self._fixes).add(e, n)
+        self._pending = []
+
+    def frame(self) -> NDArray[np.uint8]:
+        """The picture as an (h, w, 3) array of bytes."""
+        canvas = self._figure.canvas
+        if self._update() or self._background is None:
+            canvas.draw()
+            self._background = canvas.copy_from_bbox(self._figure.bbox)
+        canvas.restore_region(self._background)
+        for artist in self._moving:
+            self._figure.draw_artist(artist)
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+    def show(self) -> None:
+        """Bring the window up to date; nothing where there is no display."""
+        if self._silent:
+            return
+        self._update()
+        self._window.canvas.draw_idle()
+        self._window.canvas.flush_events()
+
+    def close(self) -> None:
+        """Close the window."""
+        if self._window is not None:
+            import matplotlib.pyplot as plt
+
+            plt.close(self._window)
+        self._window = self._figure = None
+        self._silent = True
+
+    # ------------------------------------------------------------------------------------------- drawing
+
+    def _build(self) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        if self._figure is None:
+            self._figure = Figure()
+            FigureCanvasAgg(self._figure)
+        self._figure.set_size_inches(7.2, 7.2)
+        self._figure.set_dpi(100)
+        self._chart = chart = self._figure.add_axes((0.11, 0.36, 0.86, 0.58))
+        self._below = below = self._figure.add_axes((0.11, 0.075, 0.86, 0.19))
+        for axes in (chart, below):
+            axes.grid(True, color=_GRID, linewidth=0.8)
+            axes.set_axisbelow(True)
+            axes.tick_params(colors=_INK, labelsize=8, length=3)
+            for side, spine in axes.spines.items():
+                spine.set_visible(side in ("left", "bottom"))
+                spine.set_color(_INK)
+        dot = {"linestyle": "none", "marker": "o", "markeredgewidth": 0}
+        (self._fix_dots,) = chart.plot([], [], color=_FIX, markersize=3.0, alpha=0.7, label="fix", **dot)
+        (self._fault_dots,) = chart.plot([], [], color=_FAULT, markersize=4.0, label="fix, faulty", **dot)
+        (self._truth_line,) = chart.plot([], [], color=_TRUTH, linewidth=1.6, label="truth")
+        (self._estimate_line,) = chart.plot([], [], color=_ESTIMATE, linewidth=1.3, label="estimate")
+        chart.plot([0], [0], color=_TRUTH, marker="o", markersize=5, markerfacecolor="white", linestyle="none")
+        (self._vessel,) = chart.plot([], [], color=_TRUTH, markersize=7, **dot)
+        (self._believed,) = chart.plot([], [], color=_ESTIMATE, markersize=5, **dot)
+        (self._error_line,) = below.plot([], [], color=_ESTIMATE, linewidth=1.2)
+        below.set_ylabel("horizontal error [m]", fontsize=9, color=_INK)
+        handles = [self._truth_line, self._estimate_line, self._fix_dots, self._fault_dots]
+        self._figure.legend(
+            handles=handles,
+            loc="upper right",
+            bbox_to_anchor=(0.975, 0.995),
+            ncols=4,
+            fontsize=8.5,
+            frameon=False,
+            handlelength=1.4,
+            columnspacing=1.2,
+            labelcolor=_INK,
+        )
+        self._figure.text(0.11, 0.965, self.title, fontsize=11, color=_INK, weight="bold")
+        self._reading = self._figure.text(0.97, 0.272, "", fontsize=9, color=_ESTIMATE, ha="right")
+        dots, lines = [self._fix_dots, self._fault_dots], [self._truth_line, self._estimate_line]
+        self._moving = [*dots, *lines, self._vessel, self._believed, self._error_line, self._reading]
+        for artist in self._moving:
+            artist.set_animated(self._window is None)
+
+    def _update(self) -> bool:
+        """Hand the traces to the artists; True where the axes changed."""
+        truth, estimate, error = self._truth.points, self._estimate.points, self._error.points
+        changed = self._limits(truth, estimate)
+        changed |= self._error_limits(float(error[:, 1].max()) if len(error) else 0.0)
+        scale = self._scale
+        for artist, trace in (
+            (self._fix_dots, self._fixes.points),
+            (self._fault_dots, self._faults.points),
+            (self._truth_line, truth),
+            (self._estimate_line, estimate),
+            (self._vessel, truth[-1:]),
+            (self._believed, estimate[-1:]),
+        ):
+            artist.set_data(trace[:, 0] * scale, trace[:, 1] * scale)
+        self._error_line.set_data(error[:, 0] / self._seconds, error[:, 1])
+        self._reading.set_text(f"{_clock(self._now[0])}    {self._now[1]:.3g} m" if len(truth) else "")
+        return changed
+
+    def _limits(self, truth: Array, estimate: Array) -> bool:
+        """Frame the truth; the estimate and the fixes too, as long as the truth stays readable."""
+        low, high = (truth.min(axis=0), truth.max(axis=0)) if len(truth) else (np.zeros(2), np.zeros(2))
+        bound_low, bound_high = low, high
+        span = max(float((high - low).max()), 50.0)
+        for trace in (estimate, self._fixes.points, self._faults.points):
+            if len(trace):
+                low = np.minimum(low, np.maximum(trace.min(axis=0), bound_low - span))
+                high = np.maximum(high, np.minimum(trace.max(axis=0), bound_high + span))
+        if self._view is not None and (low >= self._view[0]).all() and (high <= self._view[1]).all():
+            return False
+        box = self._chart.bbox
+        half = np.maximum((high - low) / 2 * 1.3, span / 4)  # room to grow, so that the picture stands still
+        half = max(half[0] / box.width, half[1] / box.height) * np.array([box.width, box.height])  # equal scales
+        middle = (low + high) / 2
+        self._view = middle - half, middle + half
+        self._scale, unit = (1e-3, "km") if half.max() > 2000.0 else (1.0, "m")
+        self._chart.set_xlim(*((middle[0] + half[0] * np.array([-1, 1])) * self._scale))
+        self._chart.set_ylim(*((middle[1] + half[1] * np.array([-1, 1])) * self._scale))
+        self._chart.set_xlabel(f"east of the start [{unit}]", fontsize=9, color=_INK)
+        self._chart.set_ylabel(f"north of the start [{unit}]", fontsize=9, color=_INK)
+        return True
+
+    def _error_limits(self, largest: float) -> bool:
+        span = self._span or min(60.0, self._duration)
+        while span < self._now[0] and span < self._duration:
+            span = min(2.0 * span, self._duration)
+        top = self._top
+        if not 0.0 < largest <= top:
+            top = max(1.25 * largest, 1e-3)
+        if (span, top) == (self._span, self._top):
+            return False
+        self._span, self._top = span, top
+        self._seconds, letter = (3600.0, "h") if span > 7200.0 else (1.0, "s")
+        self._below.set_xlim(0.0, span / self._seconds)
+        self._below.set_ylim(0.0, top)
+        self._below.set_xlabel(f"time [{letter}]", fontsize=9, color=_INK)
+        return True
+
+
+def _clock(time: float) -> str:
+    return f"{int(time) // 3600}:{int(time) // 60 % 60:02d}:{int(time) % 60:02d}"
+
+
+def _open_window() -> Any:
+    """A figure in a window, or None where there is no display (said once, in one sentence)."""
+    try:
+        import matplotlib.pyplot as plt
+
+        figure = plt.figure("simnav")
+        if figure.canvas.required_interactive_framework is not None:
+            figure.show()
+            return figure
+        plt.close(figure)
+    except ImportError:  # a backend was asked for that cannot run here
+        pass
+    _log.warning("there is no display here, so nothing is shown; use render_mode='rgb_array'")
+    return None
