@@ -1,0 +1,315 @@
+"""Run code that nobody vouches for: in a process of its own, with limits of time and memory.
+
+On POSIX the process is a fork: it starts in milliseconds, with all kernels warm, and the recording
+is shared, not copied. Elsewhere it is spawned. Memory is limited twice: the kernel refuses private
+memory beyond the limit (``RLIMIT_DATA``, so that Python sees a `MemoryError` before the machine
+suffers), and a watchdog kills a process whose resident memory passes it all the same. Windows
+has neither; there only time is limited.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import faulthandler
+import math
+import multiprocessing
+import os
+import pickle
+import select
+import signal
+import struct
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["Outcome", "isolate"]
+
+_LINUX: bool = sys.platform == "linux"
+_HEADER = struct.Struct(">QQ")  # resident memory at the start, length of the message
+_POLL = 0.02 if _LINUX else 0.5  # between two looks at the memory of the process [s]
+_MEGABYTE = 1 << 20
+_RSS_UNIT = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of an isolated call.
+
+    Attributes
+    ----------
+    status : str
+        ``ok``, ``error`` (it raised, crashed or left), ``timeout`` or ``out-of-memory``.
+    reason : str
+        One sentence; empty if ok.
+    value : object
+        What the function returned; None unless ok.
+    seconds : float
+        Wall-clock time.
+    peak_memory : int
+        Largest resident memory beyond what the process had at its start [bytes].
+    """
+
+    status: str
+    reason: str
+    value: Any
+    seconds: float
+    peak_memory: int
+
+
+def isolate(
+    function: Callable[..., Any], *args: Any, timeout: float, memory: int, method: str | None = None
+) -> Outcome:
+    """Call ``function(*args)`` in a process of its own and wait for it.
+
+    The process has no standard input, its output is discarded, and whatever it started is killed
+    with it. Nothing that it does raises here.
+
+    Parameters
+    ----------
+    function, *args
+        What to call. The value comes back pickled.
+    timeout : float
+        Wall-clock limit [s]; the process is killed when it passes, whatever it does.
+    memory : int
+        Limit of the memory that it takes beyond what it starts with [bytes].
+    method : {"fork", "spawn"}, optional
+        Default: fork on POSIX. A spawned function and its arguments are pickled.
+
+    Returns
+    -------
+    Outcome
+    """
+    started = time.monotonic()
+    run = _fork if (method or ("fork" if os.name == "posix" else "spawn")) == "fork" else _spawn
+    message, verdict, death, peak = run(function, args, timeout, memory)
+    seconds = time.monotonic() - started
+    if verdict:
+        reason = {
+            "timeout": f"stopped after {timeout:g} s",
+            "out-of-memory": f"stopped when it had taken more than {_readable(memory)} of memory",
+        }[verdict]
+        return Outcome(verdict, reason, None, seconds, peak)
+    if message is None:
+        if death == "SIGKILL" or (death.startswith("SIG") and peak > 0.9 * memory):
+            return Outcome("out-of-memory", f"killed ({death}) for want of memory", None, seconds, peak)
+        return Outcome("error", f"the process died ({death}) without an answer", None, seconds, peak)
+    try:
+        status, value, peak = pickle.loads(message)
+    except Exception as error:
+        return Outcome("error", f"the answer cannot be read ({_describe(error)})", None, seconds, peak)
+    if status == "ok":
+        return Outcome("ok", "", value, seconds, peak)
+    reason = f"more than {_readable(memory)} of memory was wanted" if status == "out-of-memory" else value
+    return Outcome(status, reason, None, seconds, peak)
+
+
+def _readable(memory: int) -> str:
+    return f"{memory / _MEGABYTE:.0f} MiB"
+
+
+def _describe(error: BaseException) -> str:
+    try:
+        text = str(error)
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _answer(function: Callable[..., Any], args: tuple[Any, ...], lift: Callable[[], None], start: int) -> bytes:
+    """Call, in the child, and pickle (status, value or reason, peak memory)."""
+    try:
+        status, value = "ok", function(*args)
+    except MemoryError:
+        status, value = "out-of-memory", None
+    except BaseException as error:  # SystemExit and KeyboardInterrupt, too: it is not the user who asks
+        status, value = "error", _describe(error)
+    lift()
+    peak = max(0, _peak_resident() - start)
+    try:
+        return pickle.dumps((status, value, peak), protocol=pickle.HIGHEST_PROTOCOL)
+    except BaseException as error:
+        return pickle.dumps(("error", f"what it returned cannot be pickled ({_describe(error)})", peak))
+
+
+# --- fork -----------------------------------------------------------------------------------------
+
+
+def _fork(
+    function: Callable[..., Any], args: tuple[Any, ...], timeout: float, memory: int
+) -> tuple[bytes | None, str, str, int]:
+    """Return (message or None, verdict or "", how it died, peak memory)."""
+    deadline = time.monotonic() + timeout
+    parent, (read, write) = os.getpid(), os.pipe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads: the child uses none of them
+        child = os.fork()
+    if child == 0:
+        try:
+            os.close(read)
+            _serve(write, parent, function, args, timeout, memory)
+        finally:
+            os._exit(70)
+    os.close(write)
+    received, verdict = bytearray(), ""
+    start, wanted = -1, _HEADER.size
+    try:
+        while len(received) < wanted:
+            left = deadline - time.monotonic()
+            if left <= 0:
+                verdict = "timeout"
+                break
+            if select.select([read], [], [], min(left, _POLL))[0]:
+                piece = os.read(read, _MEGABYTE)
+                if not piece:
+                    break
+                received += piece
+                if start < 0 and len(received) >= 8:
+                    start = int.from_bytes(received[:8])
+                if len(received) >= _HEADER.size:
+                    wanted = _HEADER.size + _HEADER.unpack_from(received)[1]
+            elif start >= 0 and _resident(child) - start > memory:
+                verdict = "out-of-memory"
+                break
+    finally:
+        os.close(read)
+        _kill(child)
+        _, status, usage = os.wait4(child, 0)
+    peak = max(0, usage.ru_maxrss * _RSS_UNIT - start) if start >= 0 else 0
+    if verdict or len(received) < wanted:
+        return None, verdict, _death(status), peak
+    return bytes(received[_HEADER.size :]), "", "", peak
+
+
+def _kill(child: int) -> None:
+    """Kill a child and all that it started (it leads a session once it is up)."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(child, signal.SIGKILL)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(child, signal.SIGKILL)
+
+
+def _death(status: int) -> str:
+    code = os.waitstatus_to_exitcode(status)
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+
+def _serve(
+    write: int, parent: int, function: Callable[..., Any], args: tuple[Any, ...], timeout: float, memory: int
+) -> None:
+    """The child's whole life."""
+    os.setsid()  # Ctrl-C in the terminal is not for us, and we are killed with all that we start
+    _die_with_parent(parent)
+    signal.set_wakeup_fd(-1)
+    faulthandler.disable()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
+        signal.signal(number, signal.SIG_DFL)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        os.dup2(nothing, descriptor)
+    sys.stdin = open(os.devnull)  # noqa: SIM115
+    sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    start = _resident(os.getpid())
+    os.write(write, start.to_bytes(8))
+    lift = _limit(timeout, memory)
+    message = _answer(function, args, lift, start)
+    view = memoryview(len(message).to_bytes(8) + message)
+    while view:
+        view = view[os.write(write, view) :]
+    os._exit(0)
+
+
+def _limit(timeout: float, memory: int) -> Callable[[], None]:
+    """Set the limits of this process; return what lifts that of memory again."""
+    import resource
+
+    def lower(which: int, value: int) -> None:
+        hard = resource.getrlimit(which)[1]
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(which, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+    lower(resource.RLIMIT_CORE, 0)
+    lower(resource.RLIMIT_CPU, math.ceil(4.0 * timeout) + 60)  # only if everyone who could kill us is dead
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    if _LINUX:
+        with open("/proc/self/statm") as file:
+            data = int(file.read().split()[5]) * resource.getpagesize()
+        lower(resource.RLIMIT_DATA, data + memory)
+
+    def lift() -> None:
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_DATA, before)
+
+    return lift
+
+
+def _die_with_parent(parent: int) -> None:
+    """A worker that is killed takes its child with it (Linux; elsewhere the limit of CPU time ends it)."""
+    if _LINUX:
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def _resident(process: int) -> int:
+    """Resident memory of a process [bytes]; 0 if it cannot be told."""
+    try:
+        with open(f"/proc/{process}/statm") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        pass
+    if _LINUX or os.name != "posix":
+        return 0
+    done = subprocess.run(["ps", "-o", "rss=", "-p", str(process)], capture_output=True, text=True, check=False)
+    return int(done.stdout.strip() or 0) * 1024
+
+
+def _peak_resident() -> int:
+    """Largest resident memory of this process so far [bytes]; 0 if it cannot be told."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _RSS_UNIT
+
+
+# --- spawn ----------------------------------------------------------------------------------------
+
+
+def _spawn(
+    function: Callable[..., Any], args: tuple[Any, ...], timeout: float, memory: int
+) -> tuple[bytes | None, str, str, int]:
+    """Like `_fork`, for systems without it."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_spawned, args=(theirs, function, args, timeout, memory))
+    message: bytes | None = None
+    try:
+        process.start()
+        theirs.close()
+        if not ours.poll(timeout):
+            return None, "timeout", "", 0
+        with contextlib.suppress(EOFError, OSError):
+            message = ours.recv_bytes()
+    finally:
+        ours.close()
+        if process.pid is not None:
+            if message is not None:
+                process.join(1.0)
+            process.kill()
+            process.join()
+    code = process.exitcode or 0
+    return message, "", signal.Signals(-code).name if code < 0 else f"exit code {code}", 0
+
+
+def _spawned(connection: Any, function: Callable[..., Any], args: tuple[Any, ...], timeout: float, memory: int) -> None:
+    sys.stdin = open(os.devnull)  # noqa: SIM115
+    sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    start = _peak_resident()
+    lift = _limit(timeout, memory) if os.name == "posix" else lambda: None
+    connection.send_bytes(_answer(function, args, lift, start))
