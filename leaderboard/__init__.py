@@ -1,1 +1,1 @@
-"""TODO"""
+"""Monte Carlo campaigns, result store, ranking, tables, figures, the site and the `simnav` command."""

@@ -1,0 +1,109 @@
+"""What is typed on the command line, made into scenarios and requested estimators."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from leaderboard.console import UserError, mistakes
+
+if TYPE_CHECKING:
+    from leaderboard.campaign import EstimatorRequest
+    from simnav.scenario import Scenario
+
+__all__ = ["requests", "scenario", "scenarios", "split_estimators", "split_names"]
+
+
+def split_names(given: Iterable[str] | None) -> list[str]:
+    """Names separated by commas, over any number of options.
+
+    >>> split_names(["open-sea, uuv", "mine.toml"])
+    ['open-sea', 'uuv', 'mine.toml']
+    """
+    return [part.strip() for text in given or () for part in text.split(",") if part.strip()]
+
+
+def split_estimators(given: Iterable[str] | None) -> list[tuple[str, dict[str, str]]]:
+    """Names or files with their parameters: ``name:key=value,key=value``, separated by commas.
+
+    >>> split_estimators(["ekf:gate=3,tau=10,dead-reckoning", "my.py:Mine:gain=0.5"])
+    [('ekf', {'gate': '3', 'tau': '10'}), ('dead-reckoning', {}), ('my.py:Mine', {'gain': '0.5'})]
+    """
+    found: list[tuple[str, dict[str, str]]] = []
+    for text in given or ():
+        open_for_more = False  # the item before has parameters, so that "key=value" is one more of them
+        for part in filter(None, (p.strip() for p in text.split(","))):
+            whole = re.fullmatch(r"(?P<name>.+?):(?P<key>\w+)=(?P<value>.*)", part)
+            more = re.fullmatch(r"(?P<key>\w+)=(?P<value>.*)", part)
+            if whole:
+                found.append((whole["name"], {whole["key"]: whole["value"]}))
+            elif more and open_for_more:
+                found[-1][1][more["key"]] = more["value"]
+            elif more:
+                raise UserError(f"{part!r} is no estimator; parameters follow a name: 'ekf:{part}'")
+            else:
+                found.append((part, {}))
+            open_for_more = bool(found[-1][1])
+    return found
+
+
+def _settings(given: Iterable[str]) -> dict[str, str]:
+    values = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip().isidentifier():
+            raise UserError(f"--set {text}: it should be name=value, like --set gate=3")
+        values[name.strip()] = value.strip()
+    return values
+
+
+def requests(given: Iterable[str] | None, settings: Sequence[str] | None = None) -> list[EstimatorRequest]:
+    """The estimators that were asked for, all registered ones where none was.
+
+    Parameters
+    ----------
+    given : iterable of str or None
+        As for `split_estimators`.
+    settings : sequence of str or None
+        ``name=value``; each goes to every estimator that has a parameter of that name.
+
+    Raises
+    ------
+    UserError
+        On an unknown estimator or parameter, or a value that does not fit.
+    """
+    from leaderboard.campaign import EstimatorRequest
+    from simnav.estimator import describe, make, names
+
+    asked = split_estimators(given) or [(name, {}) for name in names()]
+    common = _settings(settings or ())
+    unused = set(common)
+    made: dict[Any, EstimatorRequest] = {}
+    for name, values in asked:
+        with mistakes():
+            known = {p.name for p in describe(name).parameters}
+            mine = {k: v for k, v in common.items() if k in known}
+            unused -= set(mine)
+            make(name, **{**mine, **values})  # so that a mistake shows now, not in a worker
+        request = EstimatorRequest(name, {**mine, **values})
+        made.setdefault((name, tuple(sorted(request.parameters.items()))), request)
+    if unused:
+        which = asked[0][0] if len(asked) == 1 else "any of the estimators"
+        raise UserError(f"--set {sorted(unused)[0]}: no such parameter of {which}; 'simnav list estimators' shows them")
+    return list(made.values())
+
+
+def scenario(name: str) -> Scenario:
+    """One scenario by name, id or path."""
+    from simnav.scenario import load
+
+    with mistakes():
+        return load(name)
+
+
+def scenarios(given: Iterable[str] | None) -> list[Scenario]:
+    """The scenarios that were asked for, the whole catalogue where none was."""
+    from simnav.scenario import names
+
+    return [scenario(name) for name in dict.fromkeys(split_names(given) or names())]

@@ -1,0 +1,145 @@
+"""Tables for people, from plain values (rich is imported when a table is drawn)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+__all__ = ["duration", "interval", "number", "parameters", "percent", "size", "table"]
+
+MISSING = "–"
+
+
+def number(value: Any, digits: int = 3) -> str:
+    """A figure with ``digits`` significant digits, without exponents where they can be avoided.
+
+    >>> number(1234.5), number(0.012345), number(2.0), number(None)
+    ('1230', '0.0123', '2.00', '–')
+    """
+    if value is None:
+        return MISSING
+    if isinstance(value, bool) or isinstance(value, str):
+        return str(value)
+    if isinstance(value, int):
+        return str(value)
+    x = float(value)
+    if math.isnan(x):
+        return MISSING
+    if math.isinf(x):
+        return "∞" if x > 0 else "-∞"
+    if x == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(x)))
+    if exponent >= 6 or exponent < -4:
+        return f"{x:.{digits - 1}e}"
+    decimals = digits - 1 - exponent
+    return f"{round(x, decimals):.{max(decimals, 0)}f}"
+
+
+def interval(value: Any, low: Any, high: Any) -> str:
+    """A figure with its interval.
+
+    >>> interval(2.0, 1.5, 2.5)
+    '2.00 [1.50, 2.50]'
+    """
+    if low is None or high is None or not all(map(_finite, (value, low, high))):
+        return number(value)
+    return f"{number(value)} [{number(low)}, {number(high)}]"
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, (int, float)) and math.isfinite(value)
+
+
+def percent(value: Any) -> str:
+    """A fraction in percent.
+
+    >>> percent(0.954)
+    '95.4 %'
+    """
+    return MISSING if not _finite(value) else f"{100.0 * value:.1f} %"
+
+
+def duration(seconds: Any) -> str:
+    """A time with the unit that suits it.
+
+    >>> duration(3.2e-5), duration(0.25), duration(90), duration(5400)
+    ('32.0 µs', '250 ms', '90.0 s', '1.50 h')
+    """
+    if not _finite(seconds):
+        return MISSING
+    for factor, unit in ((1e-6, "µs"), (1e-3, "ms"), (1.0, "s")):
+        if seconds < 999.5 * factor:
+            return f"{number(seconds / factor)} {unit}"
+    return f"{number(seconds / 3600.0)} h"
+
+
+def size(count: Any) -> str:
+    """Bytes with the unit that suits them.
+
+    >>> size(350 * 2**20)
+    '350 MiB'
+    """
+    if not _finite(count):
+        return MISSING
+    for factor, unit in ((2**30, "GiB"), (2**20, "MiB"), (2**10, "KiB")):
+        if count >= factor:
+            return f"{number(count / factor)} {unit}"
+    return f"{count:.0f} B"
+
+
+def parameters(values: Mapping[str, Any]) -> str:
+    """Parameters as they are typed on the command line.
+
+    >>> parameters({"gate": 3.0})
+    'gate=3.0'
+    """
+    return ", ".join(f"{k}={v}" for k, v in values.items())
+
+
+def table(
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[Any]],
+    *,
+    numeric: Iterable[str] = (),
+    dim: Iterable[int] = (),
+    strong: Iterable[int] = (),
+    caption: str | None = None,
+) -> Table:
+    """A rich table; cells are shown as text, never as markup.
+
+    Parameters
+    ----------
+    title : str
+    columns : sequence of str
+    rows : iterable of sequences
+    numeric : iterable of str
+        Columns that are right-aligned.
+    dim, strong : iterable of int
+        Rows that step back (reference rows) and that stand out (the user's own).
+    caption : str, optional
+    """
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    right, faint, bold = set(numeric), set(dim), set(strong)
+    result = Table(
+        title=Text(title, style="bold"),
+        caption=None if caption is None else Text(caption, style="dim"),
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    for name in columns:
+        result.add_column(Text(name), justify="right" if name in right else "left", no_wrap=name in right)
+    for index, row in enumerate(rows):
+        style = "bold" if index in bold else "dim" if index in faint else ""
+        result.add_row(*(Text(MISSING if c is None else str(c)) for c in row), style=style)
+    return result
