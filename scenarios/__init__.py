@@ -1,1 +1,6 @@
-"""TODO"""
+"""The catalogue of scenarios: one TOML file each, found by `simnav.catalogue` through the entry-point group
+``simnav.scenarios``. ``docs/scenarios.md`` describes the schema."""
+
+from __future__ import annotations
+
+__all__: list[str] = []

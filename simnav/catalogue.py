@@ -1,0 +1,144 @@
+"""Where scenarios are found: the packs behind the entry-point group ``simnav.scenarios``.
+
+A pack is an importable package that holds scenario files (``*.toml``); installing it is all it takes.
+Only the heads of the files are read here, with nothing but the standard library, because ``import
+simnav`` asks for them to register its Gymnasium ids. A broken pack or file is named in a warning and
+harms nobody else.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import importlib.resources
+import re
+import tomllib
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
+
+_GROUP = "simnav.scenarios"
+
+#: Names of scenarios: kebab-case.
+NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
+
+class ScenarioWarning(UserWarning):
+    """A scenario pack, or a file in one, was left out; the message says which and why."""
+
+
+@dataclass(frozen=True)
+class Header:
+    """The head of a scenario file: what a list of scenarios shows.
+
+    Attributes
+    ----------
+    name : str
+        Kebab-case.
+    version : int
+    title : str
+    duration : float
+        Of a run [s].
+    tags : tuple of str
+    path : Path
+        Of the TOML file.
+    """
+
+    name: str
+    version: int
+    title: str
+    duration: float
+    tags: tuple[str, ...]
+    path: Path
+
+    @property
+    def id(self) -> str:
+        """``coastal-voyage-v1``."""
+        return f"{self.name}-v{self.version}"
+
+    @property
+    def gym_id(self) -> str:
+        """``simnav/CoastalVoyage-v1``."""
+        return gym_id(self.name, self.version)
+
+
+def gym_id(name: str, version: int) -> str:
+    """The Gymnasium id of a scenario.
+
+    >>> gym_id("coastal-voyage", 1)
+    'simnav/CoastalVoyage-v1'
+    """
+    return f"simnav/{''.join(part.capitalize() for part in name.split('-'))}-v{version}"
+
+
+def headers() -> list[Header]:
+    """Every scenario of every installed pack, sorted by name and version."""
+    found: dict[str, Header] = {}
+    ids: dict[str, Header] = {}
+    for folder in _folders():
+        for path in sorted(folder.glob("*.toml")):
+            header = _header(path)
+            if header is None:
+                continue
+            other = found.get(header.id) or ids.get(header.gym_id)
+            if other is not None:
+                _warn(f"{path}: left out, {other.path} already has the id {other.id!r} ({other.gym_id})")
+                continue
+            found[header.id] = ids[header.gym_id] = header
+    return sorted(found.values(), key=lambda h: (h.name, h.version))
+
+
+def _folders() -> Iterator[Path]:
+    """The folder of each pack, the project's own first."""
+    # Metadata on sys.path twice (a source tree that is also installed) must not count twice.
+    points = {(p.name, p.value): p for p in importlib.metadata.entry_points(group=_GROUP)}
+    for point in sorted(points.values(), key=lambda p: (not _own(p), p.name)):
+        if _own(point):
+            # Beside this package, so that a folder "scenarios" of the working directory cannot shadow it.
+            yield Path(__file__).resolve().parent.parent / point.module
+            continue
+        try:
+            module = importlib.import_module(point.module)
+            package = module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
+            yield Path(str(importlib.resources.files(package)))
+        except (Exception, SystemExit) as error:
+            _warn(f"scenario pack {point.name!r} ({point.value}) left out: {type(error).__name__}: {error}")
+
+
+def _own(point: importlib.metadata.EntryPoint) -> bool:
+    return point.dist is not None and point.dist.name == "simnav"
+
+
+def _header(path: Path) -> Header | None:
+    try:
+        with path.open("rb") as file:
+            table = tomllib.load(file)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        _warn(f"{path}: left out, not valid TOML: {error}")
+        return None
+    name, version, duration = table.get("name"), table.get("version"), table.get("duration_s")
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        _warn(f"{path}: left out, name = {name!r} should be in kebab-case, like 'coastal-voyage'")
+        return None
+    if not isinstance(version, int) or version < 1:
+        _warn(f"{path}: left out, version = {version!r} should be a whole number from 1")
+        return None
+    if not isinstance(duration, (int, float)):
+        _warn(f"{path}: left out, duration_s = {duration!r} should be a number")
+        return None
+    tags = table.get("tags", [])
+    return Header(
+        name=name,
+        version=version,
+        title=str(table.get("title", "")),
+        duration=float(duration),
+        tags=tuple(map(str, tags)) if isinstance(tags, list) else (),
+        path=path,
+    )
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, ScenarioWarning, stacklevel=3)

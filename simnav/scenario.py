@@ -1,0 +1,307 @@
+"""Scenarios: the declarative description of a run, read from TOML and validated.
+
+A scenario says what happens (vessel, manoeuvres, sea, current), with what it is observed
+(instruments) and what goes wrong (faults). It is either simulated, or recorded: then a ``[log]``
+table says which files hold what. Everything random is drawn from a run's seed, nothing from here.
+
+`load` finds one by name or path; `simnav.catalogue` knows where the packs are. The schema is
+described in ``docs/scenarios.md``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from simnav.catalogue import NAME, Header, gym_id, headers
+from simnav.log.spec import RecordedSpec
+from simnav.sensors import FaultSpec, ImuSpec, InstrumentSpec
+from simnav.spec import Positive, Spec, SpecError, closest, entries, quantity
+from simnav.types import Array, Instruments
+from simnav.world import Current, Manoeuvre, Sea, Start, Vessel
+
+__all__ = ["Header", "InitialError", "Scenario", "headers", "load", "names", "parse"]
+
+#: A measurement's labels are 32 bits, one an interval of a fault.
+_MOST_BITS = 32
+
+_INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
+
+Sigmas = tuple[float, float, float]
+
+
+class InitialError(Spec):
+    """One-sigma errors, north-east-down, of the state that an estimator is told at the start.
+
+    The errors of a run are drawn from it, independently, and the covariance is handed over with
+    the state.
+    """
+
+    position: Sigmas = quantity("m", (2.0, 2.0, 2.0), description="position error north, east, down")
+    velocity: Sigmas = quantity("m_s", (0.05, 0.05, 0.05), description="velocity error north, east, down")
+    attitude: Sigmas = quantity(
+        "deg",
+        tuple(math.radians(d) for d in (0.05, 0.05, 0.5)),
+        description="attitude error about north, east, down (the last is heading)",
+    )
+
+    @field_validator("position", "velocity", "attitude")
+    @classmethod
+    def _positive(cls, value: Sigmas) -> Sigmas:
+        if not all(v > 0.0 for v in value):
+            raise ValueError("the initial covariance must be positive definite: every sigma should be greater than 0")
+        return value
+
+    def covariance(self) -> Array:
+        """(9, 9) array over `simnav.types.COMPONENTS`."""
+        return np.diag(np.square([*self.position, *self.velocity, *self.attitude]))
+
+
+class _Imu(ImuSpec):
+    """The IMU among the instruments: a table that is told by its name."""
+
+    kind: Literal["imu"] = "imu"
+
+
+class Scenario(Spec):
+    """A run, described; simulated unless it has a ``[log]``."""
+
+    name: str = Field(description="kebab-case; with the version it is the scenario's id")
+    version: int = Field(ge=1, description="raise it whenever a change alters the numbers of a run")
+    title: str = Field(description="one line")
+    description: str = Field("", description="what happens and why, for the reader of the board")
+    source: str = Field("", description="paper or data that it follows")
+    tags: tuple[str, ...] = Field((), description="free words to select by")
+    duration: Positive = quantity("s", description="length of a run; a multiple of the step")
+    step: Positive = quantity("s", 1.0, description="from one estimate to the next")
+    world_seed: int | None = Field(
+        None, ge=0, description="fixes sea and truth for all runs, which then differ in errors and faults only"
+    )
+    water_depth: Positive | None = quantity("m", None, description="of the sea; absent: deep beyond any bottom lock")
+    start: Start | None = Field(None, description="state of the vessel at time 0")
+    initial_error: InitialError = Field(InitialError(), description="what the estimator does not know of it")
+    vessel: Vessel | None = Field(None, description="how the vessel answers")
+    manoeuvres: tuple[Manoeuvre, ...] = entries("manoeuvre", (), description="in order; the last holds to the end")
+    sea: Sea | None = Field(None, description="waves; absent: flat calm")
+    current: Current | None = Field(None, description="absent: none")
+    instruments: dict[str, InstrumentSpec | _Imu] = Field(
+        default_factory=dict, description="by name; the IMU, if there is one, is called imu"
+    )
+    faults: tuple[FaultSpec, ...] = entries("fault", (), description="laid over the measurements, in order")
+    log: RecordedSpec | None = Field(None, description="files of a recorded run; then there is no simulated world")
+
+    @property
+    def id(self) -> str:
+        """Name and version: ``coastal-voyage-v1``."""
+        return f"{self.name}-v{self.version}"
+
+    @property
+    def gym_id(self) -> str:
+        """The Gymnasium id: ``simnav/CoastalVoyage-v1``."""
+        return gym_id(self.name, self.version)
+
+    @property
+    def recorded(self) -> bool:
+        """Whether the measurements come from a log."""
+        return self.log is not None
+
+    @property
+    def epochs(self) -> int:
+        """Number of steps in a run."""
+        return round(self.duration / self.step)
+
+    @property
+    def imu(self) -> ImuSpec | None:
+        """The IMU's specification, or None."""
+        spec = self.instruments.get("imu")
+        return spec if isinstance(spec, ImuSpec) else None
+
+    @property
+    def aids(self) -> dict[str, InstrumentSpec]:
+        """The instruments beside the IMU, by name, in order."""
+        return {n: s for n, s in self.instruments.items() if not isinstance(s, ImuSpec)}
+
+    def instruments_sheet(self) -> Instruments:
+        """The datasheets, as an estimator gets them."""
+        imu = self.imu
+        return Instruments(
+            [spec.datasheet(name) for name, spec in self.aids.items()],
+            imu=None if imu is None else imu.datasheet(),
+            step=self.step,
+        )
+
+    def content_hash(self) -> str:
+        """Hexadecimal digest of everything that decides the numbers of a run, defaults included.
+
+        Title, description, source and tags are words and do not count; neither do the files of a log.
+        """
+        content = self.model_dump(mode="python", exclude={"title", "description", "source", "tags"})
+        text = json.dumps(content, sort_keys=True, default=str)
+        return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_head(self)
+        _check_instruments(self)
+        if self.log is None:
+            _check_world(self)
+        else:
+            _check_log(self, self.log)
+        _check_faults(self)
+        return self
+
+
+def _check_head(s: Scenario) -> None:
+    if not NAME.fullmatch(s.name) or re.search(r"-v\d+$", s.name):
+        raise ValueError(f"name = {s.name!r} should be in kebab-case and without a version, like 'coastal-voyage'")
+    if math.isinf(s.duration) or math.isinf(s.step):
+        raise ValueError("duration_s and step_s should be finite")
+    if s.epochs < 1 or abs(s.epochs * s.step - s.duration) > 1e-6:
+        raise ValueError(
+            f"duration_s = {s.duration:g} should be a multiple of step_s = {s.step:g}, "
+            f"like {max(1, s.epochs) * s.step:g}"
+        )
+
+
+def _check_instruments(s: Scenario) -> None:
+    if not s.instruments:
+        raise ValueError("there is no instrument; add at least one table [instruments.NAME]")
+    for name, spec in s.instruments.items():
+        if not _INSTRUMENT.fullmatch(name):
+            raise ValueError(f"instruments.{name}: a name is of lower-case letters, digits and underscores")
+        if isinstance(spec, ImuSpec) != (name == "imu"):
+            raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
+
+
+def _check_world(s: Scenario) -> None:
+    """A simulated run: start and manoeuvres fit the vessel and the water."""
+    if s.start is None:
+        raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
+    vessel = s.vessel or Vessel()
+    depth = -s.start.altitude
+    if vessel.kind == "ship" and depth > 0.0:
+        raise ValueError(f"start.depth_m = {depth:g}: a ship floats; say vessel.kind = 'uuv' for a submerged vehicle")
+    if s.water_depth is not None and depth >= s.water_depth:
+        raise ValueError(f"start.depth_m = {depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}")
+    for i, m in enumerate(s.manoeuvres):
+        if vessel.kind == "ship" and m.kind in ("dive", "surface"):
+            raise ValueError(f"manoeuvre[{i}].kind = {m.kind!r}: a ship cannot; say vessel.kind = 'uuv'")
+        if m.kind == "dive" and s.water_depth is not None and m.depth >= s.water_depth:
+            raise ValueError(
+                f"manoeuvre[{i}].depth_m = {m.depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}"
+            )
+
+
+def _check_log(s: Scenario, log: RecordedSpec) -> None:
+    """A recorded run: no world beside it, and a source for every instrument."""
+    for key in ("start", "vessel", "manoeuvres", "sea", "current", "world_seed"):
+        if getattr(s, key):
+            table = "manoeuvre" if key == "manoeuvres" else key
+            raise ValueError(f"{table}: a recorded run ([log]) has no simulated world; leave it out")
+    aids = list(s.aids)
+    for name in log.instruments:
+        if name not in aids:
+            raise ValueError(f"log.instruments.{name}: there is no [instruments.{name}] datasheet{closest(name, aids)}")
+    for name in aids:
+        if name not in log.instruments:
+            raise ValueError(f"instruments.{name}: the log says not where it comes from; add [log.instruments.{name}]")
+    if (log.imu is None) != (s.imu is None):
+        there, missing = ("log.imu", "instruments.imu") if s.imu is None else ("instruments.imu", "log.imu")
+        raise ValueError(f"[{there}] needs [{missing}] beside it")
+
+
+def _check_faults(s: Scenario) -> None:
+    kinds = {name: spec.kind for name, spec in s.aids.items()}
+    for i, fault in enumerate(s.faults):
+        try:
+            fault.check(kinds, imu=s.imu is not None)
+        except SpecError as error:
+            raise ValueError(f"fault[{i}] {str(error).removeprefix('fault ')}") from None
+        first = fault.intervals[0][0] if fault.intervals else fault.start
+        if first >= s.duration:
+            raise ValueError(f"fault[{i}] {fault.kind!r}: it starts at {first:g} s, but duration_s = {s.duration:g}")
+    bits = sum(fault.bits for fault in s.faults)
+    if bits > _MOST_BITS:
+        raise ValueError(f"fault: {bits} intervals are too many; the labels have room for {_MOST_BITS}")
+
+
+def parse(text: str, *, source: str = "<toml>") -> Scenario:
+    """Read a scenario from the text of a TOML file.
+
+    Raises
+    ------
+    SpecError
+        One sentence that names source, key and value, and what would be right.
+    """
+    try:
+        table: dict[str, Any] = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"{source}: not valid TOML: {error}") from None
+    return Scenario.from_toml(table, source=source)
+
+
+def names() -> list[str]:
+    """Names of all scenarios of the installed packs, sorted, without versions."""
+    return sorted({h.name for h in headers()})
+
+
+def load(name_or_path: str | Path) -> Scenario:
+    """Find and read a scenario.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        ``"coastal-voyage"`` (the newest version), ``"coastal-voyage-v1"``, or the path of a TOML file
+        (a text counts as a path where it ends in ``.toml`` or has a slash in it).
+
+    Raises
+    ------
+    SpecError
+        If there is no such scenario or file, or it is not valid: one sentence.
+    """
+    text = os.fspath(name_or_path)
+    if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or os.sep in text:
+        return _read(Path(text))
+    return _read(_find(text).path)
+
+
+def _find(name: str) -> Header:
+    available = headers()
+    by_id = {h.id: h for h in available}
+    if name in by_id:
+        return by_id[name]
+    versions = [h for h in available if h.name == name]
+    if versions:
+        return versions[-1]
+    stem = re.sub(r"-v\d+$", "", name)
+    others = [h.id for h in available if h.name == stem]
+    if others:
+        raise SpecError(f"there is no scenario {name!r}; there is {' and '.join(others)}")
+    raise SpecError(f"there is no scenario {name!r}{closest(stem, _unique(h.name for h in available))}")
+
+
+def _unique(items: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(items))
+
+
+def _read(path: Path) -> Scenario:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        near = closest(path.stem, names()) if path.parent == Path() else ""
+        raise SpecError(f"{path}: no such file{near.replace('did you mean', 'did you mean the scenario')}") from None
+    except UnicodeDecodeError:
+        raise SpecError(f"{path}: not a TOML file, for it is not UTF-8 text") from None
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
+    return parse(text, source=str(path))
