@@ -1,0 +1,77 @@
+"""Doppler velocity log: velocity over the ground in body axes, while it has the bottom."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, rotate, unrotate
+from simnav.spec import NonNegative, Positive, Vector, quantity
+from simnav.types import Array, TapStates
+
+__all__ = ["Dvl"]
+
+
+class Dvl(AidSpec):
+    """Velocity of the transducer over the ground, along axes that are the body axes up to the misalignment::
+
+        value = (1 + k) R(eta)' (C' v + omega x l)
+
+    k the scale-factor error; eta the rotation vector by which the instrument's axes are turned from the body axes, so
+    that to first order R(eta)' u = u - eta x u. The white noise of a ping has the variance sigma^2 + (speed_noise
+    |u|)^2; the datasheet gives sigma. The bottom is in reach while the transducer's altitude is between
+    ``minimum_altitude`` and ``maximum_altitude``; without a water depth it always is.
+    """
+
+    kind: Literal["dvl"] = "dvl"
+    sigma: SigmaTriple = quantity("m_s")
+    speed_noise: NonNegative = quantity("percent", 0.0)
+    bias: SigmaTriple = quantity("m_s", ZERO)
+    bias_instability: SigmaTriple = quantity("m_s", ZERO)
+    scale: NonNegative = quantity("percent", 0.0)
+    misalignment: SigmaTriple = quantity("deg", ZERO)
+    lever_arm: Vector = quantity("m", ZERO)
+    minimum_altitude: NonNegative = quantity("m", 0.0)
+    maximum_altitude: Positive = quantity("m", inf)
+    fixed_bias: Triple = quantity("m_s", ZERO)
+    fixed_scale: float = quantity("percent", 0.0)
+    fixed_misalignment: Vector = quantity("deg", ZERO)
+
+    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+        """See `AidSpec.build`."""
+        return _Dvl(self, name, seed, water_depth)
+
+
+class _Dvl(Instrument):
+    def __init__(self, spec: Dvl, name: str, seed: int, water_depth: float | None):
+        super().__init__(spec, name, seed)
+        turn = np.asarray(spec.misalignment) * self._normals("misalignment", 3) + spec.fixed_misalignment
+        self.misalignment = turn
+        self._matrix = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
+        self._speed_noise = spec.speed_noise
+        self._water_depth = water_depth
+        self._altitudes = spec.minimum_altitude, spec.maximum_altitude
+
+    def observe(self, tap: TapStates) -> Array:
+        velocity = unrotate(dcm_from_rpy(tap.attitude), tap.velocity)
+        if self._levered:
+            velocity += self.lever_velocity(tap)
+        return rotate(self._matrix, velocity)
+
+    def noise_sigma(self, observed: Array) -> Array:
+        if self._speed_noise == 0.0:
+            return super().noise_sigma(observed)
+        x, y, z = observed[:, 0], observed[:, 1], observed[:, 2]
+        return np.sqrt(self.sigma**2 + self._speed_noise**2 * (x * x + y * y + z * z)[:, None])
+
+    def available(self, tap: TapStates) -> NDArray[np.bool_] | None:
+        if self._water_depth is None:
+            return None
+        altitude = self._water_depth + tap.position[:, 2]
+        if self._levered:
+            altitude -= self.lever_displacement(tap)[:, 2]
+        return (altitude >= self._altitudes[0]) & (altitude <= self._altitudes[1])

@@ -1,0 +1,332 @@
+"""What all faults share: where and when they act, their labels, and how they are laid over a stream.
+
+A fault is a layer over whatever delivered the measurements, a simulator or a real log. It acts at the measurement times
+within its intervals [start, end); elsewhere it neither changes nor draws anything. Within them it draws a fixed number
+of variates per measurement, those counted that something else has dropped, so that faults never change one another.
+
+Bits: a fault takes one bit of the labels, and one `FaultLabel`, per interval in ``intervals``, consecutive; a fault
+with a start and an end, or with random intervals, takes one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, model_validator
+from pydantic.fields import FieldInfo
+
+from simnav.recording import AidStream, FaultLabel, ImuLabels
+from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, quantity, unit_of
+from simnav.streams import stream as random_stream
+from simnav.types import KINDS, Array, ImuSamples
+
+__all__ = ["TOLERANCE", "Activity", "FaultLayer", "FaultSpec", "Names", "Size", "quantity_of"]
+
+#: Times are multiples of the sample interval up to rounding: half a microsecond decides [s].
+TOLERANCE = 0.5e-6
+
+#: A number for all axes, or one per axis.
+Size = float | tuple[float, ...] | None
+
+#: Names of instruments; TOML may give one alone.
+Names = Annotated[tuple[str, ...], BeforeValidator(lambda x: (x,) if isinstance(x, str) else x)]
+
+_QUANTITIES = {
+    "gnss_position": "position",
+    "terrain_fix": "position",
+    "depth": "position",
+    "gnss_velocity": "velocity",
+    "dvl": "velocity",
+    "speed_log": "velocity",
+    "magnetic_compass": "heading",
+    "gyrocompass": "heading",
+}
+
+
+def quantity_of(kind: str) -> str:
+    """What the errors of a kind of instrument are: "position" [m], "velocity" [m/s] or "heading" [rad]."""
+    return _QUANTITIES[kind]
+
+
+class FaultSpec(Spec):
+    """Base of all faults.
+
+    A size is given in the unit of the instruments that it touches: a field like ``offset`` exists as
+    ``offset_position`` (TOML ``offset_m``; also for depths), ``offset_velocity`` (``offset_m_s``) and
+    ``offset_heading`` (``offset_deg``).
+
+    Attributes
+    ----------
+    instruments : tuple of str
+        Names, or kinds, of the instruments that it touches.
+    start, end : float
+        When it acts [s]; by default the whole run.
+    intervals : tuple of (float, float)
+        Instead of start and end: several intervals [s].
+    mean_active, mean_gap : float
+        Random intervals within start and end: the mean of their exponentially distributed lengths and of the gaps
+        between them [s].
+    name : str
+        Of the fault's random streams; by default its kind and instruments.
+    """
+
+    #: Stems of the fields that exist per quantity.
+    stems: ClassVar[tuple[str, ...]] = ()
+
+    kind: str
+    instruments: Names
+    start: NonNegative = quantity("s", 0.0)
+    end: Positive = quantity("s", inf)
+    intervals: tuple[tuple[float, float], ...] = quantity("s", ())
+    mean_active: Positive | None = quantity("s", None)
+    mean_gap: Positive | None = quantity("s", None)
+    name: str = ""
+
+    @classmethod
+    def toml_keys(cls) -> dict[str, tuple[str, FieldInfo]]:
+        """As `Spec.toml_keys`; the unit tells the quantity, so ``offset_position`` is ``offset_m``."""
+        keys = {}
+        for name, info in cls.model_fields.items():
+            stem, _, last = name.rpartition("_")
+            unit = unit_of(info)
+            base = stem if last in ("position", "velocity", "heading") and stem in cls.stems else name
+            keys[base if unit is None else f"{base}_{unit}"] = (name, info)
+        return keys
+
+    @model_validator(mode="after")
+    def _times(self) -> Self:
+        if not self.instruments:
+            raise ValueError("a fault names at least one instrument")
+        if not self.start < self.end:
+            raise ValueError(f"the fault ends ({self.end} s) before it starts ({self.start} s)")
+        if self.intervals and not {"start", "end", "mean_active", "mean_gap"}.isdisjoint(self.model_fields_set):
+            raise ValueError("intervals_s and start_s, end_s, mean_active_s, mean_gap_s exclude each other")
+        if (self.mean_active is None) != (self.mean_gap is None):
+            raise ValueError("mean_active_s and mean_gap_s belong together")
+        edges = [t for interval in self.intervals for t in interval]
+        if any(not a < b for a, b in zip(edges[::2], edges[1::2])) or any(
+            not a <= b for a, b in zip(edges[1::2], edges[2::2])
+        ):
+            raise ValueError("each of intervals_s is [start, end], start before end, in order and without overlap")
+        if edges and edges[0] < 0.0:
+            raise ValueError("intervals_s begin at 0 or later")
+        return self
+
+    @property
+    def bits(self) -> int:
+        """How many bits, and labels, the fault takes."""
+        return max(1, len(self.intervals))
+
+    @property
+    def sizes_required(self) -> bool:
+        """Whether every instrument needs its size."""
+        return True
+
+    def size(self, stem: str, kind: str) -> Any:
+        """The field of a stem for a kind of instrument."""
+        return getattr(self, f"{stem}_{quantity_of(kind)}")
+
+    def _key(self, stem: str, quantity_name: str) -> str:
+        field = f"{stem}_{quantity_name}"
+        return next(key for key, (name, _) in self.toml_keys().items() if name == field)
+
+    def touched(self, instruments: Mapping[str, str]) -> tuple[str, ...]:
+        """Names of the instruments that it touches, of a mapping from name to kind."""
+        return tuple(n for n, k in instruments.items() if n in self.instruments or k in self.instruments)
+
+    def check(self, instruments: Mapping[str, str], *, imu: bool = True) -> None:
+        """Check that the fault fits the instruments of a scenario.
+
+        Parameters
+        ----------
+        instruments : mapping
+            Name to kind.
+        imu : bool
+            Whether there is an IMU.
+
+        Raises
+        ------
+        SpecError
+            On an instrument that is not there, or a size in a unit that does not fit one.
+        """
+        for name in self.instruments:
+            if name not in instruments and name not in instruments.values():
+                valid = sorted({*instruments, *instruments.values()})
+                raise SpecError(f"fault {self.kind!r}: there is no instrument {name!r}{closest(name, valid)}")
+        names = self.touched(instruments)
+        for stem in self.stems:
+            needed = {quantity_of(instruments[n]) for n in names}
+            for q in ("position", "velocity", "heading"):
+                given = getattr(self, f"{stem}_{q}") is not None
+                if given and q not in needed:
+                    kinds = ", ".join(f"{n} ({instruments[n]})" for n in names)
+                    raise SpecError(f"fault {self.kind!r}: {self._key(stem, q)!r} is of no use to {kinds}")
+                if q in needed and not given and self.sizes_required:
+                    n = next(n for n in names if quantity_of(instruments[n]) == q)
+                    where = f"fault {self.kind!r} on {n!r} ({instruments[n]})"
+                    raise SpecError(f"{where}: required key {self._key(stem, q)!r} is missing")
+            for n in names:
+                self._check_axes(stem, n, instruments[n])
+
+    def _check_axes(self, stem: str, name: str, kind: str) -> None:
+        size, d = self.size(stem, kind), len(KINDS[kind].errors)
+        if not isinstance(size, tuple) or len(size) == d:
+            return
+        key = self._key(stem, quantity_of(kind))
+        raise SpecError(
+            f"fault {self.kind!r} on {name!r} ({kind}): {key!r} has {len(size)} numbers; it takes {d}, or one"
+        )
+
+    def label(self, duration: float, instruments: Mapping[str, str]) -> list[FaultLabel]:
+        """The truth about the fault: one label per bit.
+
+        Parameters
+        ----------
+        duration : float
+            Of the run [s]; labels are cut off there.
+        instruments : mapping
+            Name to kind.
+        """
+        names = self.touched(instruments)
+        intervals = self.intervals or ((self.start, self.end),)
+        return [FaultLabel(self.kind, names, min(a, duration), min(b, duration)) for a, b in intervals]
+
+    def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
+        """The fault of one run.
+
+        Parameters
+        ----------
+        index : int
+            Its first bit.
+        seed : int
+            Of the run.
+        occurrence : int, optional
+            Tells faults of the same name apart (`build_layers` counts them); by default the index.
+        """
+        raise NotImplementedError
+
+    @property
+    def stream_name(self) -> str:
+        """What the fault's random streams are named after, besides its occurrence."""
+        return self.name or f"{self.kind}:{','.join(self.instruments)}"
+
+    def _key_of_streams(self, index: int, occurrence: int | None) -> str:
+        return f"{self.stream_name}#{index if occurrence is None else occurrence}"
+
+
+class Activity:
+    """When a fault acts.
+
+    Parameters
+    ----------
+    spec : FaultSpec
+    rng : numpy.random.Generator
+        For random intervals.
+    """
+
+    def __init__(self, spec: FaultSpec, rng: np.random.Generator):
+        self._spec, self._rng = spec, rng
+        self._random = spec.mean_active is not None
+        intervals = spec.intervals or (() if self._random else ((spec.start, spec.end),))
+        self.starts = np.array([a for a, _ in intervals])
+        self.ends = np.array([b for _, b in intervals])
+
+    def _extend(self, until: float) -> None:
+        spec = self._spec
+        assert spec.mean_active is not None
+        assert spec.mean_gap is not None
+        end = float(self.ends[-1]) if len(self.ends) else spec.start
+        starts, ends = [], []
+        while end < min(until + 1.0, spec.end):
+            start = end + self._rng.exponential(spec.mean_gap)
+            end = min(start + self._rng.exponential(spec.mean_active), spec.end)
+            if start >= spec.end:
+                start = end = spec.end
+            starts.append(start)
+            ends.append(end)
+        self.starts, self.ends = np.append(self.starts, starts), np.append(self.ends, ends)
+
+    def locate(self, time: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+        """Which of the n times lie in an interval.
+
+        Parameters
+        ----------
+        time : (n,) array
+            Ascending [s].
+
+        Returns
+        -------
+        rows, interval : (m,) int array
+            The times that do, and the number of the interval of each; None for none.
+        """
+        if len(time) == 0:
+            return None
+        if self._random:
+            self._extend(float(time[-1]))
+        if len(self.starts) == 0 or time[-1] < self.starts[0] - TOLERANCE or time[0] >= self.ends[-1] - TOLERANCE:
+            return None
+        number = np.searchsorted(self.starts - TOLERANCE, time, side="right") - 1
+        rows = np.flatnonzero((number >= 0) & (time < (self.ends - TOLERANCE)[number]))
+        return (rows, number[rows]) if len(rows) else None
+
+
+class FaultLayer:
+    """A fault in one run, laid over the streams of its instruments block by block.
+
+    Parameters
+    ----------
+    spec : FaultSpec
+    index : int
+        First bit.
+    seed : int
+    key : str
+        Of its random streams.
+    """
+
+    def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
+        self._spec, self._index, self._seed, self._key = spec, index, seed, key
+        self.activity = Activity(spec, self._rng("intervals"))
+
+    def _rng(self, *names: str) -> np.random.Generator:
+        return random_stream(self._seed, "fault", self._key, *names)
+
+    def touches(self, stream: AidStream) -> bool:
+        """Whether the fault is one of this instrument's."""
+        return stream.name in self._spec.instruments or stream.kind in self._spec.instruments
+
+    def _bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
+        number = interval if self._spec.intervals else np.zeros_like(interval)
+        return np.left_shift(np.uint32(1), (self._index + number).astype(np.uint32))
+
+    def apply(self, stream: AidStream) -> AidStream:
+        """Lay the fault over the next block of a stream.
+
+        Parameters
+        ----------
+        stream : AidStream
+
+        Returns
+        -------
+        AidStream
+            The same one where the fault does nothing to it; the argument is never changed.
+        """
+        return stream
+
+    def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
+        """Lay the fault over the next block of IMU samples.
+
+        Parameters
+        ----------
+        samples : ImuSamples
+        labels : ImuLabels or None
+
+        Returns
+        -------
+        samples, labels
+            As given where the fault is none of the IMU's.
+        """
+        return samples, labels

@@ -1,0 +1,85 @@
+"""Fault of the IMU: a disturbance on specific force and angular rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from simnav.recording import ImuLabels
+from simnav.sensors.faults.fault import FaultLayer, FaultSpec, Names
+from simnav.sensors.instrument import ZERO, SigmaTriple, Triple
+from simnav.spec import SpecError, quantity
+from simnav.types import ImuSamples
+
+__all__ = ["ImuDisturbance"]
+
+
+class ImuDisturbance(FaultSpec):
+    """A constant and white noise on the IMU's output, by body axis; one number is for all three.
+
+    ``specific_force_noise`` and ``angular_rate_noise`` are the sigma of a sample.
+    """
+
+    kind: Literal["imu_disturbance"] = "imu_disturbance"
+    instruments: Names = ("imu",)
+    specific_force: Triple = quantity("m_s2", ZERO)
+    angular_rate: Triple = quantity("deg_s", ZERO)
+    specific_force_noise: SigmaTriple = quantity("m_s2", ZERO)
+    angular_rate_noise: SigmaTriple = quantity("deg_s", ZERO)
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if self.instruments != ("imu",):
+            raise ValueError("an imu_disturbance is on 'imu' and nothing else")
+        if not np.any([self.specific_force, self.angular_rate, self.specific_force_noise, self.angular_rate_noise]):
+            raise ValueError(
+                "an imu_disturbance needs specific_force_m_s2, angular_rate_deg_s, or one of their noises"
+                " (specific_force_noise_m_s2, angular_rate_noise_deg_s)"
+            )
+        return self
+
+    def touched(self, instruments: Mapping[str, str]) -> tuple[str, ...]:
+        """The IMU."""
+        return ("imu",)
+
+    def check(self, instruments: Mapping[str, str], *, imu: bool = True) -> None:
+        """See `FaultSpec.check`."""
+        if not imu:
+            raise SpecError(f"fault {self.kind!r}: the scenario has no IMU to disturb")
+
+    def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
+        """See `FaultSpec.build`."""
+        return _ImuDisturbance(self, index, seed, self._key_of_streams(index, occurrence))
+
+
+class _ImuDisturbance(FaultLayer):
+    def __init__(self, spec: ImuDisturbance, index: int, seed: int, key: str):
+        super().__init__(spec, index, seed, key)
+        self._constant = np.array(spec.angular_rate + spec.specific_force)
+        self._sigma = np.array(spec.angular_rate_noise + spec.specific_force_noise)
+        self._noise = self._rng("noise")
+
+    def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
+        n = len(samples)
+        if labels is None:
+            labels = ImuLabels(np.zeros(n, np.uint32), np.zeros((n, 6)))
+        found = self.activity.locate(samples.time)
+        if found is None:
+            return samples, labels
+        rows, interval = found
+        error = self._constant[None].repeat(len(rows), axis=0)
+        if self._sigma.any():
+            error += self._sigma * self._noise.standard_normal(error.shape)
+        angular_rate, specific_force = samples.angular_rate.copy(), samples.specific_force.copy()
+        angular_rate[rows] += error[:, :3]
+        specific_force[rows] += error[:, 3:]
+        faults, fault_error = labels.faults.copy(), labels.fault_error.copy()
+        faults[rows] |= self._bits(interval)
+        fault_error[rows] += error
+        return (
+            ImuSamples(samples.time, samples.interval, angular_rate, specific_force),
+            ImuLabels(faults, fault_error),
+        )

@@ -1,0 +1,106 @@
+"""Faults that take a measurement away or replace it: outage, frozen output, false zero."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.recording import AidStream
+from simnav.sensors.faults.fault import FaultLayer, FaultSpec
+from simnav.sensors.values import error_between
+from simnav.types import Array
+
+__all__ = ["FalseZero", "Frozen", "Outage"]
+
+
+class Outage(FaultSpec):
+    """Nothing is delivered; the times of what is missing go to ``AidStream.dropped``."""
+
+    kind: Literal["outage"] = "outage"
+
+    def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
+        """See `FaultSpec.build`."""
+        return _Outage(self, index, seed, self._key_of_streams(index, occurrence))
+
+
+class _Outage(FaultLayer):
+    def apply(self, stream: AidStream) -> AidStream:
+        found = self.activity.locate(stream.time) if self.touches(stream) else None
+        if found is None:
+            return stream
+        keep = np.ones(len(stream.time), dtype=bool)
+        keep[found[0]] = False
+        dropped = np.sort(np.concatenate([stream.dropped, stream.time[~keep]]), kind="stable")
+        kept = {n: getattr(stream, n)[keep] for n in ("time", "value", "faults", "fault_error", "sigma")}
+        return AidStream(stream.name, stream.kind, **kept, dropped=dropped)
+
+
+class _Replacing(FaultLayer):
+    """Puts other values in the place of the measurements within the intervals."""
+
+    def _replace(
+        self, stream: AidStream, rows: NDArray[np.intp], values: Array, interval: NDArray[np.intp]
+    ) -> AidStream:
+        value, faults, fault_error = stream.value.copy(), stream.faults.copy(), stream.fault_error.copy()
+        fault_error[rows] += error_between(stream.kind, values, value[rows])
+        value[rows] = values
+        faults[rows] |= self._bits(interval)
+        return replace(stream, value=value, faults=faults, fault_error=fault_error)
+
+
+class Frozen(FaultSpec):
+    """The instrument repeats the last value that it delivered before the interval (or else its first one within)."""
+
+    kind: Literal["frozen"] = "frozen"
+
+    def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
+        """See `FaultSpec.build`."""
+        return _Frozen(self, index, seed, self._key_of_streams(index, occurrence))
+
+
+class _Frozen(_Replacing):
+    def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
+        super().__init__(spec, index, seed, key)
+        self._last: dict[str, Array] = {}
+        self._held: dict[str, tuple[int, Array]] = {}
+
+    def apply(self, stream: AidStream) -> AidStream:
+        if not self.touches(stream) or len(stream) == 0:
+            return stream
+        name, found = stream.name, self.activity.locate(stream.time)
+        last = self._last.get(name)
+        self._last[name] = stream.value[-1].copy()
+        if found is None:
+            return stream
+        rows, interval = found
+        values = np.empty((len(rows), stream.value.shape[1]))
+        for number in np.unique(interval):
+            here = interval == number
+            if name not in self._held or self._held[name][0] != number:
+                first = int(rows[here][0])
+                before = stream.value[first - 1] if first > 0 else last
+                self._held[name] = int(number), (stream.value[first] if before is None else before).copy()
+            values[here] = self._held[name][1]
+        return self._replace(stream, rows, values, interval)
+
+
+class FalseZero(FaultSpec):
+    """The instrument says zero on all axes: a DVL that lost lock, or a receiver in the Gulf of Guinea."""
+
+    kind: Literal["false_zero"] = "false_zero"
+
+    def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
+        """See `FaultSpec.build`."""
+        return _FalseZero(self, index, seed, self._key_of_streams(index, occurrence))
+
+
+class _FalseZero(_Replacing):
+    def apply(self, stream: AidStream) -> AidStream:
+        found = self.activity.locate(stream.time) if self.touches(stream) else None
+        if found is None:
+            return stream
+        rows, interval = found
+        return self._replace(stream, rows, np.zeros((len(rows), stream.value.shape[1])), interval)

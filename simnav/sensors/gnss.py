@@ -1,0 +1,65 @@
+"""GNSS receiver in the position domain: position and velocity of the antenna."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from simnav import earth
+from simnav.rotation import dcm_from_rpy
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, rotate
+from simnav.spec import Vector, quantity
+from simnav.types import Array, TapStates
+
+__all__ = ["GnssPosition", "GnssVelocity"]
+
+
+class GnssPosition(AidSpec):
+    """Position of the antenna; errors by axis, north-east-down [m].
+
+    ``bias_instability`` with its ``correlation_time`` is what orbit, clock, ionosphere and mild multipath leave: the
+    slow part of the error of a single receiver.
+
+    Examples
+    --------
+    >>> gnss = GnssPosition.from_toml({"sigma_m": [2.1, 2.1, 4.0], "lever_arm_m": [0, 0, -8]})
+    >>> gnss.datasheet("gnss").sigma
+    array([2.1, 2.1, 4. ])
+    """
+
+    kind: Literal["gnss_position"] = "gnss_position"
+    sigma: SigmaTriple = quantity("m")
+    bias: SigmaTriple = quantity("m", ZERO)
+    bias_instability: SigmaTriple = quantity("m", ZERO)
+    lever_arm: Vector = quantity("m", ZERO)
+    fixed_bias: Triple = quantity("m", ZERO)
+
+    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+        """See `AidSpec.build`."""
+        return _Position(self, name, seed)
+
+
+class _Position(Instrument):
+    def observe(self, tap: TapStates) -> Array:
+        return earth.displace(tap.position, self.lever_displacement(tap)) if self._levered else tap.position
+
+
+class GnssVelocity(AidSpec):
+    """Velocity of the antenna over the ground, C (v + omega x l); errors by axis, north-east-down [m/s]."""
+
+    kind: Literal["gnss_velocity"] = "gnss_velocity"
+    sigma: SigmaTriple = quantity("m_s")
+    bias: SigmaTriple = quantity("m_s", ZERO)
+    bias_instability: SigmaTriple = quantity("m_s", ZERO)
+    lever_arm: Vector = quantity("m", ZERO)
+    fixed_bias: Triple = quantity("m_s", ZERO)
+
+    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+        """See `AidSpec.build`."""
+        return _Velocity(self, name, seed)
+
+
+class _Velocity(Instrument):
+    def observe(self, tap: TapStates) -> Array:
+        if not self._levered:
+            return tap.velocity
+        return tap.velocity + rotate(dcm_from_rpy(tap.attitude), self.lever_velocity(tap))

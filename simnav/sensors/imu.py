@@ -1,0 +1,248 @@
+"""Inertial measurement unit: three gyroscopes and three accelerometers with their errors.
+
+The model of a triad (Groves 2013, section 4.4), on means over the sample interval dt::
+
+    y = (I + S + M) x + b + g + r + w / sqrt(dt)
+
+S scale factors, M non-orthogonality (six small angles), b turn-on bias, g first-order Gauss-Markov bias (in-run
+instability), r rate random walk, w white noise (angle or velocity random walk). The output then saturates at the range,
+and its increment y dt is quantized with the residual carried over.
+
+Each process has its own random stream, and one that is zero draws nothing. g and r step on a grid of at most T/1000 (or
+1 s) and are held between (`HeldGaussMarkov`), since they change far more slowly than an IMU samples.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Self
+
+import numpy as np
+from pydantic import model_validator
+
+from simnav.compiled import kernel
+from simnav.sensors.processes import HeldGaussMarkov, quantize_scalar
+from simnav.spec import NonNegative, Positive, Spec, Vector, quantity
+from simnav.streams import stream
+from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
+
+__all__ = ["AccelerometerSpec", "GyroscopeSpec", "Imu", "ImuSpec", "TriadSpec"]
+
+_ZERO: Vector = (0.0, 0.0, 0.0)
+# Samples a chunk: the noise is used while it is in the cache.
+_CHUNK = 4096
+
+
+class TriadSpec(Spec):
+    """What gyroscopes and accelerometers have in common; all figures are one sigma, equal on the three axes.
+
+    ``fixed_bias`` and ``fixed_scale`` are realised values, by axis, that come on top of the drawn ones and that no
+    estimator is told.
+    """
+
+    bias: float
+    bias_instability: float
+    correlation_time: Positive = quantity("s", inf)
+    random_walk: float
+    rate_random_walk: float
+    scale: NonNegative = quantity("ppm", 0.0)
+    misalignment: NonNegative = quantity("deg", 0.0)
+    quantization: float
+    range: float
+    fixed_bias: Vector
+    fixed_scale: Vector = quantity("ppm", _ZERO)
+
+    @model_validator(mode="after")
+    def _correlated(self) -> Self:
+        if self.bias_instability > 0.0 and "correlation_time" not in self.model_fields_set:
+            raise ValueError("bias_instability needs a correlation_time_s (inf for a random walk)")
+        return self
+
+    def datasheet(self) -> TriadDatasheet:
+        """What an estimator is told."""
+        return TriadDatasheet(
+            self.bias,
+            self.bias_instability,
+            self.correlation_time,
+            self.random_walk,
+            self.rate_random_walk,
+            self.scale,
+            self.misalignment,
+            self.quantization,
+            self.range,
+        )
+
+
+class GyroscopeSpec(TriadSpec):
+    """Three gyroscopes; rad/s in memory. An infinite correlation time makes bias_instability deg/h per sqrt(s)."""
+
+    bias: NonNegative = quantity("deg_h", 0.0)
+    bias_instability: NonNegative = quantity("deg_h", 0.0)
+    random_walk: NonNegative = quantity("deg_sqrt_h", 0.0)
+    rate_random_walk: NonNegative = quantity("deg_h_sqrt_h", 0.0)
+    quantization: NonNegative = quantity("arcsec", 0.0)
+    range: Positive = quantity("deg_s", inf)
+    fixed_bias: Vector = quantity("deg_h", _ZERO)
+
+
+class AccelerometerSpec(TriadSpec):
+    """Three accelerometers; m/s^2 in memory. An infinite correlation time makes bias_instability ug per sqrt(s)."""
+
+    bias: NonNegative = quantity("ug", 0.0)
+    bias_instability: NonNegative = quantity("ug", 0.0)
+    random_walk: NonNegative = quantity("ug_sqrt_hz", 0.0)
+    rate_random_walk: NonNegative = quantity("ug_sqrt_s", 0.0)
+    quantization: NonNegative = quantity("m_s", 0.0)
+    range: Positive = quantity("g", inf)
+    fixed_bias: Vector = quantity("ug", _ZERO)
+
+
+class ImuSpec(Spec):
+    """An inertial measurement unit.
+
+    Examples
+    --------
+    >>> imu = ImuSpec.from_toml({"rate_hz": 100, "gyroscope": {"random_walk_deg_sqrt_h": 0.01}})
+    >>> round(imu.gyroscope.random_walk * 1e6, 3)
+    2.909
+    """
+
+    rate: Positive = quantity("hz")
+    gyroscope: GyroscopeSpec = GyroscopeSpec()
+    accelerometer: AccelerometerSpec = AccelerometerSpec()
+
+    def datasheet(self) -> ImuDatasheet:
+        """What an estimator is told."""
+        return ImuDatasheet(self.rate, self.gyroscope.datasheet(), self.accelerometer.datasheet())
+
+    def build(self, seed: int) -> Imu:
+        """The instrument of one run.
+
+        Parameters
+        ----------
+        seed : int
+            Of the run.
+        """
+        return Imu(self, seed)
+
+
+@kernel(
+    "void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, ::1], f8[::1],"
+    " f8[:, ::1], i8, f8, f8[:, ::1], i8, f8, f8, f8, f8[::1])"
+)
+def _triad_errors(  # type: ignore[no-untyped-def]
+    ideal, out, time, interval, density, matrix, bias,
+    instability, first_i, per_second_i, walk, first_w, per_second_w, limit, step, residual,
+):  # fmt: skip
+    """Errors of one triad; ``out`` holds unit variates and is overwritten by the output (see the module)."""
+    last_i = len(instability) - 1
+    last_w = len(walk) - 1
+    for i in range(len(time)):
+        dt = interval[i]
+        noise = density / sqrt(dt)
+        ki = min(max(int(time[i] * per_second_i + 1e-6) - first_i, 0), last_i)
+        kw = min(max(int(time[i] * per_second_w + 1e-6) - first_w, 0), last_w)
+        x, y, z = ideal[i, 0], ideal[i, 1], ideal[i, 2]
+        for j in range(3):
+            value = matrix[j, 0] * x + matrix[j, 1] * y + matrix[j, 2] * z
+            value += bias[j] + instability[ki, j] + walk[kw, j] + noise * out[i, j]
+            value = min(max(value, -limit), limit)
+            if step > 0.0:
+                increment, residual[j] = quantize_scalar(value * dt, step, residual[j])
+                value = increment / dt
+            out[i, j] = value
+
+
+class _Still:
+    """A bias process that is not there."""
+
+    per_second = 0.0
+    _table = np.zeros((1, 3))
+
+    def table(self, until: float) -> tuple[Array, int]:
+        return self._table, 0
+
+
+class _Triad:
+    """The realised errors of one triad."""
+
+    def __init__(self, spec: TriadSpec, name: str, rate: float, seed: int):
+        def normals(process: str, n: int) -> Array:
+            return stream(seed, "instrument", "imu", name, process).standard_normal(n)
+
+        def held(process: str, sigma: float, correlation_time: float) -> HeldGaussMarkov | _Still:
+            if sigma <= 0.0:
+                return _Still()
+            hold = min(1.0, max(correlation_time / 1000.0, 1.0 / rate))
+            rng = stream(seed, "instrument", "imu", name, process)
+            return HeldGaussMarkov(np.full(3, sigma), correlation_time, hold, rng)
+
+        self.matrix = np.eye(3) + np.diag(spec.scale * normals("scale", 3) + spec.fixed_scale)
+        self.matrix[~np.eye(3, dtype=bool)] = spec.misalignment * normals("misalignment", 6)
+        self.bias = spec.bias * normals("bias", 3) + spec.fixed_bias
+        self.instability = held("bias_instability", spec.bias_instability, spec.correlation_time)
+        self.walk = held("rate_random_walk", spec.rate_random_walk, inf)
+        self.density = spec.random_walk
+        self.range, self.step = spec.range, spec.quantization
+        self.residual = np.zeros(3)
+        self._rng = stream(seed, "instrument", "imu", name, "random_walk")
+
+    def sense(self, ideal: Array, time: Array, interval: Array) -> Array:
+        ideal = np.require(ideal, np.float64, ["C", "W"])
+        out = np.empty(ideal.shape)
+        until = float(time[-1])
+        instability, first_i = self.instability.table(until)
+        walk, first_w = self.walk.table(until)
+        for a in range(0, len(time), _CHUNK):
+            part = slice(a, a + _CHUNK)
+            if self.density > 0.0:
+                self._rng.standard_normal(out=out[part])
+            else:
+                out[part] = 0.0
+            _triad_errors(
+                ideal[part], out[part], time[part], interval[part], self.density, self.matrix, self.bias,
+                instability, first_i, self.instability.per_second, walk, first_w, self.walk.per_second,
+                self.range, self.step, self.residual,
+            )  # fmt: skip
+        return out
+
+
+class Imu:
+    """An IMU in one run: the errors are drawn, and go on from block to block.
+
+    Parameters
+    ----------
+    spec : ImuSpec
+    seed : int
+    """
+
+    def __init__(self, spec: ImuSpec, seed: int):
+        self.spec = spec
+        self._gyroscope = _Triad(spec.gyroscope, "gyroscope", spec.rate, seed)
+        self._accelerometer = _Triad(spec.accelerometer, "accelerometer", spec.rate, seed)
+
+    def sense(self, ideal: ImuSamples) -> ImuSamples:
+        """Add the errors to the ideal samples of the next block.
+
+        Parameters
+        ----------
+        ideal : ImuSamples
+            Means over each interval; left as they are.
+
+        Returns
+        -------
+        ImuSamples
+            On the same times.
+        """
+        if len(ideal) == 0:
+            return ideal
+        time, interval = (
+            np.require(ideal.time, np.float64, ["C", "W"]),
+            np.require(ideal.interval, np.float64, ["C", "W"]),
+        )
+        return ImuSamples(
+            ideal.time,
+            ideal.interval,
+            self._gyroscope.sense(ideal.angular_rate, time, interval),
+            self._accelerometer.sense(ideal.specific_force, time, interval),
+        )

@@ -1,0 +1,204 @@
+"""What all aiding instruments share: their specification, realised errors and labels.
+
+The model of a measurement is ::
+
+    value = observe(truth) + b + g + w
+
+with ``observe`` the instrument's geometry and deterministic errors, b a turn-on bias that is constant in a run, g a
+first-order Gauss-Markov bias and w white noise; the errors of a position are in metres. Turn-on values are drawn at the
+start of a run from the datasheet's one-sigma figures; ``fixed_*`` are realised values that come on top and that no
+estimator is told. Every process has its own random stream and draws at every sample, delivered or not.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from math import inf
+from typing import Annotated, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, model_validator
+
+from simnav.recording import AidStream
+from simnav.rotation import dcm_from_rpy
+from simnav.sensors.processes import GaussMarkov
+from simnav.sensors.values import add_error
+from simnav.spec import NonNegative, Positive, Spec, Vector, quantity
+from simnav.streams import stream
+from simnav.types import KINDS, Array, Datasheet, TapStates
+
+__all__ = ["ZERO", "AidSpec", "Instrument", "Pair", "SigmaPair", "SigmaTriple", "Triple", "rotate", "unrotate"]
+
+#: Default of a vector.
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+def _spread(n: int) -> BeforeValidator:
+    return BeforeValidator(lambda x: (x,) * n if isinstance(x, (int, float)) and not isinstance(x, bool) else x)
+
+
+#: Two or three numbers by axis; TOML may give one for all axes. One-sigma figures are not negative.
+Pair = Annotated[tuple[float, float], _spread(2)]
+Triple = Annotated[Vector, _spread(3)]
+SigmaPair = Annotated[tuple[NonNegative, NonNegative], _spread(2)]
+SigmaTriple = Annotated[tuple[NonNegative, NonNegative, NonNegative], _spread(3)]
+
+
+def rotate(dcm: Array, vector: Array) -> Array:
+    """C v for stacks: (n, 3, 3) and (n, 3) or (3,) arrays to (n, 3).
+
+    Written out, since a matrix product may round differently with the number of rows.
+    """
+    v = vector[..., None, :]
+    return dcm[..., 0] * v[..., 0] + dcm[..., 1] * v[..., 1] + dcm[..., 2] * v[..., 2]
+
+
+def unrotate(dcm: Array, vector: Array) -> Array:
+    """C' v for stacks: (n, 3, 3) and (n, 3) arrays to (n, 3)."""
+    v = vector[..., :, None]
+    return dcm[..., 0, :] * v[..., 0, :] + dcm[..., 1, :] * v[..., 1, :] + dcm[..., 2, :] * v[..., 2, :]
+
+
+class AidSpec(Spec):
+    """Base of the specifications of aiding instruments.
+
+    Subclasses declare ``sigma`` and, as far as they apply, ``bias``, ``bias_instability``, ``scale``,
+    ``misalignment``, ``lever_arm`` and their ``fixed_`` forms, each with its unit.
+    """
+
+    kind: str
+    rate: Positive = quantity("hz", 1.0)
+    phase: NonNegative = quantity("s", 0.0)
+    correlation_time: Positive = quantity("s", inf)
+
+    @model_validator(mode="after")
+    def _correlated(self) -> Self:
+        if np.any(np.asarray(self.figure("bias_instability"))) and "correlation_time" not in self.model_fields_set:
+            raise ValueError("bias_instability needs a correlation_time_s (inf for a random walk)")
+        return self
+
+    def figure(self, name: str) -> Any:
+        """A figure of this instrument, or 0 where its kind has no such error."""
+        return getattr(self, name, 0.0)
+
+    def datasheet(self, name: str) -> Datasheet:
+        """What an estimator is told.
+
+        Parameters
+        ----------
+        name : str
+            Of the instrument in its scenario.
+        """
+        return Datasheet(
+            name,
+            self.kind,
+            self.rate,
+            np.asarray(self.figure("sigma"), dtype=np.float64),
+            self.phase,
+            np.asarray(self.figure("bias"), dtype=np.float64),
+            np.asarray(self.figure("bias_instability"), dtype=np.float64),
+            self.correlation_time,
+            float(self.figure("scale")),
+            np.broadcast_to(np.asarray(self.figure("misalignment"), dtype=np.float64), (3,)).copy(),
+            np.broadcast_to(np.asarray(self.figure("lever_arm"), dtype=np.float64), (3,)).copy(),
+        )
+
+    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+        """The instrument of one run.
+
+        Parameters
+        ----------
+        name : str
+            Of the instrument in its scenario; it names the random streams.
+        seed : int
+            Of the run.
+        water_depth : float, optional
+            Below the mean sea surface [m], for instruments that need the bottom.
+        """
+        raise NotImplementedError
+
+
+class Instrument(ABC):
+    """An aiding instrument in one run: its errors are drawn, and go on from block to block.
+
+    Parameters
+    ----------
+    spec : AidSpec
+    name : str
+    seed : int
+    """
+
+    def __init__(self, spec: AidSpec, name: str, seed: int):
+        self.name, self.kind = name, spec.kind
+        self._seed = seed
+        sheet = spec.datasheet(name)
+        self.sigma = sheet.sigma
+        self.lever_arm = sheet.lever_arm
+        d = len(KINDS[self.kind].errors)
+        self.bias = sheet.bias * self._normals("bias", d) + spec.figure("fixed_bias")
+        self.scale = float(sheet.scale * self._normals("scale", 1)[0] + spec.figure("fixed_scale"))
+        self._noise = stream(seed, "instrument", name, "noise") if self.sigma.any() else None
+        self._instability = None
+        if sheet.bias_instability.any():
+            rng = stream(seed, "instrument", name, "bias_instability")
+            self._instability = GaussMarkov(sheet.bias_instability, sheet.correlation_time, rng)
+        self._levered = bool(self.lever_arm.any())
+
+    def _normals(self, process: str, n: int) -> Array:
+        return stream(self._seed, "instrument", self.name, process).standard_normal(n)
+
+    @abstractmethod
+    def observe(self, tap: TapStates) -> Array:
+        """The (n, d) values before bias and noise."""
+
+    def noise_sigma(self, observed: Array) -> Array:
+        """The (n, d) standard deviation of the white noise of each measurement."""
+        return self.sigma[None].repeat(len(observed), axis=0)
+
+    def available(self, tap: TapStates) -> NDArray[np.bool_] | None:
+        """Which of the n samples are delivered; None for all."""
+        return None
+
+    def lever_displacement(self, tap: TapStates) -> Array:
+        """The (n, 3) north-east-down offset [m] of the instrument from the reference point."""
+        return rotate(dcm_from_rpy(tap.attitude), self.lever_arm)
+
+    def lever_velocity(self, tap: TapStates) -> Array:
+        """The (n, 3) velocity [m/s] of the instrument relative to the reference point, body axes: omega x l."""
+        w, (x, y, z) = tap.angular_rate, self.lever_arm
+        velocity = np.empty((len(w), 3))
+        velocity[:, 0] = w[:, 1] * z - w[:, 2] * y
+        velocity[:, 1] = w[:, 2] * x - w[:, 0] * z
+        velocity[:, 2] = w[:, 0] * y - w[:, 1] * x
+        return velocity
+
+    def sense(self, tap: TapStates) -> AidStream:
+        """Measure the states of the next block.
+
+        Parameters
+        ----------
+        tap : TapStates
+            True states at the instrument's sample times.
+
+        Returns
+        -------
+        AidStream
+            Without faults; ``dropped`` holds the times at which the instrument delivers nothing.
+        """
+        value = self.observe(tap)
+        sigma = self.noise_sigma(value)
+        error = self.bias[None].repeat(len(value), axis=0)
+        if self._instability is not None:
+            error += self._instability.sample(tap.time)
+        if self._noise is not None:
+            error += sigma * self._noise.standard_normal(value.shape)
+        value = add_error(self.kind, value, error)
+        time, dropped = tap.time, np.empty(0)
+        there = self.available(tap)
+        if there is not None and not there.all():
+            time, dropped, value, sigma = time[there], time[~there], value[there], sigma[there]
+        n = len(value)
+        return AidStream(
+            self.name, self.kind, time, value, np.zeros(n, np.uint32), np.zeros(value.shape), sigma, dropped
+        )

@@ -1,0 +1,246 @@
+"""The error processes that instruments share: white noise, Gauss-Markov, random walk, quantization.
+
+Every process is a state machine: it is handed the times of successive blocks and gives the same numbers, bit for bit,
+wherever the blocks are cut. Times may be irregular. Each owns its generator (`simnav.streams.stream`) and draws a fixed
+number of variates per sample.
+
+Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., Artech
+House 2013, sections 4.4 and 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, MIT Press 1974, section 3.6.
+"""
+
+from __future__ import annotations
+
+from math import exp, expm1, floor, isinf, sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.types import Array
+
+__all__ = ["GaussMarkov", "HeldGaussMarkov", "Quantizer", "RandomWalk", "WhiteNoise"]
+
+_NO_TIMES = np.empty(0)
+
+
+@kernel()
+def quantize_scalar(increment, step, residual):  # type: ignore[no-untyped-def]
+    """Nearest multiple of ``step`` to increment + residual, and what is left for the next sample."""
+    total = increment + residual
+    output = step * floor(total / step + 0.5)
+    return output, total - output
+
+
+@kernel("b1(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8, f8)")
+def _gauss_markov(variates, state, sigma, time, previous, correlation_time):  # type: ignore[no-untyped-def]
+    """Turn unit variates (n, d) into the process, in place; false where time runs backwards.
+
+    x_k = a x_{k-1} + b sigma w_k, a = exp(-dt/T), b = sqrt(1 - a^2); for infinite T: a = 1, b = sqrt(dt).
+    """
+    step = -1.0
+    a = 1.0
+    b = 0.0
+    for i in range(len(time)):
+        dt = time[i] - previous
+        previous = time[i]
+        if not dt >= 0.0:
+            return False
+        if dt != step:
+            step = dt
+            if isinf(correlation_time):
+                a = 1.0
+                b = sqrt(dt)
+            else:
+                a = exp(-dt / correlation_time)
+                b = sqrt(-expm1(-2.0 * dt / correlation_time))
+        for j in range(len(state)):
+            state[j] = a * state[j] + b * sigma[j] * variates[i, j]
+            variates[i, j] = state[j]
+    return True
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8)")
+def _quantize(increments, residual, step):  # type: ignore[no-untyped-def]
+    for i in range(increments.shape[0]):
+        for j in range(increments.shape[1]):
+            increments[i, j], residual[j] = quantize_scalar(increments[i, j], step, residual[j])
+
+
+def _vector(value: Array | float, size: int | None = None) -> Array:
+    vector = np.array(value, dtype=np.float64, ndmin=1)
+    return vector if size is None else np.broadcast_to(vector, (size,)).copy()
+
+
+class WhiteNoise:
+    """Independent normal variates.
+
+    Parameters
+    ----------
+    sigma : (d,) array
+    rng : numpy.random.Generator
+    """
+
+    def __init__(self, sigma: Array | float, rng: np.random.Generator):
+        self.sigma = _vector(sigma)
+        self._rng = rng
+
+    def sample(self, n: int) -> Array:
+        """The next n samples.
+
+        Returns
+        -------
+        (n, d) array
+        """
+        return self._rng.standard_normal((n, len(self.sigma))) * self.sigma
+
+
+class GaussMarkov:
+    """First-order Gauss-Markov process; with an infinite correlation time, a random walk.
+
+    It exists from time 0, where it is drawn from its stationary distribution (a random walk starts at zero).
+    Its autocovariance is sigma^2 exp(-|dt| / T).
+
+    Parameters
+    ----------
+    sigma : (d,) array
+        Stationary sigma [x]; of a random walk, x per sqrt(s).
+    correlation_time : float
+        T [s].
+    rng : numpy.random.Generator
+    """
+
+    def __init__(self, sigma: Array | float, correlation_time: float, rng: np.random.Generator):
+        if not correlation_time > 0.0:
+            raise ValueError(f"a correlation time is positive, not {correlation_time} s")
+        self.sigma = _vector(sigma)
+        self.correlation_time = float(correlation_time)
+        self._rng = rng
+        self._time = 0.0
+        start = 0.0 if np.isinf(correlation_time) else rng.standard_normal(len(self.sigma))
+        self.state = self.sigma * start
+        self._started = False
+
+    def sample(self, time: Array) -> Array:
+        """The process at the times of the next block.
+
+        Parameters
+        ----------
+        time : (n,) array
+            [s], not before the last time of the block before; the first may be negative (no step is taken to it).
+
+        Returns
+        -------
+        (n, d) array
+
+        Raises
+        ------
+        ValueError
+            If a time lies before the one before it.
+        """
+        n = len(time)
+        x = self._rng.standard_normal((n, len(self.sigma)))
+        if n:
+            t = np.require(time, np.float64, ["C", "W"])
+            if not self._started:
+                self._time = min(0.0, float(t[0]))
+                self._started = True
+            if not _gauss_markov(x, self.state, self.sigma, t, self._time, self.correlation_time):
+                raise ValueError("the times of an error process run backwards; sort the measurements by time")
+            self._time = float(t[-1])
+        return x
+
+
+class RandomWalk(GaussMarkov):
+    """Random walk that starts at zero at time 0.
+
+    Parameters
+    ----------
+    density : (d,) array
+        [x per sqrt(s)].
+    rng : numpy.random.Generator
+    """
+
+    def __init__(self, density: Array | float, rng: np.random.Generator):
+        super().__init__(density, np.inf, rng)
+
+
+class HeldGaussMarkov:
+    """Gauss-Markov process that steps on the grid 0, h, 2h, ... and holds its value between.
+
+    For a bias that changes slowly against the sample rate. Each value has the stationary variance, the
+    autocovariance at multiples of h is exact, and the power density at low frequencies, which is what a navigator
+    integrates, is that of the continuous process but for a factor 1 + (h/T)^2 / 12: 1e-7 for h = T/1000.
+
+    Parameters
+    ----------
+    sigma : (d,) array
+    correlation_time : float
+        T [s], as in `GaussMarkov`.
+    hold : float
+        h [s].
+    rng : numpy.random.Generator
+    """
+
+    def __init__(self, sigma: Array | float, correlation_time: float, hold: float, rng: np.random.Generator):
+        self._process = GaussMarkov(sigma, correlation_time, rng)
+        self.per_second = 1.0 / hold
+        self._hold = hold
+        self._next = 1
+        self._last = self._process.state[None].copy()
+
+    def table(self, until: float) -> tuple[Array, int]:
+        """The values of the grid points up to a time, from the last of the call before on.
+
+        Parameters
+        ----------
+        until : float
+            Last time of the block [s].
+
+        Returns
+        -------
+        values : (m, d) array
+        first : int
+            Number of the first grid point; the value at time t is that of number floor(t / h + 1e-6), the millionth
+            being for times that are multiples of h up to rounding.
+        """
+        first = self._next - 1
+        end = int(until * self.per_second + 1e-6) + 1
+        if end <= self._next:
+            return self._last, first
+        grid = np.arange(self._next, end, dtype=np.float64) * self._hold
+        values = np.concatenate([self._last, self._process.sample(grid)])
+        self._next, self._last = end, values[-1:].copy()
+        return values, first
+
+
+class Quantizer:
+    """Increment quantizer whose residual is carried over, as in an IMU that counts pulses.
+
+    The sum of its outputs never differs from the sum of its inputs by more than half a step.
+
+    Parameters
+    ----------
+    step : float
+        [x]; 0 for none.
+    size : int
+        Number of components d.
+    """
+
+    def __init__(self, step: float, size: int):
+        self.step = float(step)
+        self.residual = np.zeros(size)
+
+    def quantize(self, increments: Array) -> Array:
+        """Quantize the increments of the next block.
+
+        Parameters
+        ----------
+        increments : (n, d) array
+
+        Returns
+        -------
+        (n, d) array
+        """
+        output = np.array(increments, dtype=np.float64, order="C")
+        if self.step > 0.0:
+            _quantize(output, self.residual, self.step)
+        return output

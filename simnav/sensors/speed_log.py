@@ -1,0 +1,37 @@
+"""Speed log: forward speed through the water."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from simnav.rotation import dcm_from_rpy
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, unrotate
+from simnav.spec import NonNegative, Vector, quantity
+from simnav.types import Array, TapStates
+
+__all__ = ["SpeedLog"]
+
+
+class SpeedLog(AidSpec):
+    """Forward component of the sensor's velocity through the water, (1 + k) (C' (v - current) + omega x l)_forward."""
+
+    kind: Literal["speed_log"] = "speed_log"
+    sigma: NonNegative = quantity("m_s")
+    bias: NonNegative = quantity("m_s", 0.0)
+    bias_instability: NonNegative = quantity("m_s", 0.0)
+    scale: NonNegative = quantity("percent", 0.0)
+    lever_arm: Vector = quantity("m", ZERO)
+    fixed_bias: float = quantity("m_s", 0.0)
+    fixed_scale: float = quantity("percent", 0.0)
+
+    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+        """See `AidSpec.build`."""
+        return _SpeedLog(self, name, seed)
+
+
+class _SpeedLog(Instrument):
+    def observe(self, tap: TapStates) -> Array:
+        velocity = unrotate(dcm_from_rpy(tap.attitude), tap.velocity - tap.water_velocity)
+        if self._levered:
+            velocity += self.lever_velocity(tap)
+        return (1.0 + self.scale) * velocity[:, :1]
