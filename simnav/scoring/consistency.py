@@ -1,0 +1,192 @@
+"""Consistency: does the covariance that an estimator states agree with the errors that it makes?
+
+The normalised estimation error squared (NEES) of d components, e^T P^-1 e, is chi-square with d degrees of freedom for
+a consistent Gaussian estimator (Bar-Shalom, Li and Kirubarajan, *Estimation with Applications to Tracking and
+Navigation*, Wiley 2001, section 5.4). Scores here are divided by d: 1 is ideal, above it the estimator is optimistic
+(its covariance too small), below it pessimistic.
+
+Errors are correlated over the epochs of a run, so that the epochs are no independent samples; runs are. Bands are
+therefore those of the mean over M runs, chi-square with M d degrees of freedom: exact at one epoch, and wider than
+needed for a mean over time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.trial import Trial
+from simnav.types import Array
+
+__all__ = [
+    "GROUPS",
+    "LARGEST",
+    "MARGIN",
+    "Badge",
+    "badge",
+    "consistency",
+    "coverage",
+    "nees",
+    "nees_band",
+]
+
+#: The components of each group that gets a NEES.
+GROUPS: dict[str, tuple[int, ...]] = {
+    "horizontal": (0, 1),
+    "position": (0, 1, 2),
+    "velocity": (3, 4, 5),
+    "attitude": (6, 7, 8),
+}
+
+#: Mean NEES [-] that stands for a covariance without an inverse, so that scores stay finite.
+LARGEST = 1e12
+
+#: A mean NEES within this factor of 1 is consistent whatever the number of runs (sigmas right within 22 %).
+MARGIN = 1.5
+
+Badge = Literal["optimistic", "consistent", "pessimistic", "unknown"]
+
+
+def nees(error: Array, covariance: Array, components: tuple[int, ...]) -> tuple[Array, NDArray[np.int64]]:
+    """Normalised estimation error squared of a group of components, epoch by epoch.
+
+    Parameters
+    ----------
+    error : (T, 9) array
+        NaN components are left out of the epoch's NEES.
+    covariance : (T, 9, 9) array
+    components : tuple of int
+        For example one of `GROUPS`.
+
+    Returns
+    -------
+    nees : (T,) array
+        e^T P^-1 e; infinite where P is singular, NaN where no component is known.
+    degrees : (T,) int array
+        Number of components in it.
+    """
+    index = np.asarray(components)
+    e = error[:, index]
+    p = covariance[:, index[:, None], index]
+    known = np.isfinite(e) & np.isfinite(np.diagonal(p, axis1=1, axis2=2))
+    e = np.where(known, e, 0.0)
+    p = np.where(known[:, :, None] & known[:, None, :], p, np.eye(len(index)))
+    # In units of its own sigmas, so that a small variance is not taken for a singular matrix.
+    sigma = np.sqrt(np.diagonal(p, axis1=1, axis2=2))
+    flat = (sigma <= 0.0).any(axis=1)
+    sigma = np.where(sigma > 0.0, sigma, 1.0)
+    correlation = p / sigma[:, :, None] / sigma[:, None, :]
+    values, vectors = np.linalg.eigh(0.5 * (correlation + correlation.swapaxes(1, 2)))
+    flat |= values[:, 0] <= 1e-12
+    principal = np.einsum("tij,ti->tj", vectors, e / sigma)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        result = np.sum(principal**2 / values, axis=1)
+    result = np.where(flat, np.inf, result)
+    degrees = known.sum(axis=1)
+    return np.where(degrees > 0, result, np.nan), degrees.astype(np.int64)
+
+
+def nees_band(degrees: int, runs: int, level: float = 0.95) -> tuple[float, float]:
+    """Two-sided chi-square band of the mean of ``runs`` independent NEES, divided by the degrees of freedom.
+
+    Parameters
+    ----------
+    degrees : int
+        Of one NEES.
+    runs : int
+    level : float
+        Probability that a consistent estimator falls inside.
+
+    Returns
+    -------
+    low, high : float
+        Around 1.
+
+    Examples
+    --------
+    The example of Bar-Shalom et al. 2001, section 5.4.2: 50 runs, 2 components.
+
+    >>> low, high = nees_band(2, 50)
+    >>> round(2 * low, 2), round(2 * high, 2)
+    (1.48, 2.59)
+    """
+    from scipy.stats import chi2
+
+    n = degrees * runs
+    low, high = chi2.ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], n) / n
+    return float(low), float(high)
+
+
+def coverage(nees_horizontal: Array, level: float) -> float:
+    """Fraction of epochs at which the truth lies in the horizontal error ellipse of a probability.
+
+    Parameters
+    ----------
+    nees_horizontal : (T,) array
+        With two degrees of freedom; NaN is left out.
+    level : float
+        Probability content of the ellipse: its NEES is below -2 ln(1 - level).
+    """
+    x = nees_horizontal[~np.isnan(nees_horizontal)]
+    return float(np.mean(x <= -2.0 * math.log1p(-level))) if len(x) else float("nan")
+
+
+def consistency(trial: Trial, error: Array) -> dict[str, float]:
+    """Consistency scores of a run; NaN without a covariance.
+
+    Parameters
+    ----------
+    trial : Trial
+    error : (T, 9) array
+        From `simnav.scoring.errors`.
+
+    Returns
+    -------
+    dict
+        ``nees_<group>``: mean over the epochs, divided by the degrees of freedom (1 is ideal, at
+        most `LARGEST`); ``coverage_50``, ``coverage_95``.
+    """
+    nothing = float("nan")
+    scores = {f"nees_{group}": nothing for group in GROUPS} | {"coverage_50": nothing, "coverage_95": nothing}
+    if trial.covariance is None:
+        return scores
+    for group, components in GROUPS.items():
+        values, degrees = nees(error, trial.covariance, components)
+        known = degrees > 0
+        if known.any():
+            scores[f"nees_{group}"] = min(float(values[known].sum() / degrees[known].sum()), LARGEST)
+        if group == "horizontal":
+            flat = np.where(degrees == 2, values, np.nan)
+            scores["coverage_50"], scores["coverage_95"] = coverage(flat, 0.5), coverage(flat, 0.95)
+    return scores
+
+
+def badge(nees_by_run: Array, degrees: int = 2) -> Badge:
+    """Verdict on an estimator's covariance over several runs.
+
+    Parameters
+    ----------
+    nees_by_run : (M,) array
+        Mean NEES of each run divided by its degrees of freedom, as `consistency` gives it; NaN is left out.
+    degrees : int
+        Of the group: 2 for the horizontal position.
+
+    Returns
+    -------
+    str
+        ``consistent`` if the mean over the runs lies within the 95 % chi-square band of M independent samples or within
+        a factor of `MARGIN` of 1; otherwise ``optimistic`` (above) or ``pessimistic`` (below). ``unknown`` without a
+        covariance.
+    """
+    x = np.asarray(nees_by_run, dtype=np.float64)
+    x = x[~np.isnan(x)]
+    if len(x) == 0:
+        return "unknown"
+    low, high = nees_band(degrees, len(x))
+    mean = float(np.mean(x))
+    if mean > max(high, MARGIN):
+        return "optimistic"
+    return "pessimistic" if mean < min(low, 1.0 / MARGIN) else "consistent"

@@ -1,0 +1,109 @@
+"""Navigation errors: estimate minus truth, resolved in the local north-east-down frame of the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.earth import relative_position
+from simnav.recording import Recording
+from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.trial import Trial
+from simnav.types import Array, NavigationStates
+
+__all__ = ["attitude_error", "errors", "horizontal", "smoothed_errors", "state_errors"]
+
+
+def errors(trial: Trial, recording: Recording) -> Array:
+    """Errors of a trial at its epochs.
+
+    Parameters
+    ----------
+    trial : Trial
+    recording : Recording
+        The one that the trial was run on.
+
+    Returns
+    -------
+    (T, 9) array
+        In the order of `simnav.types.COMPONENTS` [m, m/s, rad]; NaN where a component was not estimated or the
+        truth (a real log's reference) does not hold it.
+
+    Raises
+    ------
+    ValueError
+        If the trial's times are not those of the recording.
+    """
+    truth = recording.data.truth[: len(trial)]
+    if len(truth) != len(trial) or not np.allclose(truth.time, trial.time, rtol=0.0, atol=1e-6):
+        raise ValueError(f"the trial of {trial.estimator} was not run on this recording of {recording.scenario}")
+    states = NavigationStates(trial.time, trial.position, trial.velocity, trial.attitude)
+    return state_errors(states, truth, trial.estimated)
+
+
+def smoothed_errors(trial: Trial, recording: Recording) -> Array | None:
+    """Errors of the smoothed trajectory, like `errors`, or None where the estimator does not smooth."""
+    if trial.smoothed is None:
+        return None
+    given = np.broadcast_to(trial.estimated.any(axis=0), trial.estimated.shape)
+    return state_errors(trial.smoothed, recording.data.truth[: len(trial)], given)
+
+
+def state_errors(states: NavigationStates, truth: NavigationStates, estimated: NDArray[np.bool_]) -> Array:
+    """Errors of n states.
+
+    Parameters
+    ----------
+    states, truth : NavigationStates
+        At the same n times.
+    estimated : (n, 9) bool array
+        The components that ``states`` holds.
+
+    Returns
+    -------
+    (n, 9) array
+        North, east, down with the WGS-84 radii at the truth [m]; velocity [m/s]; attitude as in `attitude_error`.
+    """
+    origin = truth.position.copy()
+    origin[:, 2] = np.where(np.isfinite(origin[:, 2]), origin[:, 2], 0.0)  # a reference without height
+    position = relative_position(states.position, origin)
+    position[:, 2] = truth.position[:, 2] - states.position[:, 2]
+    velocity = states.velocity - truth.velocity
+    attitude = attitude_error(states.attitude, truth.attitude, estimated[:, 6:])
+    error = np.concatenate([position, velocity, attitude], axis=1)
+    return np.where(estimated & np.isfinite(error), error, np.nan)
+
+
+def attitude_error(attitude: Array, truth: Array, estimated: NDArray[np.bool_] | None = None) -> Array:
+    """Rotation vector of C_est C_true^T, in north-east-down axes, exact up to pi.
+
+    Parameters
+    ----------
+    attitude, truth : (n, 3) array
+        Roll, pitch, yaw [rad].
+    estimated : (n, 3) bool array, optional
+        Components (north, east, down) that are estimated; all by default.
+
+    Returns
+    -------
+    (n, 3) array
+        [rad]. Where only the heading is estimated or known, roll and pitch are taken as equal, which leaves the
+        difference of the headings; where only roll and pitch are, the headings are taken as equal.
+    """
+    attitude, truth = np.asarray(attitude, dtype=np.float64), np.asarray(truth, dtype=np.float64)
+    if estimated is None:
+        estimated = np.ones(attitude.shape, dtype=bool)
+    known = np.isfinite(attitude) & np.isfinite(truth)
+    level = estimated[:, :2].any(axis=1) & known[:, :2].all(axis=1)
+    heading = estimated[:, 2] & known[:, 2]
+    both = np.stack([level, level, heading], axis=1)
+    common = np.where(np.isfinite(truth), truth, 0.0)
+    vector = rotation_vector_from_dcm(
+        dcm_from_rpy(np.where(both, attitude, common)) @ dcm_from_rpy(common).swapaxes(-1, -2)
+    )
+    return np.where(both & estimated, vector, np.nan)
+
+
+def horizontal(error: Array) -> Array:
+    """Length of the horizontal position error [m]: (n, 9) -> (n,)."""
+    return np.hypot(error[:, 0], error[:, 1])
