@@ -14,7 +14,7 @@ from pydantic import Field
 from simnav.sensors.compass import Gyrocompass, MagneticCompass
 from simnav.sensors.depth import Depth
 from simnav.sensors.dvl import Dvl
-from simnav.sensors.faults import FaultLayer, FaultSpec, build_layers, check_faults, label_faults
+from simnav.sensors.faults import FaultLayer, FaultSpec, build_layers, check_faults, labels
 from simnav.sensors.gnss import GnssPosition, GnssVelocity
 from simnav.sensors.imu import Imu, ImuSpec
 from simnav.sensors.instrument import AidSpec, Instrument
@@ -39,7 +39,7 @@ __all__ = [
     "TerrainFix",
     "build_layers",
     "check_faults",
-    "label_faults",
+    "labels",
 ]
 
 #: Any aiding instrument; ``kind`` tells which.

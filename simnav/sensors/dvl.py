@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, rotate, unrotate
+from simnav.rotation import dcm_from_rotation_vector
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, turn_to_body
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import Array, TapStates
 
@@ -51,16 +51,18 @@ class _Dvl(Instrument):
         super().__init__(spec, name, seed)
         turn = np.asarray(spec.misalignment) * self._normals("misalignment", 3) + spec.fixed_misalignment
         self.misalignment = turn
-        self._matrix = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
+        self._matrix: Array = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
         self._speed_noise = spec.speed_noise
         self._water_depth = water_depth
         self._altitudes = spec.minimum_altitude, spec.maximum_altitude
 
     def observe(self, tap: TapStates) -> Array:
-        velocity = unrotate(dcm_from_rpy(tap.attitude), tap.velocity)
+        velocity = turn_to_body(tap.attitude, tap.velocity)
         if self._levered:
             velocity += self.lever_velocity(tap)
-        return rotate(self._matrix, velocity)
+        (x, y, z), m = velocity.T, self._matrix
+        # Written out: a matrix product may round differently with the number of rows.
+        return np.outer(x, m[:, 0]) + np.outer(y, m[:, 1]) + np.outer(z, m[:, 2])
 
     def noise_sigma(self, observed: Array) -> Array:
         if self._speed_noise == 0.0:

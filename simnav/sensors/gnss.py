@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from simnav import earth
-from simnav.rotation import dcm_from_rpy
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, rotate
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, turn_to_ned
 from simnav.spec import Vector, quantity
 from simnav.types import Array, TapStates
 
@@ -62,4 +61,4 @@ class _Velocity(Instrument):
     def observe(self, tap: TapStates) -> Array:
         if not self._levered:
             return tap.velocity
-        return tap.velocity + rotate(dcm_from_rpy(tap.attitude), self.lever_velocity(tap))
+        return tap.velocity + turn_to_ned(tap.attitude, self.lever_velocity(tap))

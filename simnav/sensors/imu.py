@@ -15,7 +15,7 @@ Each process has its own random stream, and one that is zero draws nothing. g an
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -107,6 +107,7 @@ class ImuSpec(Spec):
     2.909
     """
 
+    kind: Literal["imu"] = "imu"
     rate: Positive = quantity("hz")
     gyroscope: GyroscopeSpec = GyroscopeSpec()
     accelerometer: AccelerometerSpec = AccelerometerSpec()

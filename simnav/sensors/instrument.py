@@ -21,14 +21,13 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, model_validator
 
 from simnav.recording import AidStream
-from simnav.rotation import dcm_from_rpy
 from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.values import add_error
 from simnav.spec import NonNegative, Positive, Spec, Vector, quantity
 from simnav.streams import stream
 from simnav.types import KINDS, Array, Datasheet, TapStates
 
-__all__ = ["ZERO", "AidSpec", "Instrument", "Pair", "SigmaPair", "SigmaTriple", "Triple", "rotate", "unrotate"]
+__all__ = ["ZERO", "AidSpec", "Instrument", "Pair", "SigmaPair", "SigmaTriple", "Triple", "turn_to_body", "turn_to_ned"]
 
 #: Default of a vector.
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -45,19 +44,40 @@ SigmaPair = Annotated[tuple[NonNegative, NonNegative], _spread(2)]
 SigmaTriple = Annotated[tuple[NonNegative, NonNegative, NonNegative], _spread(3)]
 
 
-def rotate(dcm: Array, vector: Array) -> Array:
-    """C v for stacks: (n, 3, 3) and (n, 3) or (3,) arrays to (n, 3).
+def turn_to_ned(attitude: Array, vector: Array) -> Array:
+    """C v, body axes to north-east-down, for n attitudes.
 
-    Written out, since a matrix product may round differently with the number of rows.
+    Three turns about one axis each: cheaper than a matrix for one vector, and each row by itself, where a matrix
+    product may round differently with the number of rows.
+
+    Parameters
+    ----------
+    attitude : (n, 3) array
+        Roll, pitch, yaw [rad].
+    vector : (n, 3) or (3,) array
+
+    Returns
+    -------
+    (n, 3) array
     """
-    v = vector[..., None, :]
-    return dcm[..., 0] * v[..., 0] + dcm[..., 1] * v[..., 1] + dcm[..., 2] * v[..., 2]
+    (sr, sp, sy), (cr, cp, cy) = np.sin(attitude).T, np.cos(attitude).T
+    x, y, z = vector.T
+    y, z = cr * y - sr * z, sr * y + cr * z
+    x, z = cp * x + sp * z, cp * z - sp * x
+    out = np.empty(attitude.shape)
+    out[:, 0], out[:, 1], out[:, 2] = cy * x - sy * y, sy * x + cy * y, z
+    return out
 
 
-def unrotate(dcm: Array, vector: Array) -> Array:
-    """C' v for stacks: (n, 3, 3) and (n, 3) arrays to (n, 3)."""
-    v = vector[..., :, None]
-    return dcm[..., 0, :] * v[..., 0, :] + dcm[..., 1, :] * v[..., 1, :] + dcm[..., 2, :] * v[..., 2, :]
+def turn_to_body(attitude: Array, vector: Array) -> Array:
+    """C' v, north-east-down to body axes: the inverse of `turn_to_ned`."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(attitude).T, np.cos(attitude).T
+    x, y, z = vector.T
+    x, y = cy * x + sy * y, cy * y - sy * x
+    x, z = cp * x - sp * z, sp * x + cp * z
+    out = np.empty(attitude.shape)
+    out[:, 0], out[:, 1], out[:, 2] = x, cr * y + sr * z, cr * z - sr * y
+    return out
 
 
 class AidSpec(Spec):
@@ -162,7 +182,7 @@ class Instrument(ABC):
 
     def lever_displacement(self, tap: TapStates) -> Array:
         """The (n, 3) north-east-down offset [m] of the instrument from the reference point."""
-        return rotate(dcm_from_rpy(tap.attitude), self.lever_arm)
+        return turn_to_ned(tap.attitude, self.lever_arm)
 
     def lever_velocity(self, tap: TapStates) -> Array:
         """The (n, 3) velocity [m/s] of the instrument relative to the reference point, body axes: omega x l."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.rotation import dcm_from_rpy
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, unrotate
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, turn_to_body
 from simnav.spec import NonNegative, Vector, quantity
 from simnav.types import Array, TapStates
 
@@ -31,7 +30,7 @@ class SpeedLog(AidSpec):
 
 class _SpeedLog(Instrument):
     def observe(self, tap: TapStates) -> Array:
-        velocity = unrotate(dcm_from_rpy(tap.attitude), tap.velocity - tap.water_velocity)
+        velocity = turn_to_body(tap.attitude, tap.velocity - tap.water_velocity)
         if self._levered:
             velocity += self.lever_velocity(tap)
         return (1.0 + self.scale) * velocity[:, :1]

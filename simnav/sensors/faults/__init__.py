@@ -1,6 +1,6 @@
 """Faults: composable layers over the streams of instruments, simulated or real, with their labels.
 
-`build_layers` makes the layers of a run and `label_faults` the truth about them; the bits of both agree.
+`build_layers` makes the layers of a run and `labels` the truth about them; the bits of both agree.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
     "Ramp",
     "build_layers",
     "check_faults",
-    "label_faults",
+    "labels",
     "quantity_of",
 ]
 
@@ -81,7 +81,7 @@ def build_layers(faults: Sequence[AnyFault], seed: int) -> tuple[FaultLayer, ...
     Returns
     -------
     tuple of FaultLayer
-        Their bits are those of `label_faults`. The random streams of a fault are named by it and not by its place, so
+        Their bits are those of `labels`. The random streams of a fault are named by it and not by its place, so
         that adding another one leaves it as it was.
     """
     layers, bit = [], 0
@@ -94,7 +94,7 @@ def build_layers(faults: Sequence[AnyFault], seed: int) -> tuple[FaultLayer, ...
     return tuple(layers)
 
 
-def label_faults(faults: Sequence[AnyFault], duration: float, instruments: Mapping[str, str]) -> tuple[FaultLabel, ...]:
+def labels(faults: Sequence[AnyFault], duration: float, instruments: Mapping[str, str]) -> tuple[FaultLabel, ...]:
     """The truth about the faults of a run: label j belongs to bit j.
 
     Parameters

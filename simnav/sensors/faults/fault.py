@@ -154,6 +154,8 @@ class FaultSpec(Spec):
             On an instrument that is not there, or a size in a unit that does not fit one.
         """
         for name in self.instruments:
+            if name == "imu":
+                raise SpecError(f"fault {self.kind!r}: on the IMU there is 'imu_disturbance' only")
             if name not in instruments and name not in instruments.values():
                 valid = sorted({*instruments, *instruments.values()})
                 raise SpecError(f"fault {self.kind!r}: there is no instrument {name!r}{closest(name, valid)}")
