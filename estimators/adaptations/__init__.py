@@ -1,1 +1,1 @@
-"""TODO"""
+"""How the noise is adapted: pieces that any solver takes."""

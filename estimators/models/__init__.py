@@ -1,1 +1,1 @@
-"""TODO"""
+"""What is estimated: state, error dynamics, measurement models."""

@@ -1,1 +1,1 @@
-"""TODO"""
+"""How it is estimated: filters over any model."""

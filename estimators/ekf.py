@@ -1,0 +1,34 @@
+"""The row ``ekf``: error-state extended Kalman filter over the inertial model."""
+
+from __future__ import annotations
+
+from estimators.models.inertial import InertialModel
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimator import UnsuitableScenario, register
+from simnav.types import InitialState, Instruments
+
+__all__ = ["Ekf"]
+
+
+@register("ekf", aliases=("eskf",))
+class Ekf(KalmanEstimator):
+    """15-state error-state EKF over an IMU and whatever aids there are.
+
+    Position, velocity, attitude and IMU biases, plus calibration states where the datasheets of the aids ask for them
+    (`estimators.models.inertial`). Every measurement is used, at its own time; no gating, no adaptation.
+
+    Parameters
+    ----------
+    calibrate : bool
+        False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
+    """
+
+    def __init__(self, calibrate: bool = True):
+        super().__init__(InertialModel(calibrate))
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; needs an IMU and at least one aiding instrument."""
+        if instruments.imu is None or not instruments:
+            lacks = "an IMU" if instruments.imu is None else "an instrument beside the IMU"
+            raise UnsuitableScenario(f"the EKF needs an IMU and at least one other instrument; there is not {lacks}")
+        super().reset(start, instruments)

@@ -1,0 +1,135 @@
+"""What a model is to a solver: a state with a local error, that moves, is observed and is corrected."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+
+from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
+
+__all__ = ["ErrorModel", "GaussMarkov", "Linearised", "gauss_markov", "triad_bias"]
+
+
+class Linearised(NamedTuple):
+    """A measurement of m components, linearised at a state of n error components.
+
+    Attributes
+    ----------
+    innovation : (m,) array
+        Measured minus predicted, in the units of ``KINDS[kind].errors``.
+    jacobian : (m, n) array
+        Of the prediction with respect to the error (estimate minus truth).
+    noise : (m, m) array
+        Covariance of what the state does not explain.
+    """
+
+    innovation: Array
+    jacobian: Array
+    noise: Array
+
+
+class ErrorModel(ABC):
+    """A state, kept by the model, and what a solver needs to know of its n-component error.
+
+    Errors are estimate minus truth; a correction ``dx`` is what is to be added to the estimate.
+
+    Attributes
+    ----------
+    size : int
+        n.
+    time : float
+        Of the state [s].
+    """
+
+    size: int
+    time: float
+
+    @abstractmethod
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; return the (n, n) covariance of its error. Raises UnsuitableScenario."""
+
+    @abstractmethod
+    def observes(self, instrument: Datasheet) -> bool:
+        """Whether `measure` knows what to do with an instrument."""
+
+    def load(self, imu: ImuSamples | None) -> None:  # noqa: B027 (most models have no IMU)
+        """Take the IMU samples of the step that follows."""
+
+    @abstractmethod
+    def propagate(self, covariance: Array, until: float) -> None:
+        """Advance the state to a time, and its covariance in place."""
+
+    @abstractmethod
+    def measure(self, measurement: Measurement) -> Linearised | None:
+        """Linearise at the present state; None where the measurement says nothing usable."""
+
+    @abstractmethod
+    def correct(self, dx: Array) -> None:
+        """Add a correction to the state."""
+
+    @abstractmethod
+    def estimate(self, covariance: Array) -> Estimate:
+        """The state as an estimate at the present time."""
+
+
+class GaussMarkov(NamedTuple):
+    """A first-order Gauss-Markov bias and the white noise that stands for what is faster than it.
+
+    Attributes
+    ----------
+    variance : float
+        At the start [x^2].
+    decay : float
+        Inverse of the correlation time [1/s].
+    noise : float
+        Density of the driving noise [x^2/s].
+    white : float
+        Density of white noise in the output [x^2 s].
+    """
+
+    variance: float
+    decay: float
+    noise: float
+    white: float
+
+
+def gauss_markov(
+    bias: float, instability: float, correlation_time: float, rate_random_walk: float = 0.0, *, shortest: float = 1.0
+) -> GaussMarkov:
+    """One Gauss-Markov state for a turn-on bias and an in-run bias together.
+
+    The two have the autocovariance ``b^2 + s^2 exp(-t/tau)``. One state of variance ``b^2 + s^2`` and correlation
+    time ``tau (b^2 + s^2) / s^2`` has the same value and the same slope at lag 0, and falls off faster everywhere
+    else, so that it promises no more than the two. It is exact where either is zero.
+
+    Parameters
+    ----------
+    bias : float
+        Turn-on bias, one sigma [x].
+    instability, correlation_time : float
+        Stationary sigma [x] and correlation time [s] of the in-run bias; where the time is infinite it is a random walk
+        of ``instability`` per sqrt(s).
+    rate_random_walk : float
+        [x/sqrt(s)].
+    shortest : float
+        A correlation time below this [s] is white noise of the same density at low frequency, 2 s^2 tau.
+    """
+    constant, moving = bias * bias, instability * instability
+    walk = rate_random_walk * rate_random_walk
+    if np.isinf(correlation_time):
+        return GaussMarkov(constant, 0.0, moving + walk, 0.0)
+    if correlation_time < shortest:
+        return GaussMarkov(constant, 0.0, walk, 2.0 * moving * max(correlation_time, 0.0))
+    if moving == 0.0:
+        return GaussMarkov(constant, 0.0, walk, 0.0)
+    total = constant + moving
+    return GaussMarkov(total, moving / (total * correlation_time), 2.0 * moving / correlation_time + walk, 0.0)
+
+
+def triad_bias(triad: TriadDatasheet, extra: float = 0.0) -> GaussMarkov:
+    """The bias state of three gyroscopes or accelerometers; ``extra`` adds to the turn-on bias."""
+    return gauss_markov(
+        float(np.hypot(triad.bias, extra)), triad.bias_instability, triad.correlation_time, triad.rate_random_walk
+    )
