@@ -8,9 +8,8 @@ harms nobody else.
 
 from __future__ import annotations
 
-import importlib
 import importlib.metadata
-import importlib.resources
+import importlib.util
 import re
 import tomllib
 import warnings
@@ -101,11 +100,21 @@ def _folders() -> Iterator[Path]:
             yield Path(__file__).resolve().parent.parent / point.module
             continue
         try:
-            module = importlib.import_module(point.module)
-            package = module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
-            yield Path(str(importlib.resources.files(package)))
-        except (Exception, SystemExit) as error:
-            _warn(f"scenario pack {point.name!r} ({point.value}) left out: {type(error).__name__}: {error}")
+            folders = _package_folders(point.module)
+        except Exception as error:
+            _warn(f"scenario pack {point.name!r} ({point.value}) left out: {error}")
+        else:
+            yield from folders
+
+
+def _package_folders(package: str) -> list[Path]:
+    """Without running the package's code; only the parents of a dotted name are imported."""
+    spec = importlib.util.find_spec(package)
+    if spec is None:
+        raise ModuleNotFoundError(f"there is no package {package!r}")
+    if spec.submodule_search_locations is None:
+        raise ValueError(f"{package!r} is a module; a pack is a package, with its scenarios as *.toml in its folder")
+    return [Path(location) for location in spec.submodule_search_locations]
 
 
 def _own(point: importlib.metadata.EntryPoint) -> bool:

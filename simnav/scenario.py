@@ -27,7 +27,7 @@ from simnav.catalogue import NAME, Header, gym_id, headers
 from simnav.log.spec import RecordedSpec
 from simnav.sensors import FaultSpec, ImuSpec, InstrumentSpec
 from simnav.spec import Positive, Spec, SpecError, closest, entries, quantity
-from simnav.types import Array, Instruments
+from simnav.types import KINDS, Array, Instruments
 from simnav.world import Current, Manoeuvre, Sea, Start, Vessel
 
 __all__ = ["Header", "InitialError", "Scenario", "headers", "load", "names", "parse"]
@@ -179,6 +179,10 @@ def _check_instruments(s: Scenario) -> None:
     for name, spec in s.instruments.items():
         if not _INSTRUMENT.fullmatch(name):
             raise ValueError(f"instruments.{name}: a name is of lower-case letters, digits and underscores")
+        if name == "interval" or (name in KINDS and name != spec.kind):
+            raise ValueError(
+                f"instruments.{name}.kind = {spec.kind!r}: {name!r} is no name for it, it means something else"
+            )
         if isinstance(spec, ImuSpec) != (name == "imu"):
             raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
 
@@ -187,6 +191,10 @@ def _check_world(s: Scenario) -> None:
     """A simulated run: start and manoeuvres fit the vessel and the water."""
     if s.start is None:
         raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
+    if s.imu is not None and abs(s.step * s.imu.rate - round(s.step * s.imu.rate)) > 1e-6:
+        raise ValueError(
+            f"step_s = {s.step:g} should be a multiple of the IMU's sample interval, 1 / {s.imu.rate:g} Hz"
+        )
     vessel = s.vessel or Vessel()
     depth = -s.start.altitude
     if vessel.kind == "ship" and depth > 0.0:
