@@ -60,7 +60,9 @@ def radii_scalar(sin_latitude):  # type: ignore[no-untyped-def]
     """Meridian and prime-vertical radius [m] at a sine of latitude (Groves eqs. 2.105-2.106)."""
     x = 1.0 - ECCENTRICITY_SQUARED * sin_latitude * sin_latitude
     prime_vertical = SEMI_MAJOR_AXIS / sqrt(x)
-    return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x, prime_vertical
+    # R_M = R_N (1 - e^2) / x, without the second division
+    scaled = prime_vertical * (1.0 / SEMI_MAJOR_AXIS)
+    return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) * scaled * scaled, prime_vertical
 
 
 @kernel()

@@ -34,6 +34,9 @@ from simnav.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_s
 from simnav.rotation import cross, dcm_from_rpy, rotation_coefficients, rpy_from_dcm
 from simnav.types import Array, ImuSamples, NavigationStates
 
+#: Divisions by constants are products here: the compiler may not turn one into the other by itself.
+TWELFTH = 1.0 / 12.0
+
 __all__ = ["increments", "integrate", "mechanize", "mechanize_step", "sample_from_motion"]
 
 
@@ -47,21 +50,22 @@ def local_rates(latitude, height, vm0, vm1, vm2, dt):  # type: ignore[no-untyped
         w_ie north and down, w_en north, east, down [rad/s], gravity [m/s^2], d(latitude)/d(north) and
         d(longitude)/d(east) [rad/m], height in the middle [m].
     """
-    middle = latitude + 0.5 * dt * vm0 / SEMI_MAJOR_AXIS
+    middle = latitude + 0.5 * dt * vm0 * (1.0 / SEMI_MAJOR_AXIS)
     hm = height - 0.5 * dt * vm2
     s, c = sin(middle), cos(middle)
     meridian, prime_vertical = radii_scalar(s)
     per_north = 1.0 / (meridian + hm)
     per_east = 1.0 / (prime_vertical + hm)
+    secant = 1.0 / c
     return (
         ROTATION_RATE * c,
         -ROTATION_RATE * s,
         vm1 * per_east,
         -vm0 * per_north,
-        -vm1 * per_east * s / c,
+        -vm1 * per_east * s * secant,
         gravity_scalar(s, hm),
         per_north,
-        per_east / c,
+        per_east * secant,
         hm,
     )
 
@@ -83,17 +87,17 @@ def mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt):
     a0, a1, a2 = w0 * dt, w1 * dt, w2 * dt
     n0, n1, n2 = f0 * dt, f1 * dt, f2 * dt
     q0, q1, q2 = cross(memory[0], memory[1], memory[2], a0, a1, a2)
-    r0, r1, r2 = a0 + q0 / 12.0, a1 + q1 / 12.0, a2 + q2 / 12.0
+    r0, r1, r2 = a0 + q0 * TWELFTH, a1 + q1 * TWELFTH, a2 + q2 * TWELFTH
     angle2 = r0 * r0 + r1 * r1 + r2 * r2
     sa, b = rotation_coefficients(angle2)
-    c = 1.0 / 6.0 - angle2 / 120.0 if angle2 < 1e-3 else (1.0 - sa) / angle2
+    c = 1.0 / 6.0 - angle2 * (1.0 / 120.0) if angle2 < 1e-3 else (1.0 - sa) / angle2
     x0, x1, x2 = cross(r0, r1, r2, n0, n1, n2)
     y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
     s0, s1, s2 = cross(memory[0], memory[1], memory[2], n0, n1, n2)
     t0, t1, t2 = cross(memory[3], memory[4], memory[5], a0, a1, a2)
-    d0 = n0 + b * x0 + c * y0 + (s0 + t0) / 12.0
-    d1 = n1 + b * x1 + c * y1 + (s1 + t1) / 12.0
-    d2 = n2 + b * x2 + c * y2 + (s2 + t2) / 12.0
+    d0 = n0 + b * x0 + c * y0 + (s0 + t0) * TWELFTH
+    d1 = n1 + b * x1 + c * y1 + (s1 + t1) * TWELFTH
+    d2 = n2 + b * x2 + c * y2 + (s2 + t2) * TWELFTH
     memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a0, a1, a2, n0, n1, n2
     u0 = dcm[0, 0] * d0 + dcm[0, 1] * d1 + dcm[0, 2] * d2
     u1 = dcm[1, 0] * d0 + dcm[1, 1] * d1 + dcm[1, 2] * d2
@@ -103,9 +107,10 @@ def mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt):
     m0, m1, m2 = v0 + 0.5 * u0, v1 + 0.5 * u1, v2 + 0.5 * (u2 + 9.8 * dt)
     e0, e2, _, _, _, g, per_north, per_east, hm = local_rates(position[0], position[2], m0, m1, m2, dt)
     tangent = -e2 / e0
+    east_rate = per_east * e0 * (1.0 / ROTATION_RATE)
     z0, z1, z2 = 0.0, 0.0, 0.0
     for _ in range(3):
-        k0, k1 = m1 * per_east * e0 / ROTATION_RATE, -m0 * per_north
+        k0, k1 = m1 * east_rate, -m0 * per_north
         k2 = -k0 * tangent
         z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
         x0, x1, x2 = cross(z0, z1, z2, u0, u1, u2)
@@ -232,8 +237,9 @@ def sample_from_motion(latitude, height, v, w, c, d, memory, dt):  # type: ignor
 
     Returns
     -------
-    tuple of 9 floats
-        Mean angular rate and specific force; latitude and longitude change [rad] and height change [m].
+    tuple of 11 floats
+        Mean angular rate and specific force; latitude and longitude change [rad] and height change [m]; the Earth rate, north
+        and down, in the middle.
     """
     m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
     e0, e2, k0, k1, k2, g, per_north, per_east, _ = local_rates(latitude, height, m0, m1, m2, dt)
@@ -255,47 +261,48 @@ def sample_from_motion(latitude, height, v, w, c, d, memory, dt):  # type: ignor
         ratio = np.arcsin(min(1.0, sqrt(sine2))) / sqrt(sine2)
     r0, r1, r2 = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
     # alpha from phi = (I + [alpha'/12 x]) alpha
-    h0, h1, h2 = memory[0] / 12.0, memory[1] / 12.0, memory[2] / 12.0
-    norm2 = h0 * h0 + h1 * h1 + h2 * h2
+    h0, h1, h2 = memory[0] * TWELFTH, memory[1] * TWELFTH, memory[2] * TWELFTH
+    inverse = 1.0 / (1.0 + h0 * h0 + h1 * h1 + h2 * h2)
     dot = h0 * r0 + h1 * r1 + h2 * r2
     q0, q1, q2 = cross(h0, h1, h2, r0, r1, r2)
-    a0 = (r0 - q0 + h0 * dot) / (1.0 + norm2)
-    a1 = (r1 - q1 + h1 * dot) / (1.0 + norm2)
-    a2 = (r2 - q2 + h2 * dot) / (1.0 + norm2)
+    a0 = (r0 - q0 + h0 * dot) * inverse
+    a1 = (r1 - q1 + h1 * dot) * inverse
+    a2 = (r2 - q2 + h2 * dot) * inverse
     # Velocity change in the axes at the start: u = C dv, from v+ - v = (I - zeta x / 2) u + gravity and Coriolis
     y0, y1, y2 = cross(2.0 * e0 + k0, k1, 2.0 * e2 + k2, m0, m1, m2)
     p0, p1, p2 = w[0] - v[0] + dt * y0, w[1] - v[1] + dt * y1, w[2] - v[2] + dt * y2 - dt * g
     l0, l1, l2 = -0.5 * z0, -0.5 * z1, -0.5 * z2
-    norm2 = l0 * l0 + l1 * l1 + l2 * l2
+    inverse = 1.0 / (1.0 + l0 * l0 + l1 * l1 + l2 * l2)
     dot = l0 * p0 + l1 * p1 + l2 * p2
     q0, q1, q2 = cross(l0, l1, l2, p0, p1, p2)
-    u0 = (p0 - q0 + l0 * dot) / (1.0 + norm2)
-    u1 = (p1 - q1 + l1 * dot) / (1.0 + norm2)
-    u2 = (p2 - q2 + l2 * dot) / (1.0 + norm2)
+    u0 = (p0 - q0 + l0 * dot) * inverse
+    u1 = (p1 - q1 + l1 * dot) * inverse
+    u2 = (p2 - q2 + l2 * dot) * inverse
     t0, t1, t2 = cross(memory[3], memory[4], memory[5], a0, a1, a2)
-    d0 = c[0] * u0 + c[3] * u1 + c[6] * u2 - t0 / 12.0
-    d1 = c[1] * u0 + c[4] * u1 + c[7] * u2 - t1 / 12.0
-    d2 = c[2] * u0 + c[5] * u1 + c[8] * u2 - t2 / 12.0
+    d0 = c[0] * u0 + c[3] * u1 + c[6] * u2 - t0 * TWELFTH
+    d1 = c[1] * u0 + c[4] * u1 + c[7] * u2 - t1 * TWELFTH
+    d2 = c[2] * u0 + c[5] * u1 + c[8] * u2 - t2 * TWELFTH
     # nu from (I + b phi x + c (phi x)^2 + alpha'/12 x) nu = d: diagonally dominant, by Cramer's rule
     angle2 = r0 * r0 + r1 * r1 + r2 * r2
     sa, b = rotation_coefficients(angle2)
-    k = 1.0 / 6.0 - angle2 / 120.0 if angle2 < 1e-3 else (1.0 - sa) / angle2
+    k = 1.0 / 6.0 - angle2 * (1.0 / 120.0) if angle2 < 1e-3 else (1.0 - sa) / angle2
     g0, g1, g2 = b * r0 + h0, b * r1 + h1, b * r2 + h2
     m00, m11, m22 = 1.0 + k * (r0 * r0 - angle2), 1.0 + k * (r1 * r1 - angle2), 1.0 + k * (r2 * r2 - angle2)
     m01, m10 = k * r0 * r1 - g2, k * r0 * r1 + g2
     m02, m20 = k * r0 * r2 + g1, k * r0 * r2 - g1
     m12, m21 = k * r1 * r2 - g0, k * r1 * r2 + g0
     x0, x1, x2 = cross(m01, m11, m21, m02, m12, m22)
-    determinant = m00 * x0 + m10 * x1 + m20 * x2
-    n0 = (d0 * x0 + d1 * x1 + d2 * x2) / determinant
+    inverse = 1.0 / (m00 * x0 + m10 * x1 + m20 * x2)
+    n0 = (d0 * x0 + d1 * x1 + d2 * x2) * inverse
     y0, y1, y2 = cross(m02, m12, m22, m00, m10, m20)
-    n1 = (d0 * y0 + d1 * y1 + d2 * y2) / determinant
+    n1 = (d0 * y0 + d1 * y1 + d2 * y2) * inverse
     t0, t1, t2 = cross(m00, m10, m20, m01, m11, m21)
-    n2 = (d0 * t0 + d1 * t1 + d2 * t2) / determinant
+    n2 = (d0 * t0 + d1 * t1 + d2 * t2) * inverse
     memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a0, a1, a2, n0, n1, n2
+    inverse = 1.0 / dt
     return (
-        a0 / dt, a1 / dt, a2 / dt, n0 / dt, n1 / dt, n2 / dt,
-        dt * m0 * per_north, dt * m1 * per_east, -dt * m2,
+        a0 * inverse, a1 * inverse, a2 * inverse, n0 * inverse, n1 * inverse, n2 * inverse,
+        dt * m0 * per_north, dt * m1 * per_east, -dt * m2, e0, e2,
     )  # fmt: skip
 
 

@@ -12,7 +12,6 @@ from math import atan2, cos, exp, inf, sin
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.earth import ROTATION_RATE
 from simnav.strapdown import sample_from_motion
 from simnav.world.manoeuvres import ACCELERATE, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
 
@@ -29,7 +28,8 @@ SEGMENT_TIME, SEGMENT_PSI, SEGMENT_SIGN, SEGMENT_NORTH, SEGMENT_EAST = range(38,
 BODY_RATE = 43
 ERROR_NORTH, ERROR_EAST = 46, 47
 ROLL, PITCH = 48, 49
-STATE = 50
+COS_PSI, SIN_PSI, COS_GAMMA, SIN_GAMMA = range(50, 54)
+STATE = 54
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
 # ... and in the parameters.
 DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)
@@ -75,6 +75,16 @@ def _lag(x, dx, command, dt, tau, decay):  # type: ignore[no-untyped-def]
 @kernel()
 def _wrap(angle):  # type: ignore[no-untyped-def]
     return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+
+
+@kernel()
+def _waypoint(points, j, relative, x):  # type: ignore[no-untyped-def]
+    """Waypoint j, north and east of the start of the run."""
+    a, b = points[j, 0], points[j, 1]
+    if relative > 0.0:
+        c, s = cos(x[SEGMENT_PSI]), sin(x[SEGMENT_PSI])
+        return x[SEGMENT_NORTH] + c * a - s * b, x[SEGMENT_EAST] + s * a + c * b
+    return a, b
 
 
 @kernel()
@@ -135,19 +145,19 @@ def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
         elif kind == WAYPOINTS:
             # Steered by where the navigator believes the vessel to be.
             north, east = x[NORTH] + x[ERROR_NORTH], x[EAST] + x[ERROR_EAST]
-            while True:
+            while index[2] < int(rows[i, 3]):
                 j = index[2]
-                if j >= int(rows[i, 3]):
-                    done = True
-                    break
-                a, b = points[j, 0], points[j, 1]
-                if rows[i, 5] > 0.0:
-                    c, s = cos(x[SEGMENT_PSI]), sin(x[SEGMENT_PSI])
-                    a, b = x[SEGMENT_NORTH] + c * a - s * b, x[SEGMENT_EAST] + s * a + c * b
-                if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2:
+                a, b = _waypoint(points, j, rows[i, 5], x)
+                from_a, from_b = x[SEGMENT_NORTH], x[SEGMENT_EAST]
+                if j > int(rows[i, 2]):
+                    from_a, from_b = _waypoint(points, j - 1, rows[i, 5], x)
+                # Reached inside the radius, or when passed abeam: a tight corner is not circled for ever.
+                passed = (north - a) * (a - from_a) + (east - b) * (b - from_b) > 0.0
+                if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2 and not passed:
                     x[PSI_REFERENCE] = psi + _wrap(atan2(b - east, a - north) - psi)
                     break
                 index[2] += 1
+            done = index[2] >= int(rows[i, 3])
         elif kind == DEPTH:
             done = done or (abs(x[DEPTH_CALM] - rows[i, 2]) < 0.5 and abs(x[GAMMA]) < 0.02)
         if not done:
@@ -162,19 +172,31 @@ def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
 
 
 @kernel()
+def _cosine_sine(angle):  # type: ignore[no-untyped-def]
+    """Cosine and sine; by their series, good to rounding, where the angle is small, as roll and pitch mostly are."""
+    if abs(angle) > 0.3:
+        return cos(angle), sin(angle)
+    a = angle * angle
+    c = 1.0 - a * (1 / 2 - a * (1 / 24 - a * (1 / 720 - a * (1 / 40320 - a * (1 / 3628800 - a * (1 / 479001600))))))
+    s = 1.0 - a * (1 / 6 - a * (1 / 120 - a * (1 / 5040 - a * (1 / 362880 - a * (1 / 39916800 - a * (1 / 6227020800))))))
+    return c, s * angle
+
+
+@kernel()
 def _compose(x, p, w0, w1, w2, w3, w4, w5, w6):  # type: ignore[no-untyped-def]
     """Velocity (3), DCM (9), roll and pitch of the state with the wave responses w0 ... w6 on top."""
-    cp, sp = cos(x[PSI]), sin(x[PSI])
-    cg, sg = cos(x[GAMMA]), sin(x[GAMMA])
-    shade = exp(-p[ATTENUATION] * max(0.0, x[DEPTH_CALM]))
-    flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
+    cp, sp, cg, sg = x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA]
+    shade, flow = 1.0, 1.0
+    if x[DEPTH_CALM] > 0.0:
+        shade = exp(-p[ATTENUATION] * x[DEPTH_CALM])
+        flow = max(0.0, 1.0 - p[SHEAR] * x[DEPTH_CALM])
     v0 = x[U] * cg * cp + flow * p[CURRENT_N] + shade * w0
     v1 = x[U] * cg * sp + flow * p[CURRENT_E] + shade * w1
     v2 = -x[U] * sg + shade * w2
-    roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * x[U] * x[R] / 9.81
+    roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * x[U] * x[R] * (1.0 / 9.81)
     pitch = x[GAMMA] + shade * (w5 * cp + w6 * sp)
-    cr, sr = cos(roll), sin(roll)
-    ct, st = cos(pitch), sin(pitch)
+    cr, sr = _cosine_sine(roll)
+    ct, st = _cosine_sine(pitch)
     return (
         (v0, v1, v2),
         (
@@ -190,7 +212,9 @@ def _compose(x, p, w0, w1, w2, w3, w4, w5, w6):  # type: ignore[no-untyped-def]
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
 def initialise(x, p, phase, table):  # type: ignore[no-untyped-def]
     """Complete the state at time 0: velocity and attitude with the waves as they are then."""
-    w = _waves(phase, table, x[U] * cos(x[GAMMA]) * cos(x[PSI]), x[U] * cos(x[GAMMA]) * sin(x[PSI]), 0.0)
+    x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
+    ahead = x[U] * x[COS_GAMMA]
+    w = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], 0.0)
     v, c, roll, pitch = _compose(x, p, w[0], w[1], w[2], w[3], w[4], w[5], w[6])
     x[V], x[V + 1], x[V + 2] = v
     for i in range(9):
@@ -206,7 +230,7 @@ def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force
 
     Parameters
     ----------
-    x : (50,) array
+    x : (54,) array
         State; updated.
     index : (4,) int array
         Sample, segment, waypoint, whether the segment has begun; updated.
@@ -242,12 +266,14 @@ def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force
         if p[DIVES] > 0.0:
             climb = (x[DEPTH_CALM] - x[DEPTH_REFERENCE]) / (max(x[U], 0.3) * 5.0 * p[TAU_G])
             climb = min(max(climb, -x[GAMMA_LIMIT]), x[GAMMA_LIMIT])
-            sink = -x[U] * sin(x[GAMMA])
+            sink = -x[U] * x[SIN_GAMMA]
             x[GAMMA], x[DGAMMA] = _lag(x[GAMMA], x[DGAMMA], climb, dt, p[TAU_G], decay_g)
-            x[DEPTH_CALM] += 0.5 * dt * (sink - x[U] * sin(x[GAMMA]))
+            x[COS_GAMMA], x[SIN_GAMMA] = cos(x[GAMMA]), sin(x[GAMMA])
+            x[DEPTH_CALM] += 0.5 * dt * (sink - x[U] * x[SIN_GAMMA])
         # Waves, met at the speed through the water
-        ahead = x[U] * cos(x[GAMMA])
-        w0, w1, w2, w3, w4, w5, w6 = _waves(phase, table, ahead * cos(x[PSI]), ahead * sin(x[PSI]), dt)
+        x[COS_PSI], x[SIN_PSI] = cos(x[PSI]), sin(x[PSI])
+        ahead = x[U] * x[COS_GAMMA]
+        w0, w1, w2, w3, w4, w5, w6 = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], dt)
         v, c, roll, pitch = _compose(x, p, w0, w1, w2, w3, w4, w5, w6)
         # Ideal instruments
         u = (x[V], x[V + 1], x[V + 2])
@@ -259,10 +285,8 @@ def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force
         while tap < tap_time.size and (tap_time[tap] <= t1 or k == rate.shape[0] - 1):
             _tap(taps[tap], min((tap_time[tap] - t0) / dt, 1.0), x, p, v, roll, pitch, out, c)
             tap += 1
-        cl, sl = cos(x[LATITUDE]), sin(x[LATITUDE])
-        x[BODY_RATE] = out[0] - ROTATION_RATE * (c[0] * cl - c[6] * sl)
-        x[BODY_RATE + 1] = out[1] - ROTATION_RATE * (c[1] * cl - c[7] * sl)
-        x[BODY_RATE + 2] = out[2] - ROTATION_RATE * (c[2] * cl - c[8] * sl)
+        for i in range(3):
+            x[BODY_RATE + i] = out[i] - c[i] * out[9] - c[6 + i] * out[10]
         x[LATITUDE] += out[6]
         x[LONGITUDE] += out[7]
         x[HEIGHT] += out[8]
@@ -290,9 +314,8 @@ def _tap(out, a, x, p, v, roll, pitch, sample, c):  # type: ignore[no-untyped-de
     out[7] = x[PITCH] + a * (pitch - x[PITCH])
     out[8] = _wrap(yaw + a * _wrap(new_yaw - yaw))
     # Angular rate at the instant, extrapolated from the means over this interval and the one before
-    cl, sl = cos(x[LATITUDE]), sin(x[LATITUDE])
     for i in range(3):
-        now = sample[i] - ROTATION_RATE * (c[i] * cl - c[6 + i] * sl)
+        now = sample[i] - c[i] * sample[9] - c[6 + i] * sample[10]
         out[9 + i] = now + (a - 0.5) * (now - x[BODY_RATE + i])
     flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
     out[12] = flow * p[CURRENT_N]

@@ -43,7 +43,7 @@ class Sea(Spec):
         Number of components, each of the same energy.
     heave_period, roll_period, pitch_period : float
         Natural periods of the responses [s].
-    roll_damping, pitch_damping : float
+    heave_damping, roll_damping, pitch_damping : float
         Damping ratios.
     roll_gain, pitch_gain, drift_gain : float
         Response to the wave slope (roll, pitch) and to the orbital motion (surge, sway) well below resonance; a hull that spans
@@ -60,6 +60,7 @@ class Sea(Spec):
     heave_period: Positive = quantity("s", 6.0)
     roll_period: Positive = quantity("s", 9.0)
     pitch_period: Positive = quantity("s", 6.0)
+    heave_damping: Annotated[float, Field(gt=0.02, le=2.0)] = 0.6
     roll_damping: Annotated[float, Field(gt=0.02, le=2.0)] = 0.15
     pitch_damping: Annotated[float, Field(gt=0.02, le=2.0)] = 0.5
     roll_gain: NonNegative = 0.6
@@ -139,7 +140,7 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
 
     # With the phase theta = omega t - k x and a complex gain G, a response is Re(G e^{-i theta}) =
     # Re(G) cos(theta) + Im(G) sin(theta): elevation has G = a, horizontal displacement i a, slope i a k.
-    heave = amplitude * response(sea.heave_period, 0.4)
+    heave = amplitude * response(sea.heave_period, sea.heave_damping)
     orbit = 1j * amplitude * sea.drift_gain
     roll = 1j * amplitude * number * sea.roll_gain * response(sea.roll_period, sea.roll_damping)
     pitch = 1j * amplitude * number * sea.pitch_gain * response(sea.pitch_period, sea.pitch_damping)

@@ -1,0 +1,214 @@
+"""The simulator: a scenario and a seed to a recording, in one block or step by step.
+
+A `Simulator` is a state machine. The world's truth, the instruments' errors and the faults all carry their state from block to
+block and draw a fixed number of variates per sample, so that one long block and many short ones give the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from simnav.recording import Block, ImuLabels, Recording
+from simnav.scenario import Scenario
+from simnav.sensors.faults import build_layers, labels
+from simnav.spec import SpecError
+from simnav.start import draw_start
+from simnav.types import Array, NavigationStates
+from simnav.world import Vessel, World, WorldBlock
+
+__all__ = ["TIME_TOLERANCE", "Simulator", "sample_times", "simulate", "simulate_many"]
+
+#: Times closer than this are one and the same [s].
+TIME_TOLERANCE = 0.5e-6
+#: Rate of the truth where no IMU sets it [Hz].
+_RATE_WITHOUT_IMU = 20.0
+#: Tap of the ends of the steps; no instrument can have this name.
+_STEPS = "step ends"
+
+
+def sample_times(rate: float, phase: float, start: float, end: float) -> Array:
+    """Sample times ``phase + k / rate`` (k = 0, 1, ...) within (start, end].
+
+    Parameters
+    ----------
+    rate, phase : float
+        [Hz], [s]
+    start, end : float
+        [s]
+
+    Returns
+    -------
+    (n,) array
+
+    Examples
+    --------
+    >>> sample_times(2.0, 0.25, 0.0, 1.25)
+    array([0.25, 0.75, 1.25])
+    """
+    first = max(0, int(np.floor((start - phase + TIME_TOLERANCE) * rate)) + 1)
+    last = int(np.floor((end - phase + TIME_TOLERANCE) * rate))
+    return phase + np.arange(first, last + 1) / rate
+
+
+def _world(scenario: Scenario, seed: int) -> World:
+    assert scenario.start is not None  # a simulated scenario has one
+    imu = scenario.imu
+    rate = _RATE_WITHOUT_IMU if imu is None else imu.rate
+    if abs(rate * scenario.step - round(rate * scenario.step)) > 1e-6:
+        raise SpecError(
+            f"{scenario.id}: step_s = {scenario.step:g} should be a multiple of the sample interval of the IMU, "
+            f"{1.0 / rate:g} s"
+        )
+    return World(
+        scenario.start,
+        scenario.vessel or Vessel(),
+        scenario.manoeuvres,
+        scenario.sea,
+        scenario.current,
+        rate=rate,
+        seed=seed if scenario.world_seed is None else scenario.world_seed,
+    )
+
+
+class Simulator:
+    """A simulated run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A simulated one.
+    seed : int
+        Of the run, non-negative.
+    truth : WorldBlock, optional
+        The truth of the whole run, where several runs share one (`simulate_many`).
+
+    Attributes
+    ----------
+    instruments : Instruments
+    initial_truth : NavigationStates
+    start : InitialState
+    faults : tuple of FaultLabel
+    duration, step, time : float
+        [s]
+    note : str
+        Empty; a log says here which recording it is.
+
+    Raises
+    ------
+    SpecError
+        If the scenario is a recorded one or its step does not fit the IMU's rate.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, *, truth: tuple[NavigationStates, WorldBlock] | None = None):
+        if scenario.recorded:
+            raise SpecError(f"{scenario.id} is a recorded run; open it with simnav.source.open_source")
+        self.scenario, self.seed, self.note = scenario, seed, ""
+        self.duration, self.step, self.time = scenario.duration, scenario.step, 0.0
+        self.instruments = scenario.instruments_sheet()
+        self._truth = None if truth is None else truth[1]
+        self._world = _world(scenario, seed) if truth is None else None
+        self.initial_truth = self._world.state() if truth is None else truth[0]  # type: ignore[union-attr]
+        self.start = draw_start(self.initial_truth, scenario.initial_error.covariance(), seed)
+        self._imu = None if scenario.imu is None else scenario.imu.build(seed)
+        self._aids = {
+            name: spec.build(name, seed, water_depth=scenario.water_depth) for name, spec in scenario.aids.items()
+        }
+        kinds = {name: spec.kind for name, spec in scenario.aids.items()}
+        self.faults = labels(scenario.faults, scenario.duration, kinds)
+        self._layers = build_layers(scenario.faults, seed)
+        self._label_imu = any("imu" in f.instruments for f in scenario.faults)
+
+    def steer_by(self, north: float, east: float) -> None:
+        """Closed loop: from now on the vessel is steered by a position that is off by this much [m]."""
+        if self._world is None:
+            raise ValueError("runs that share one truth cannot be steered")
+        self._world.steer_by(north, east)
+
+    def advance(self, until: float) -> Block:
+        """What happens from now to a time.
+
+        Parameters
+        ----------
+        until : float
+            The end of a step, not before now [s].
+
+        Returns
+        -------
+        Block
+        """
+        start, until = self.time, min(until, self.duration)
+        taps = self._taps(start, until)
+        block = self._shared(taps) if self._world is None else self._world.advance(until, taps)
+        self.time = until
+        imu, imu_labels = None, None
+        if self._imu is not None:
+            imu = self._imu.sense(block.imu)
+            if self._label_imu:
+                imu_labels = ImuLabels(np.zeros(len(imu), dtype=np.uint32), np.zeros((len(imu), 6)))
+            for layer in self._layers:
+                imu, imu_labels = layer.apply_imu(imu, imu_labels)
+        aids = {}
+        for name, instrument in self._aids.items():
+            stream = instrument.sense(block.taps[name])
+            for layer in self._layers:
+                stream = layer.apply(stream)
+            aids[name] = stream
+        return Block(start, until, imu, imu_labels, aids, block.taps[_STEPS])
+
+    def _taps(self, start: float, until: float) -> dict[str, Array]:
+        taps = {n: sample_times(s.rate, s.phase, start, until) for n, s in self.scenario.aids.items()}
+        taps[_STEPS] = sample_times(1.0 / self.step, self.step, start, until)
+        return taps
+
+    def _shared(self, taps: dict[str, Array]) -> WorldBlock:
+        truth = self._truth
+        assert truth is not None
+        if self.time == 0.0 and all(len(t) == len(truth.taps[n]) for n, t in taps.items()):
+            return truth
+        raise ValueError("runs that share one truth are advanced to their end in one block")
+
+
+def _recording(simulator: Simulator) -> Recording:
+    return Recording(
+        simulator.scenario.id,
+        simulator.seed,
+        simulator.instruments,
+        simulator.initial_truth,
+        simulator.start,
+        simulator.faults,
+        simulator.advance(simulator.duration),
+    )
+
+
+def simulate(scenario: Scenario, seed: int) -> Recording:
+    """Simulate a whole run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+
+    Returns
+    -------
+    Recording
+    """
+    return _recording(Simulator(scenario, seed))
+
+
+def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recording]:
+    """Simulate runs one after the other; with ``world_seed`` they share one truth, which is made once.
+
+    Yields
+    ------
+    Recording
+        The same as `simulate` gives for each seed.
+    """
+    truth = None
+    for seed in seeds:
+        if truth is None and scenario.world_seed is not None:
+            first = Simulator(scenario, seed)
+            assert first._world is not None
+            truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))
+        yield _recording(Simulator(scenario, seed, truth=truth))

@@ -1,0 +1,54 @@
+"""What an estimator is told at the start: the true state with errors drawn from their covariance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.earth import displace
+from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
+from simnav.streams import stream
+from simnav.types import Array, InitialState, NavigationStates
+
+__all__ = ["draw_start"]
+
+
+def draw_start(truth: NavigationStates, covariance: Array, seed: int) -> InitialState:
+    """Draw the initial state of a run.
+
+    Parameters
+    ----------
+    truth : NavigationStates
+        A series of one: the state at the start.
+    covariance : (9, 9) array
+        Of the errors, over `simnav.types.COMPONENTS`.
+    seed : int
+        Of the run.
+
+    Returns
+    -------
+    InitialState
+
+    Raises
+    ------
+    ValueError
+        If the covariance is not symmetric and positive definite.
+    """
+    covariance = np.asarray(covariance, dtype=np.float64)
+    if covariance.shape != (9, 9) or not np.allclose(covariance, covariance.T):
+        raise ValueError(f"an initial covariance is a symmetric (9, 9) array, not one of shape {covariance.shape}")
+    try:
+        root = np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        least = float(np.linalg.eigvalsh(covariance)[0])
+        raise ValueError(
+            f"the initial covariance is not positive definite: its least eigenvalue is {least:.3g}"
+        ) from None
+    error = root @ stream(seed, "initial error").standard_normal(9)
+    dcm = dcm_from_rotation_vector(error[6:9]) @ dcm_from_rpy(truth.attitude[0])
+    return InitialState(
+        float(truth.time[0]),
+        displace(truth.position[0], error[0:3]),
+        truth.velocity[0] + error[3:6],
+        rpy_from_dcm(dcm),
+        covariance,
+    )
