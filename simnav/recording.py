@@ -7,23 +7,38 @@ touched it, what the faults added, and the noise that it really had.
 
 from __future__ import annotations
 
+import json
+import os
+import zipfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.types import (
     Array,
+    Datasheet,
+    ImuDatasheet,
     ImuSamples,
     InitialState,
     Instruments,
     Measurement,
     Measurements,
     NavigationStates,
+    TriadDatasheet,
 )
 
-__all__ = ["AidStream", "Block", "FaultLabel", "ImuLabels", "Recording"]
+__all__ = ["AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
+
+#: Of the files that `Recording.save` writes; raised when they change.
+FORMAT = 1
+
+
+class RecordingError(ValueError):
+    """A file that holds no recording that this version can read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +196,55 @@ class Recording:
         """The packets that an estimator is fed, one a step, in order."""
         yield from packets(self.data, self.data.truth.time)
 
+    def save(self, path: str | Path) -> None:
+        """Write the recording to one npz file: all of it, or nothing.
+
+        It is written under a temporary name beside ``path`` and renamed at the end, so that an interrupted write or a
+        full disk leaves no half file and spares the one that was there.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        path = Path(path)
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+        try:
+            with open(temporary, "wb") as file:
+                np.savez(file, allow_pickle=False, **_to_arrays(self))
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+    @classmethod
+    def load(cls, path: str | Path) -> Recording:
+        """Read a recording that `save` wrote.
+
+        Raises
+        ------
+        RecordingError
+            If the file is not a recording, is damaged, or was written by another version.
+        FileNotFoundError
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                if "meta" not in file:
+                    raise RecordingError(f"{path}: not a recording of simnav")
+                meta = json.loads(str(file["meta"]))
+                if meta.get("format") != FORMAT:
+                    raise RecordingError(
+                        f"{path}: written in format {meta.get('format')!r} of recordings, but this version of simnav "
+                        f"reads format {FORMAT}; record it again"
+                    )
+                return _from_arrays(meta, {name: file[name] for name in file.files})
+        except RecordingError:
+            raise
+        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise RecordingError(f"{path}: not a recording of simnav, or damaged ({error})") from None
+
 
 def packets(data: Block, ends: Array) -> Iterator[Measurements]:
     """Cut a block into the packets of successive steps.
@@ -213,3 +277,81 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
             j = int(cut_imu[k])
         yield Measurements(start, float(end), imu, aids[i : int(cut[k])])
         start, i = float(end), int(cut[k])
+
+
+_AID_ARRAYS = ("time", "value", "faults", "fault_error", "sigma", "dropped")
+_IMU_ARRAYS = ("time", "interval", "angular_rate", "specific_force")
+_STATE_ARRAYS = ("time", "position", "velocity", "attitude")
+
+
+def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
+    """A datasheet for JSON."""
+    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in asdict(sheet).items()}
+
+
+def _to_arrays(recording: Recording) -> dict[str, Any]:
+    """All arrays under names like ``truth.position``; everything else as JSON in ``meta``."""
+    data, instruments = recording.data, recording.instruments
+    meta = {
+        "format": FORMAT,
+        "scenario": recording.scenario,
+        "seed": int(recording.seed),
+        "note": recording.note,
+        "step": instruments.step,
+        "begin": data.start,
+        "end": data.end,
+        "imu": None if instruments.imu is None else _sheet(instruments.imu),
+        "aids": [_sheet(a) for a in instruments.values()],
+        "streams": {name: s.kind for name, s in data.aids.items()},
+        "faults": [asdict(f) for f in recording.faults],
+        "start_time": recording.start.time,
+    }
+    arrays: dict[str, Any] = {"meta": np.array(json.dumps(meta))}
+
+    def add(prefix: str, holder: object, names: Sequence[str]) -> None:
+        arrays.update({f"{prefix}.{n}": getattr(holder, n) for n in names})
+
+    add("truth", data.truth, _STATE_ARRAYS)
+    add("initial_truth", recording.initial_truth, _STATE_ARRAYS)
+    add("start", recording.start, ("position", "velocity", "attitude", "covariance"))
+    if data.imu is not None:
+        add("imu", data.imu, _IMU_ARRAYS)
+    if data.imu_labels is not None:
+        add("imu_labels", data.imu_labels, ("faults", "fault_error"))
+    for name, stream in data.aids.items():
+        add(f"aid.{name}", stream, _AID_ARRAYS)
+    return arrays
+
+
+def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
+    def get(prefix: str, names: Sequence[str]) -> list[Any]:
+        return [arrays[f"{prefix}.{n}"] for n in names]
+
+    imu_sheet = meta["imu"]
+    if imu_sheet is not None:
+        triads = {n: TriadDatasheet(**imu_sheet[n]) for n in ("gyroscope", "accelerometer")}
+        imu_sheet = ImuDatasheet(**{**imu_sheet, **triads})
+    sheets = []
+    for aid in meta["aids"]:
+        fields: dict[str, Any] = {
+            k: np.array(v, dtype=np.float64) if isinstance(v, list) else v for k, v in aid.items()
+        }
+        sheets.append(Datasheet(**fields))
+    data = Block(
+        meta["begin"],
+        meta["end"],
+        ImuSamples(*get("imu", _IMU_ARRAYS)) if "imu.time" in arrays else None,
+        ImuLabels(*get("imu_labels", ("faults", "fault_error"))) if "imu_labels.faults" in arrays else None,
+        {n: AidStream(n, kind, *get(f"aid.{n}", _AID_ARRAYS)) for n, kind in meta["streams"].items()},
+        NavigationStates(*get("truth", _STATE_ARRAYS)),
+    )
+    return Recording(
+        meta["scenario"],
+        meta["seed"],
+        Instruments(sheets, imu_sheet, meta["step"]),
+        NavigationStates(*get("initial_truth", _STATE_ARRAYS)),
+        InitialState(meta["start_time"], *get("start", ("position", "velocity", "attitude", "covariance"))),
+        tuple(FaultLabel(f["kind"], tuple(f["instruments"]), f["start"], f["end"]) for f in meta["faults"]),
+        data,
+        meta["note"],
+    )

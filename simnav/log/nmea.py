@@ -1,0 +1,314 @@
+"""NMEA 0183 logs: lines of sentences, each usually behind the UTC stamp of the logger.
+
+Each type of sentence becomes a table with named columns in SI units and radians (`SENTENCES` lists them). The date
+comes from the logger's stamp and only the time of day from the sentence, so that a receiver whose week number rolled
+over (its date is 1024 weeks off) does no harm.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from simnav.log.table import LogError, LogWarning, Table
+from simnav.spec import closest
+from simnav.types import KINDS
+
+__all__ = ["DEFAULT_COLUMNS", "SENTENCES", "NmeaFile", "read_nmea"]
+
+_DEG = math.pi / 180.0
+_KNOT = 1852.0 / 3600.0
+
+Fields = list[str]
+Row = dict[str, float]
+
+
+class _NoFixError(Exception):
+    """A well-formed sentence that says that it holds no measurement."""
+
+
+def _number(text: str) -> float:
+    return float(text) if text else math.nan
+
+
+def _angle(text: str, hemisphere: str) -> float:
+    """``ddmm.mmmm`` and N, S, E or W, in radians."""
+    if not text:
+        return math.nan
+    if hemisphere not in ("N", "S", "E", "W"):
+        raise ValueError(f"hemisphere {hemisphere!r}")
+    value = float(text)
+    degrees = math.floor(value / 100.0)
+    minutes = value - 100.0 * degrees
+    if not 0.0 <= minutes < 60.0 or degrees > 180:
+        raise ValueError(f"angle {text!r}")
+    angle = (degrees + minutes / 60.0) * _DEG
+    return -angle if hemisphere in "SW" else angle
+
+
+def _time_of_day(text: str) -> float:
+    if not text:
+        return math.nan
+    if len(text) < 6 or not text[:6].isdigit():
+        raise ValueError(f"time of day {text!r}")
+    return int(text[:2]) * 3600.0 + int(text[2:4]) * 60.0 + float(text[4:])
+
+
+def _track(course: str, knots: str) -> Row:
+    angle, speed = _number(course) * _DEG, _number(knots) * _KNOT
+    if speed == 0.0 and math.isnan(angle):
+        angle = 0.0  # a ship at rest has no course
+    return {
+        "course": angle,
+        "speed": speed,
+        "velocity_north": speed * math.cos(angle),
+        "velocity_east": speed * math.sin(angle),
+    }
+
+
+def _gga(f: Fields) -> Row:
+    if f[5] in ("", "0"):
+        raise _NoFixError
+    separation = _number(f[10])
+    altitude = _number(f[8])
+    return {
+        "time_of_day": _time_of_day(f[0]),
+        "latitude": _angle(f[1], f[2]),
+        "longitude": _angle(f[3], f[4]),
+        "quality": float(f[5]),
+        "satellites": _number(f[6]),
+        "hdop": _number(f[7]),
+        "altitude": altitude,
+        "separation": separation,
+        "height": altitude + (0.0 if math.isnan(separation) else separation),
+    }
+
+
+def _gll(f: Fields) -> Row:
+    if len(f) > 5 and f[5] == "V":
+        raise _NoFixError
+    tod = _time_of_day(f[4]) if len(f) > 4 else math.nan
+    return {"time_of_day": tod, "latitude": _angle(f[0], f[1]), "longitude": _angle(f[2], f[3])}
+
+
+def _rmc(f: Fields) -> Row:
+    if f[1] == "V":
+        raise _NoFixError
+    place = {"time_of_day": _time_of_day(f[0]), "latitude": _angle(f[2], f[3]), "longitude": _angle(f[4], f[5])}
+    return place | _track(f[7], f[6])
+
+
+def _zda(f: Fields) -> Row:
+    return {"time_of_day": _time_of_day(f[0])}
+
+
+def _vtg(f: Fields) -> Row:
+    return _track(f[0], f[4])
+
+
+def _hdt(f: Fields) -> Row:
+    return {"heading": _number(f[0]) * _DEG}
+
+
+def _vhw(f: Fields) -> Row:
+    return {"heading": _number(f[0]) * _DEG, "speed": _number(f[4]) * _KNOT}
+
+
+def _vbw(f: Fields) -> Row:
+    return {
+        "speed": _number(f[0]) * _KNOT,
+        "speed_starboard": _number(f[1]) * _KNOT,
+        "ground_forward": _number(f[3]) * _KNOT,
+        "ground_starboard": _number(f[4]) * _KNOT,
+    }
+
+
+def _dpt(f: Fields) -> Row:
+    return {"depth": _number(f[0]), "offset": _number(f[1]) if len(f) > 1 else math.nan}
+
+
+def _psxn23(f: Fields) -> Row:
+    return {
+        "roll": _number(f[0]) * _DEG,
+        "pitch": _number(f[1]) * _DEG,
+        "heading": _number(f[2]) * _DEG,
+        "heave": _number(f[3]) if len(f) > 3 else math.nan,
+    }
+
+
+def _uvh(f: Fields) -> Row:
+    east, north, heading = _number(f[0]) * _KNOT, _number(f[1]) * _KNOT, _number(f[2]) * _DEG
+    return {
+        "east": east,
+        "north": north,
+        "heading": heading,
+        "speed": north * math.cos(heading) + east * math.sin(heading),
+        "speed_starboard": east * math.cos(heading) - north * math.sin(heading),
+    }
+
+
+#: Decoder of each sentence: its fields after the name, to named values in SI units and radians.
+SENTENCES: Mapping[str, Callable[[Fields], Row]] = {
+    "GGA": _gga,
+    "GLL": _gll,
+    "RMC": _rmc,
+    "ZDA": _zda,
+    "VTG": _vtg,
+    "HDT": _hdt,
+    "THS": _hdt,
+    "VHW": _vhw,
+    "VBW": _vbw,
+    "DPT": _dpt,
+    "PSXN,23": _psxn23,
+    "PUHAW,UVH": _uvh,
+}
+
+#: Columns that a kind of instrument (or part of the reference) takes where the scenario names none.
+DEFAULT_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    **{name: kind.values for name, kind in KINDS.items()},
+    "gnss_velocity": ("velocity_north", "velocity_east", "=0"),
+    "dvl": ("ground_forward", "ground_starboard", "=0"),
+    "position": ("latitude", "longitude", "height"),
+    "velocity": ("velocity_north", "velocity_east", "=nan"),
+    "attitude": ("roll", "pitch", "heading"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class NmeaFile:
+    """The sentences of one file: a table for each (talker, sentence).
+
+    Each table has the columns of its sentence, and ``logger`` and ``sentence``: UTC seconds since 1970 (or since
+    midnight where the file has no stamps).
+    """
+
+    path: str
+    tables: Mapping[tuple[str, str], Table]
+
+    def table(self, sentence: str, talker: str | None = None) -> Table:
+        """The table of a sentence.
+
+        Raises
+        ------
+        LogError
+            If the file has no such sentence, or several talkers say it and none was chosen.
+        """
+        found = [key for key in self.tables if key[1] == sentence and talker in (None, key[0])]
+        if not found:
+            have = sorted({s if t == "P" else t + s for t, s in self.tables})
+            want = sentence if talker is None else talker + sentence
+            known = "" if sentence in SENTENCES else f" (sentences that are understood: {', '.join(SENTENCES)})"
+            raise LogError(f"{self.path}: there is no sentence {want!r}{closest(want, have)}{known}")
+        if len(found) > 1:
+            talkers = ", ".join(sorted(t for t, _ in found))
+            raise LogError(f"{self.path}: several talkers say {sentence!r}: {talkers}; choose one by 'talker'")
+        return self.tables[found[0]]
+
+
+def read_nmea(path: Path) -> NmeaFile:
+    """Read an NMEA log; kept for the life of the process, as long as the file does not change.
+
+    Lines with a bad checksum and lines that cannot be understood are left out, with one `LogWarning` for each kind that
+    counts them; a sentence without a checksum is accepted.
+
+    Raises
+    ------
+    LogError
+        If the file is absent or has no sentence that is understood.
+    """
+    try:
+        status = os.stat(path)
+    except OSError:
+        raise LogError(f"{path}: there is no such file") from None
+    return _read_nmea(path, status.st_mtime_ns, status.st_size)
+
+
+def _checksum_ok(body: str, given: str) -> bool:
+    total = 0
+    for c in body:
+        total ^= ord(c)
+    try:
+        return total == int(given[:2], 16)
+    except ValueError:
+        return False
+
+
+def _stamp(text: str) -> float:
+    try:
+        moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
+    except ValueError:
+        return math.nan
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def _near(tod: float, about: float) -> float:
+    """The moment with a time of day that is nearest to another moment (the day may differ by one)."""
+    return about + (tod - about + 43200.0) % 86400.0 - 43200.0
+
+
+@lru_cache(maxsize=64)
+def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
+    rows: dict[tuple[str, str], list[tuple[int, float, float, Row]]] = {}
+    bad_sum: list[int] = []
+    bad_line: list[int] = []
+    epoch = math.nan  # the last time of day that a sentence gave, as a moment
+    with open(path, encoding="latin-1") as lines:
+        for number, line in enumerate(lines, 1):
+            at = line.find("$")
+            if at < 0:
+                if line.strip():
+                    bad_line.append(number)
+                continue
+            body, star, given = line[at + 1 :].strip().partition("*")
+            if star and not _checksum_ok(body, given):
+                bad_sum.append(number)
+                continue
+            name, *fields = body.split(",")
+            if name.startswith("P"):
+                talker, sentence = "P", name
+                if fields and f"{name},{fields[0]}" in SENTENCES:
+                    sentence, fields = f"{name},{fields[0]}", fields[1:]
+            else:
+                talker, sentence = name[:-3], name[-3:]
+            decode = SENTENCES.get(sentence)
+            if decode is None:
+                continue
+            try:
+                row = decode(fields)
+                stamp = _stamp(line[:at])
+                tod = row.pop("time_of_day", math.nan)
+                if not math.isnan(tod):
+                    about = epoch if math.isnan(stamp) else stamp
+                    epoch = tod if math.isnan(about) else _near(tod, about)
+            except _NoFixError:
+                continue
+            except (ValueError, IndexError):
+                bad_line.append(number)
+                continue
+            rows.setdefault((talker, sentence), []).append((number, stamp, epoch, row))
+    for bad, what in ((bad_sum, "have a bad checksum"), (bad_line, "are not understood")):
+        if bad:
+            warnings.warn(
+                f"{path}: {len(bad)} lines {what} and are left out, the first is line {bad[0]}", LogWarning, 4
+            )
+    if not rows:
+        raise LogError(f"{path}: there is no NMEA sentence that is understood ({', '.join(SENTENCES)})")
+    tables = {}
+    for (talker, sentence), entries in rows.items():
+        columns = {
+            "logger": np.array([e[1] for e in entries]),
+            "sentence": np.array([e[2] for e in entries]),
+        }
+        for key in entries[0][3]:
+            columns[key] = np.array([e[3][key] for e in entries])
+        source = f"{path} ({sentence if talker == 'P' else talker + sentence})"
+        tables[talker, sentence] = Table(source, columns, np.array([e[0] for e in entries]), numbered=False)
+    return NmeaFile(str(path), tables)

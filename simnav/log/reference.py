@@ -1,0 +1,130 @@
+"""The reference trajectory of a log, at any time: for the epochs, for the start and for simulated instruments."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.earth import displace, relative_position
+from simnav.log.channel import Series
+from simnav.rotation import wrap_angle
+from simnav.types import Array, NavigationStates, TapStates
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+__all__ = ["Reference"]
+
+
+class _Track:
+    """One series, interpolated by a cubic spline; not a number outside of it and inside its holes."""
+
+    def __init__(self, time: Array, value: Array, max_gap: float | None):
+        from scipy.interpolate import CubicSpline
+
+        self.time = time
+        spacing = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+        self.max_gap = 1.5 * spacing if max_gap is None else max_gap
+        self.near = 0.1 * spacing  # so close to a sample a hole beside it does not matter
+        self.spline: list[CubicSpline | None] = [
+            CubicSpline(time, column) if len(time) > 1 and np.isfinite(column).all() else None for column in value.T
+        ]
+
+    def covered(self, time: Array) -> NDArray[np.bool_]:
+        tolerance = 1e-6
+        after = np.clip(np.searchsorted(self.time, time), 1, max(1, len(self.time) - 1))
+        before = after - 1
+        if len(self.time) == 1:
+            return np.asarray(np.abs(time - self.time[0]) < tolerance)
+        left, right = time - self.time[before], self.time[after] - time
+        inside = (left > -tolerance) & (right > -tolerance)
+        return np.asarray(inside & ((left + right <= self.max_gap) | (np.minimum(left, right) <= self.near)))
+
+    def __call__(self, time: Array, derivative: int = 0) -> Array:
+        """(n, 3) values, or derivatives, at n times; without regard to holes."""
+        nothing = np.full(len(time), np.nan)
+        return np.stack([nothing if s is None else s(time, derivative) for s in self.spline], axis=-1)
+
+
+class Reference:
+    """The reference trajectory.
+
+    Parameters
+    ----------
+    position : Series
+    velocity, attitude : Series or None
+    max_gap : float or None
+        Longest hole that is interpolated [s]; default one and a half times the usual spacing.
+
+    Attributes
+    ----------
+    time : (n,) array
+        Times of the positions, on the clock of the log.
+    """
+
+    def __init__(
+        self, position: Series, velocity: Series | None, attitude: Series | None, max_gap: float | None = None
+    ):
+        self.time = position.time
+        self._origin = position.value[0]
+        self._position = _Track(position.time, relative_position(position.value, self._origin), max_gap)
+        self._velocity = None if velocity is None else _Track(velocity.time, velocity.value, max_gap)
+        self._attitude = None if attitude is None else _Track(attitude.time, np.unwrap(attitude.value, axis=0), max_gap)
+
+    @property
+    def has_attitude(self) -> bool:
+        """Whether there is any attitude in it."""
+        return self._attitude is not None
+
+    def states(self, time: Array) -> NavigationStates:
+        """The reference at n times; not a number where it has nothing to say (outside, or in a hole)."""
+        time = np.asarray(time, dtype=np.float64)
+        parts = []
+        for track in (self._position, self._velocity, self._attitude):
+            value = np.full((len(time), 3), np.nan)
+            if track is not None:
+                covered = track.covered(time)
+                value[covered] = track(time[covered])
+            parts.append(value)
+        return NavigationStates(time, displace(self._origin, parts[0]), parts[1], wrap_angle(parts[2]))
+
+    def motion(self, time: Array) -> tuple[Array, Array]:
+        """Velocity and acceleration, north-east-down, differentiated from the positions."""
+        time = np.asarray(time, dtype=np.float64)
+        return self._position(time, 1), self._position(time, 2)
+
+    def taps(self, time: Array) -> TapStates:
+        """What a simulated instrument sees at n times, holes interpolated.
+
+        Velocity comes from the positions where the reference has none. The water is taken to rest. Angular rate is that
+        of the interpolated roll, pitch and yaw (Groves eq. 2.58, inverted).
+
+        Raises
+        ------
+        ValueError
+            If the reference has no attitude.
+        """
+        if self._attitude is None:
+            raise ValueError("an instrument with source = 'reference' needs [log.reference.attitude]")
+        time = np.asarray(time, dtype=np.float64)
+        derived, _ = self.motion(time)
+        velocity = derived if self._velocity is None else self._velocity(time)
+        velocity = np.where(np.isfinite(velocity), velocity, derived)
+        angle, rate = np.nan_to_num(self._attitude(time)), np.nan_to_num(self._attitude(time, 1))
+        sr, cr = np.sin(angle[:, 0]), np.cos(angle[:, 0])
+        sp, cp = np.sin(angle[:, 1]), np.cos(angle[:, 1])
+        body = [
+            rate[:, 0] - rate[:, 2] * sp,
+            rate[:, 1] * cr + rate[:, 2] * cp * sr,
+            rate[:, 2] * cp * cr - rate[:, 1] * sr,
+        ]
+        return TapStates(
+            time,
+            displace(self._origin, self._position(time)),
+            velocity,
+            wrap_angle(angle),
+            np.stack(body, axis=-1),
+            np.zeros((len(time), 3)),
+        )

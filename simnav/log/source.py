@@ -1,0 +1,288 @@
+"""A real log through the same door as the simulator.
+
+The measurements and the reference are those of the log; a seed chooses the recording and draws the initial error, the
+faults and the instruments that are simulated from the reference.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.earth import gravity
+from simnav.log.channel import ImuSeries, Series, list_recordings, read_channel, read_imu
+from simnav.log.reference import Reference
+from simnav.log.table import LogError, LogWarning
+from simnav.recording import AidStream, Block, ImuLabels
+from simnav.sensors import build_layers, labels
+from simnav.start import draw_start
+from simnav.types import Array, ImuSamples, NavigationStates
+
+if TYPE_CHECKING:
+    from simnav.log.spec import RecordedSpec
+    from simnav.scenario import Scenario
+
+__all__ = ["LogSource"]
+
+#: Half a microsecond decides on which side of an edge a time lies, as in `simnav.recording.packets`.
+_TOLERANCE = 0.5e-6
+#: Below this speed the course says nothing about the heading [m/s].
+_LEAST_SPEED = 1.0
+#: How long the accelerometers are averaged for roll and pitch [s].
+_LEVELLING = 2.0
+
+
+class LogSource:
+    """One run over one recording of a log.
+
+    Time 0 is the first epoch of the reference that the IMU covers (after ``log.skip``). The run is as long as the
+    scenario says, or as the recording reaches. White noise labels (``AidStream.sigma``) of real measurements are those
+    of the datasheet, since nobody knows the true ones.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a ``[log]``.
+    seed : int
+        Recording number ``seed`` modulo their count; and the run's randomness.
+
+    Attributes
+    ----------
+    recording : str
+        Name of the recording.
+    note : str
+        Which recording this is, and what in it is not measured.
+    instruments, start, initial_truth, faults, duration, step
+        As of the simulator. Components that the reference lacks are NaN in ``initial_truth`` and in the truth of the
+        blocks; in ``start`` they are made from the motion and the accelerometers.
+
+    Raises
+    ------
+    LogError
+        If the log is absent or cannot be used: one sentence with file, line and column.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int):
+        log = scenario.log
+        if log is None:
+            raise LogError(f"the scenario {scenario.id!r} has no [log]; it is simulated")
+        names = list_recordings(log)
+        self.recording = names[seed % len(names)]
+        self.instruments = scenario.instruments_sheet()
+        self.step = float(scenario.step)
+        reference = _reference(log, self.recording)
+        imu = None if log.imu is None else read_imu(log, log.imu, self.recording)
+        begin = _begin(log, reference, imu)
+        end = min(reference.time[-1], math.inf if imu is None else imu.edge[-1])
+        self.duration = self._length(scenario.duration, float(end - begin))
+        self._reference, self._begin, self._now = reference, begin, 0.0
+        self._imu = None
+        notes = [f"recording {self.recording!r}"] if self.recording else []
+        if imu is not None and log.imu is not None:
+            self._imu, resampled = _regrid(imu, begin, self.instruments.imu.rate, self.duration)  # type: ignore[union-attr]
+            notes.append(f"IMU samples were {log.imu.samples}" + (", resampled" if resampled else ""))
+        self.initial_truth = self._states(np.zeros(1))
+        told, made = _start(reference, self.initial_truth, imu, begin)
+        if made:
+            notes.append(f"start {' and '.join(made)} not from the reference")
+        self._aids = self._measure(scenario, log, seed)
+        simulated = [n for n, i in log.instruments.items() if i.source == "reference"]
+        if simulated:
+            notes.append(f"simulated from the reference: {', '.join(simulated)}")
+        self.note = "; ".join(notes)
+        self.start = draw_start(told, scenario.initial_error.covariance(), seed)
+        self._imu_labels: ImuLabels | None = None
+        if self._imu is not None and any("imu" in f.instruments for f in scenario.faults):
+            n = len(self._imu)
+            self._imu_labels = ImuLabels(np.zeros(n, np.uint32), np.zeros((n, 6)))
+        self.faults = labels(scenario.faults, self.duration, {n: s.kind for n, s in scenario.aids.items()})
+        for layer in build_layers(scenario.faults, seed):
+            self._aids = {n: layer.apply(s) for n, s in self._aids.items()}
+            if self._imu is not None:
+                self._imu, self._imu_labels = layer.apply_imu(self._imu, self._imu_labels)
+
+    def _length(self, wanted: float, available: float) -> float:
+        if wanted <= available + _TOLERANCE:
+            return float(wanted)
+        steps = math.floor(available / self.step + 1e-9)
+        if steps < 1:
+            raise LogError(f"recording {self.recording!r}: IMU and reference have only {available:.3f} s in common")
+        length = steps * self.step
+        message = (
+            f"recording {self.recording!r}: the run ends at {length:g} s, where the log does ({wanted:g} s are wanted)"
+        )
+        warnings.warn(message, LogWarning, 3)
+        return length
+
+    def _states(self, time: Array) -> NavigationStates:
+        return replace(self._reference.states(self._begin + time), time=time)
+
+    def _measure(self, scenario: Scenario, log: RecordedSpec, seed: int) -> dict[str, AidStream]:
+        """The streams of all aiding instruments, without faults."""
+        streams = {}
+        for name, spec in scenario.aids.items():
+            where = log.instruments[name]
+            sheet = self.instruments[name]
+            if where.source == "reference":
+                first = 1 if spec.phase <= _TOLERANCE else 0
+                count = math.floor((self.duration - spec.phase) * spec.rate + 1e-9) + 1
+                time = spec.phase + np.arange(first, count) / spec.rate
+                try:
+                    tap = replace(self._reference.taps(self._begin + time), time=time)
+                except ValueError as error:
+                    raise LogError(f"instruments.{name}: {error}") from None
+                streams[name] = spec.build(name, seed, water_depth=scenario.water_depth).sense(tap)
+                continue
+            series = read_channel(log, where.channel(), spec.kind, self.recording)
+            time = series.time - self._begin
+            inside = (time > _TOLERANCE) & (time <= self.duration + _TOLERANCE)
+            if not inside.any():
+                raise LogError(
+                    f"{series.source}: none of the {len(time)} measurements of {name!r} lies within the run; they are "
+                    f"at {time[0]:.3f} to {time[-1]:.3f} s of it (check clock and offset_s)"
+                )
+            value = series.value[inside]
+            sigma = np.tile(sheet.sigma, (len(value), 1))
+            nothing = np.zeros(len(value), np.uint32)
+            streams[name] = AidStream(
+                name, spec.kind, time[inside], value, nothing, np.zeros_like(sigma), sigma, np.empty(0)
+            )
+        return streams
+
+    def advance(self, until: float) -> Block:
+        """The next stretch of the run, up to a time [s] (at most the duration)."""
+        until = min(float(until), self.duration)
+        begin, self._now = self._now, until
+        if until < begin - _TOLERANCE:
+            raise ValueError(f"the run is at {begin:g} s and cannot go back to {until:g} s")
+        first, last = (math.floor(t / self.step + 1e-6) for t in (begin, until))
+        aids = {n: _cut(s, begin, until) for n, s in self._aids.items()}
+        imu, labels = None, None
+        if self._imu is not None:
+            a, b = np.searchsorted(self._imu.time, [begin + _TOLERANCE, until + _TOLERANCE], side="right")
+            imu = self._imu[a:b]
+            if self._imu_labels is not None:
+                labels = ImuLabels(self._imu_labels.faults[a:b], self._imu_labels.fault_error[a:b])
+        truth = self._states(self.step * np.arange(first + 1.0, last + 1.0))
+        return Block(begin, until, imu, labels, aids, truth)
+
+
+def _cut(s: AidStream, begin: float, until: float) -> AidStream:
+    edges = [begin + _TOLERANCE, until + _TOLERANCE]
+    a, b = np.searchsorted(s.time, edges, side="right")
+    c, d = np.searchsorted(s.dropped, edges, side="right")
+    parts: dict[str, Any] = {n: getattr(s, n)[a:b] for n in ("time", "value", "faults", "fault_error", "sigma")}
+    return replace(s, **parts, dropped=s.dropped[c:d])
+
+
+def _reference(log: RecordedSpec, recording: str) -> Reference:
+    spec = log.reference
+
+    def series(name: str) -> Series | None:
+        channel = getattr(spec, name)
+        return None if channel is None else read_channel(log, channel, name, recording)
+
+    position = series("position")
+    assert position is not None
+    return Reference(position, series("velocity"), series("attitude"), spec.max_gap)
+
+
+def _begin(log: RecordedSpec, reference: Reference, imu: ImuSeries | None) -> float:
+    """The first epoch of the reference that the IMU covers and at which all that it has is there."""
+    earliest = float(reference.time[0] if imu is None else imu.edge[0]) + log.skip
+    time = reference.time[reference.time >= earliest - _TOLERANCE]
+    if imu is not None:
+        time = time[time < imu.edge[-1]]
+    states = reference.states(time)
+    whole = np.isfinite(states.position).all(axis=1)
+    if log.reference.velocity is not None:
+        whole &= np.isfinite(states.velocity[:, :2]).all(axis=1)
+    if log.reference.attitude is not None:
+        whole &= np.isfinite(states.attitude[:, 2])
+    if not whole.any():
+        other = "" if imu is None else f" and of the IMU ({imu.source}: {imu.edge[0]:.3f} to {imu.edge[-1]:.3f} s)"
+        raise LogError(
+            f"the clocks of the reference ({reference.time[0]:.3f} to {reference.time[-1]:.3f} s){other} have no epoch "
+            f"in common that has all parts of the reference; check scale, offset_s, spacing_s and skip_s"
+        )
+    return float(time[whole][0])
+
+
+def _regrid(imu: ImuSeries, begin: float, rate: float, duration: float) -> tuple[ImuSamples, bool]:
+    """The samples on the grid of the run, and whether they had to be resampled.
+
+    Resampling interpolates the integral linearly, which keeps every increment that falls into a step.
+    """
+    count = round(duration * rate)
+    grid = np.arange(count + 1) / rate
+    edge = imu.edge - begin
+    interval = np.full(count, 1.0 / rate)
+    first = int(np.searchsorted(edge, -_TOLERANCE))
+    here = edge[first : first + count + 1]
+    if len(here) == count + 1 and np.max(np.abs(here - grid)) < 1e-6:
+        mean, resampled = imu.mean[first : first + count], False
+    else:
+        integral = np.zeros((len(edge), 6))
+        np.cumsum(imu.mean * np.diff(edge)[:, None], axis=0, out=integral[1:])
+        on_grid = np.stack([np.interp(grid, edge, column) for column in integral.T], axis=-1)
+        mean, resampled = np.diff(on_grid, axis=0) * rate, True
+    rates, forces = np.ascontiguousarray(mean[:, :3]), np.ascontiguousarray(mean[:, 3:])
+    return ImuSamples(grid[1:], interval, rates, forces), resampled
+
+
+def _start(
+    reference: Reference, truth: NavigationStates, imu: ImuSeries | None, begin: float
+) -> tuple[NavigationStates, list[str]]:
+    """The state at time 0, complete, and what of it is not the reference's."""
+    velocity, attitude, made = truth.velocity[0].copy(), truth.attitude[0].copy(), []
+    derived = reference.motion(np.array([begin]))[0][0]
+    if not np.isfinite(velocity[:2]).all():
+        made.append("velocity (differentiated positions)")
+    velocity = np.where(np.isfinite(velocity), velocity, derived)
+    if not np.isfinite(attitude[2]):
+        if np.hypot(velocity[0], velocity[1]) < _LEAST_SPEED:
+            raise LogError(
+                "the reference has no attitude, and the vessel is too slow at the start for a heading from its course; "
+                "leave out the part before by skip_s"
+            )
+        attitude[2] = math.atan2(velocity[1], velocity[0])
+        made.append("heading (course over ground)")
+    if not np.isfinite(attitude[:2]).all():
+        attitude[:2] = 0.0
+        if imu is not None:
+            attitude[:2] = _level(reference, imu, begin, attitude[2], truth.position[0])
+            made.append("roll and pitch (accelerometers)")
+        else:
+            made.append("roll and pitch (zero)")
+    return NavigationStates(truth.time, truth.position, velocity[None], attitude[None]), made
+
+
+def _level(reference: Reference, imu: ImuSeries, begin: float, heading: float, position: Array) -> Array:
+    """Roll and pitch from the mean specific force over a short time, less the acceleration of the reference."""
+    middle = 0.5 * (imu.edge[1:] + imu.edge[:-1])
+    here = (middle > begin) & (middle < begin + _LEVELLING)
+    if not here.any():
+        return np.zeros(2)
+    time = middle[here]
+    course, acceleration = reference.motion(time)
+    turned = np.arctan2(course[:, 1], course[:, 0])
+    turned += heading - turned[0]
+    c, s = np.cos(turned), np.sin(turned)
+    level = np.stack(
+        [
+            c * acceleration[:, 0] + s * acceleration[:, 1],
+            c * acceleration[:, 1] - s * acceleration[:, 0],
+            acceleration[:, 2] - gravity(position[0], position[2]),
+        ],
+        axis=-1,
+    ).mean(axis=0)
+    force = imu.mean[here, 3:].mean(axis=0)
+    # Small tilts: the force that is missing forward is gravity on the pitch, the one to starboard on the roll.
+    g = -level[2]
+    pitch = math.asin(max(-1.0, min(1.0, (force[0] - level[0]) / g)))
+    roll = -math.asin(max(-1.0, min(1.0, (force[1] - level[1]) / g)))
+    return np.array([roll, pitch])

@@ -1,0 +1,302 @@
+"""How a real log is described: the ``[log]`` table of a recorded scenario.
+
+Files give columns (CSV) or sentences (NMEA 0183) with a clock; channels pick columns of a file, with sign, order and
+unit; the IMU, the aiding instruments and the reference are channels. Nothing here reads a file.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from simnav.spec import UNITS, NonNegative, Positive, Spec, closest, quantity
+
+__all__ = [
+    "LOG_UNITS",
+    "ChannelSpec",
+    "FileSpec",
+    "LogImuSpec",
+    "LogInstrumentSpec",
+    "OriginSpec",
+    "RecordedSpec",
+    "ReferenceSpec",
+]
+
+#: Factor to SI of every unit that a column of a log may have: those of TOML keys, and some that only logs have.
+LOG_UNITS = {
+    **UNITS,
+    "1": 1.0,
+    "rad": 1.0,
+    "rad_s": 1.0,
+    "mm": 1e-3,
+    "km": 1e3,
+    "ft": 0.3048,
+    "mm_s": 1e-3,
+    "km_h": 1.0 / 3.6,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+}
+
+#: A column: its header, or its number counted from 1; a minus before it flips the sign; ``"=0.0"`` is a constant.
+Column = int | str
+_Every = Annotated[int, Field(ge=1)]
+
+
+class FileSpec(Spec):
+    """One file of a recording, and its clock.
+
+    Attributes
+    ----------
+    path : str
+        Below the folder; ``{recording}`` stands for the recording's name.
+    format : {"csv", "nmea"}
+        ``csv`` is any table of numbers, with or without a header, separated by comma, semicolon, tab or blank.
+    time : int or str
+        CSV: the column of the time.
+    time_unit : str
+        CSV: unit of the time column, or ``iso`` for dates like ``2014-08-01T00:00:00.124Z``.
+    clock : {"logger", "sentence"}
+        NMEA: the stamp that the logger put before each line, or the UTC time inside the sentence (a sentence without
+        one has that of the last sentence before it in the file that has one).
+    spacing : float or None
+        True spacing of the rows [s], where the time column is not to be trusted: row k is at k times this.
+    scale : float
+        Multiplies the times.
+    offset : float or tuple of float
+        Added to the times, after ``scale`` or ``spacing`` [s]; one for each recording, or one for all.
+    skip_rows : int
+        CSV: rows of data to leave out at the beginning.
+    """
+
+    path: str
+    format: Literal["csv", "nmea"] = "csv"
+    time: Column = 1
+    time_unit: str = "s"
+    clock: Literal["logger", "sentence"] = "logger"
+    spacing: Positive | None = quantity("s", None)
+    scale: Positive = 1.0
+    offset: float | tuple[float, ...] = quantity("s", 0.0)
+    skip_rows: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.time_unit != "iso":
+            _check_units((self.time_unit,))
+        return self
+
+
+class ChannelSpec(Spec):
+    """Columns of a file, in the order that the instrument wants them.
+
+    Attributes
+    ----------
+    file : str
+        A key of ``[log.files]``.
+    sentence, talker : str or None
+        NMEA: e.g. ``GGA`` and ``GP``; of a proprietary sentence all up to its first number, e.g. ``PSXN,23``.
+    columns : tuple
+        Names or numbers (from 1), ``-`` before a name flips its sign, ``"=0"`` is a constant; empty for what the
+        sentence holds of this instrument.
+    units : str or tuple of str
+        Of the columns, one or one each (keys of `LOG_UNITS`); SI and radians where left out, as in NMEA sentences once
+        they are read.
+    frame : {"geodetic", "enu", "ned"}
+        Of a position: latitude, longitude, height, or local Cartesian around ``[log.origin]``.
+    every : int
+        Take only the rows 0, every, 2 every, ...
+    hold_out : int or None
+        Leave out the rows 0, hold_out, 2 hold_out, ...
+    """
+
+    file: str
+    sentence: str | None = None
+    talker: str | None = None
+    columns: tuple[Column, ...] = ()
+    units: str | tuple[str, ...] = ()
+    frame: Literal["geodetic", "enu", "ned"] = "geodetic"
+    every: _Every = 1
+    hold_out: Annotated[int, Field(ge=2)] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_units((self.units,) if isinstance(self.units, str) else self.units)
+        if isinstance(self.units, tuple) and len(self.units) not in (0, len(self.columns)):
+            raise ValueError(
+                f"{len(self.units)} units for {len(self.columns)} columns; give one unit, or one for each column"
+            )
+        return self
+
+
+class LogInstrumentSpec(Spec):
+    """Where the measurements of one aiding instrument come from.
+
+    Attributes
+    ----------
+    source : {"file", "reference"}
+        ``reference``: simulated from the reference with the instrument's own error model.
+    file, sentence, talker, columns, units, frame, every, hold_out
+        As in `ChannelSpec`, for ``source = "file"``.
+    """
+
+    source: Literal["file", "reference"] = "file"
+    file: str | None = None
+    sentence: str | None = None
+    talker: str | None = None
+    columns: tuple[Column, ...] = ()
+    units: str | tuple[str, ...] = ()
+    frame: Literal["geodetic", "enu", "ned"] = "geodetic"
+    every: _Every = 1
+    hold_out: Annotated[int, Field(ge=2)] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.source == "file":
+            self.channel()
+        elif self.file is not None or self.columns:
+            raise ValueError("source = 'reference' reads no file; leave out 'file' and 'columns'")
+        return self
+
+    def channel(self) -> ChannelSpec:
+        """The columns in the file."""
+        if self.file is None:
+            raise ValueError("'file' is missing; name a key of [log.files], or say source = 'reference'")
+        return ChannelSpec(**self.model_dump(exclude={"source"}))
+
+
+class LogImuSpec(Spec):
+    """The columns of the IMU.
+
+    Attributes
+    ----------
+    file : str
+        A key of ``[log.files]``.
+    samples : {"means", "increments", "instantaneous"}
+        What a row holds: the mean over the interval that ends at its time; the increment over that interval (angle
+        [rad], velocity [m/s]); or the value at its time. The latter two are converted to means on import:
+        increments are divided by their interval, instantaneous values averaged with the row before (trapezoid).
+    angular_rate, specific_force : tuple
+        Columns in the order forward, starboard, down; ``-`` before a name flips its sign.
+    angular_rate_unit, specific_force_unit : str
+        Keys of `LOG_UNITS`; of increments the unit of the increment.
+    max_gap : float
+        Longest hole between two rows that is bridged [s].
+    """
+
+    file: str
+    samples: Literal["means", "increments", "instantaneous"] = "means"
+    angular_rate: tuple[Column, Column, Column]
+    specific_force: tuple[Column, Column, Column]
+    angular_rate_unit: str = "rad_s"
+    specific_force_unit: str = "m_s2"
+    max_gap: Positive = quantity("s", 0.1)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_units((self.angular_rate_unit, self.specific_force_unit))
+        return self
+
+
+class OriginSpec(Spec):
+    """Origin of local Cartesian positions."""
+
+    latitude: Annotated[float, Field(ge=-1.5708, le=1.5708)] = quantity("deg")
+    longitude: float = quantity("deg")
+    height: float = quantity("m", 0.0)
+
+
+class ReferenceSpec(Spec):
+    """The reference trajectory that estimates are scored against, for want of the truth.
+
+    Attributes
+    ----------
+    position : ChannelSpec
+    velocity, attitude : ChannelSpec or None
+        North-east-down; roll, pitch, yaw. Where absent they are not scored, and the start is made from the positions
+        (velocity, heading along the course) and from the accelerometers (roll, pitch).
+    max_gap : float or None
+        The reference is interpolated across holes up to this long [s]; default one and a half times its usual spacing.
+    """
+
+    position: ChannelSpec
+    velocity: ChannelSpec | None = None
+    attitude: ChannelSpec | None = None
+    max_gap: Positive | None = quantity("s", None)
+
+
+class RecordedSpec(Spec):
+    """The ``[log]`` table of a recorded scenario.
+
+    Attributes
+    ----------
+    folder : str
+        Below the data root, which is the environment variable ``SIMNAV_DATA``, or ``data`` in the working directory.
+        ``gtsam:`` takes the example data that comes with gtsam.
+    recordings : str or tuple of str
+        Names that take the place of ``{recording}`` in the paths, or a pattern (``"*"``) to find them with. Seed s
+        takes recording s modulo their number, in sorted order where they were found by a pattern.
+    files : dict of FileSpec
+    imu : LogImuSpec or None
+    instruments : dict of LogInstrumentSpec
+        By the names of the scenario's instruments.
+    reference : ReferenceSpec
+    origin : OriginSpec or None
+        Of local Cartesian positions.
+    skip : float
+        Seconds to leave out at the beginning.
+    """
+
+    folder: str = ""
+    recordings: str | tuple[str, ...] = "*"
+    files: dict[str, FileSpec]
+    imu: LogImuSpec | None = None
+    instruments: dict[str, LogInstrumentSpec] = Field(default_factory=dict)
+    reference: ReferenceSpec
+    origin: OriginSpec | None = None
+    skip: NonNegative = quantity("s", 0.0)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        reference = self.reference
+        channels: list[tuple[str, ChannelSpec | LogImuSpec]] = [
+            (f"instruments.{n}", i.channel()) for n, i in self.instruments.items() if i.source == "file"
+        ]
+        channels += [
+            (f"reference.{n}", c)
+            for n, c in (
+                ("position", reference.position),
+                ("velocity", reference.velocity),
+                ("attitude", reference.attitude),
+            )
+            if c is not None
+        ]
+        if self.imu is not None:
+            channels.append(("imu", self.imu))
+        for name, channel in channels:
+            if channel.file not in self.files:
+                raise ValueError(f"{name}.file = {channel.file!r} is not in [log.files]{_near(channel.file, self)}")
+            if isinstance(channel, LogImuSpec):
+                if self.files[channel.file].format == "nmea":
+                    raise ValueError(f"{name}.file = {channel.file!r} is NMEA; an IMU needs a table (csv)")
+                continue
+            nmea = self.files[channel.file].format == "nmea"
+            if nmea and channel.sentence is None:
+                raise ValueError(f"{name}: the file {channel.file!r} is NMEA; say which 'sentence'")
+            if not nmea and not channel.columns:
+                raise ValueError(f"{name}: 'columns' is missing")
+            if channel.frame != "geodetic" and self.origin is None:
+                raise ValueError(f"{name}.frame = {channel.frame!r} needs [log.origin]")
+        if not isinstance(self.recordings, str) and not self.recordings:
+            raise ValueError("recordings = [] is empty; name at least one, or leave it out")
+        return self
+
+
+def _near(name: str, spec: RecordedSpec) -> str:
+    return closest(name, list(spec.files))
+
+
+def _check_units(units: tuple[str, ...]) -> None:
+    for unit in units:
+        if unit not in LOG_UNITS:
+            raise ValueError(f"unknown unit {unit!r}{closest(unit, list(LOG_UNITS))}")

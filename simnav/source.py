@@ -1,0 +1,86 @@
+"""Where measurements come from: the simulator or a real log, behind one door."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from simnav.recording import Block, FaultLabel, Recording
+from simnav.types import InitialState, Instruments, NavigationStates
+
+if TYPE_CHECKING:
+    from simnav.scenario import Scenario
+
+__all__ = ["Source", "open_source", "record"]
+
+
+class Source(Protocol):
+    """A run that is advanced block by block.
+
+    Attributes
+    ----------
+    instruments : Instruments
+    start : InitialState
+    initial_truth : NavigationStates
+    faults : tuple of FaultLabel
+    duration, step : float
+        [s]
+    """
+
+    instruments: Instruments
+    start: InitialState
+    initial_truth: NavigationStates
+    faults: tuple[FaultLabel, ...]
+    duration: float
+    step: float
+
+    def advance(self, until: float) -> Block:
+        """The next stretch of the run, up to a time [s]."""
+        ...
+
+
+def open_source(scenario: Scenario, seed: int) -> Source:
+    """Open one run of a scenario: the simulator, or a `simnav.log.LogSource` where the scenario is recorded.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+
+    Raises
+    ------
+    simnav.log.LogError
+        If the log of a recorded scenario is absent or cannot be used.
+    """
+    if scenario.log is not None:
+        from simnav.log.source import LogSource
+
+        return LogSource(scenario, seed)
+    from simnav.simulator import Simulator
+
+    return Simulator(scenario, seed)
+
+
+def record(scenario: Scenario, seed: int) -> Recording:
+    """Run a scenario to its end, in one block.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+
+    Returns
+    -------
+    Recording
+        Without the truth it would be what an estimator sees.
+    """
+    source = open_source(scenario, seed)
+    return Recording(
+        scenario.id,
+        seed,
+        source.instruments,
+        source.initial_truth,
+        source.start,
+        source.faults,
+        source.advance(source.duration),
+        getattr(source, "note", ""),
+    )
