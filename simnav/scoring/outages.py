@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.recording import Recording
+from simnav.recording import FaultLabel, Recording
 from simnav.scoring.navigation_error import horizontal
 from simnav.types import Array
 
@@ -14,6 +14,8 @@ __all__ = ["RECOVERY_THRESHOLD", "Outage", "outage_scores", "outages"]
 
 #: Horizontal error [m] below which an estimate has recovered: the 10 m of IMO A.1046(27).
 RECOVERY_THRESHOLD = 10.0
+
+_TOLERANCE = 0.5e-6  # s; times are multiples of the sample interval up to rounding
 
 
 @dataclass(frozen=True)
@@ -24,14 +26,16 @@ class Outage:
     ----------
     instruments : tuple of str
     start, end : float
-        [s], cut at the end of the run.
+        Times of the first measurement that was lost and of the first that came again [s]; ``end`` is infinite where
+        none came.
     end_error : float
-        Horizontal error at the last epoch of the outage [m].
+        Horizontal error at the last epoch before ``end`` [m].
     threshold : float
         That the horizontal error has to come under [m].
     recovery_time : float
-        From the end of the outage to the first epoch under the threshold [s]; 0 where the error never left it. Where
-        it does not recover before the next outage of a shared instrument or the end of the run, the time until then.
+        From ``end`` to the first epoch under the threshold [s]; 0 where the error stayed under it. Where it does not
+        recover before the next outage of these instruments or the end of the run, the time until then. NaN where
+        no measurement came again.
     recovered : bool
     """
 
@@ -52,52 +56,59 @@ def outages(error: Array, recording: Recording, *, threshold: float = RECOVERY_T
     error : (T, 9) array
         From `simnav.scoring.errors`.
     recording : Recording
-        Its fault labels of kind ``outage`` are the outages; those with the same start and end are one.
+        An outage is a stretch of measurements that a fault of kind ``outage`` took away; those of several instruments
+        of one fault that overlap are one.
     threshold : float
         [m]; an estimator that was worse when the outage began has to come back to what it was then.
 
     Returns
     -------
     list of Outage
-        In order of time; outages that begin after the last epoch of ``error`` are left out.
+        In order of time, as far as ``error`` reaches.
     """
     time, h = recording.data.truth.time[: len(error)], horizontal(error)
-    spans: dict[tuple[float, float], tuple[str, ...]] = {}
-    for fault in recording.faults:
-        if fault.kind == "outage":
-            span = (fault.start, fault.end)
-            spans[span] = tuple(dict.fromkeys(spans.get(span, ()) + fault.instruments))
+    spans = sorted((start, end, f.instruments) for f in recording.faults for start, end in _gaps(f, recording))
     result = []
-    for (start, end), instruments in sorted(spans.items()):
-        before = int(np.searchsorted(time, start + 1e-6, side="right")) - 1
-        last = int(np.searchsorted(time, end + 1e-6, side="right")) - 1
-        if last <= before or len(time) == 0:
+    for start, end, instruments in spans:
+        first, stop = (int(i) for i in np.searchsorted(time, [start - _TOLERANCE, end - _TOLERANCE]))
+        if first >= stop:  # after the last epoch, or between two
             continue
-        following = [s for (s, _), names in spans.items() if s > end and set(names) & set(instruments)]
-        limit = min([*following, float(time[-1])])
-        if before >= 0 and np.isfinite(h[before]):
-            level = max(threshold, float(h[before]))
-        else:
-            level = threshold
-        after = np.flatnonzero((np.arange(len(h)) >= last) & (time <= limit + 1e-6) & (h <= level))
-        recovered = len(after) > 0
-        back = float(time[after[0]]) if recovered else limit
-        result.append(
-            Outage(
-                instruments,
-                start,
-                min(end, float(time[-1])),
-                float(h[last]),
-                level,
-                max(0.0, back - float(time[last])),
-                recovered,
-            )
-        )
+        level = max(threshold, float(h[first - 1])) if first > 0 and np.isfinite(h[first - 1]) else threshold
+        nexts = [s for s, _, names in spans if s > start and set(names) & set(instruments)]
+        limit = min([*nexts, float(time[-1])])
+        under = np.flatnonzero(h[stop - 1 :] <= level)
+        back = float(time[stop - 1 + under[0]]) if len(under) else np.inf
+        wait = max(0.0, min(back, limit) - end) if stop < len(time) else float("nan")
+        result.append(Outage(instruments, start, end, float(h[stop - 1]), level, wait, back <= limit + _TOLERANCE))
     return result
 
 
+def _gaps(fault: FaultLabel, recording: Recording) -> list[tuple[float, float]]:
+    """The stretches without measurements that an outage made: from the first that was lost to the first that came."""
+    if fault.kind != "outage":
+        return []
+    found: list[tuple[float, float]] = []
+    for name in fault.instruments:
+        stream = recording.data.aids.get(name)
+        if stream is None:
+            continue
+        lost = stream.dropped[(stream.dropped >= fault.start - _TOLERANCE) & (stream.dropped < fault.end)]
+        following, index = np.unique(np.searchsorted(stream.time, lost), return_index=True)
+        found += [
+            (float(lost[i]), float(stream.time[j]) if j < len(stream) else np.inf)
+            for i, j in zip(index, following, strict=True)
+        ]
+    merged: list[tuple[float, float]] = []
+    for start, end in sorted(found):
+        if merged and start < merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(end, merged[-1][1]))
+        else:
+            merged.append((start, end))
+    return merged
+
+
 def outage_scores(error: Array, recording: Recording, *, threshold: float = RECOVERY_THRESHOLD) -> dict[str, float]:
-    """Means over the outages of a run; NaN without outages or without a position.
+    """Means over the outages of a run; NaN without outages or without a position. Recovery is of those that ended.
 
     Returns
     -------
@@ -105,12 +116,13 @@ def outage_scores(error: Array, recording: Recording, *, threshold: float = RECO
         ``outage_end_error``, ``outage_end_error_max``, ``recovery_time`` and ``recovered``: keys of
         `simnav.scoring.SCORES`.
     """
+    scores = dict.fromkeys(("outage_end_error", "outage_end_error_max", "recovery_time", "recovered"), float("nan"))
     known = [o for o in outages(error, recording, threshold=threshold) if np.isfinite(o.end_error)]
-    if not known:
-        return dict.fromkeys(("outage_end_error", "outage_end_error_max", "recovery_time", "recovered"), float("nan"))
-    return {
-        "outage_end_error": float(np.mean([o.end_error for o in known])),
-        "outage_end_error_max": max(o.end_error for o in known),
-        "recovery_time": float(np.mean([o.recovery_time for o in known])),
-        "recovered": float(np.mean([o.recovered for o in known])),
-    }
+    if known:
+        scores["outage_end_error"] = float(np.mean([o.end_error for o in known]))
+        scores["outage_end_error_max"] = max(o.end_error for o in known)
+    ended = [o for o in known if np.isfinite(o.recovery_time)]
+    if ended:
+        scores["recovery_time"] = float(np.mean([o.recovery_time for o in ended]))
+        scores["recovered"] = float(np.mean([o.recovered for o in ended]))
+    return scores
