@@ -167,7 +167,8 @@ def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
         direct = inf
     if direct < inf:
         return direct
-    wanted = (x[PSI_REFERENCE] - psi) / (4.0 * p[TAU_R])
+    # Steering the heading of rest makes the loop a plain exponential: its derivative is the commanded rate itself.
+    wanted = (x[PSI_REFERENCE] - rest) / (2.0 * p[TAU_R])
     return min(max(wanted, -x[RATE_LIMIT]), x[RATE_LIMIT])
 
 
