@@ -16,7 +16,8 @@ from gymnasium.envs.registration import registry as _registry
 from simnav.catalogue import headers as _headers
 
 if TYPE_CHECKING:
-    from simnav.environment import EstimatorAgent, NavigationEnv
+    from simnav.agent import EstimatorAgent
+    from simnav.environment import NavigationEnv
     from simnav.estimator import Estimator, UnsuitableScenario, register
     from simnav.recording import Recording
     from simnav.scenario import Scenario
@@ -68,7 +69,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "environment": ("EstimatorAgent", "NavigationEnv"),
+    "agent": ("EstimatorAgent",),
+    "environment": ("NavigationEnv",),
     "estimator": ("Estimator", "UnsuitableScenario", "register"),
     "recording": ("Recording",),
     "scenario": ("Scenario",),

@@ -17,6 +17,7 @@ so that every step is estimated and scored exactly once; the observation that co
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,15 +30,14 @@ from numpy.typing import NDArray
 
 from simnav.earth import principal_radii
 from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
-from simnav.types import KINDS, Array, Estimate, ImuSamples, InitialState, Instruments, Measurement, Measurements
+from simnav.types import KINDS, Array, InitialState
 
 if TYPE_CHECKING:
-    from simnav.estimator import Estimator
     from simnav.recording import AidStream, Block
     from simnav.rendering import Chart
     from simnav.scenario import Scenario
 
-__all__ = ["REWARDS", "EstimatorAgent", "NavigationEnv", "Observation", "unpack"]
+__all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action"]
 
 Observation = dict[str, Any]
 
@@ -90,12 +90,13 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
     row 1 velocity north, east, down [m/s]; row 2 roll, pitch, yaw [rad]. Any finite estimate is taken; the bounds of
     the space are for sampling.
 
-    Reward: minus the error, by default the horizontal position error in metres. ``terminated`` is never true;
-    ``truncated`` is true with the last step of the run.
+    Reward: minus the error, by default the horizontal position error in metres; what the reference of a log lacks
+    counts nothing. ``terminated`` is never true; ``truncated`` is true with the last step of the run.
 
     Info: `reset` gives ``seed`` (of the run: `simnav run --seed` repeats it), ``start`` (`InitialState`, with its
-    errors and their covariance) and ``instruments`` (`Instruments`, the datasheets). With ``reveal_truth`` every info
-    holds ``truth``, the (3, 3) array that would be the perfect answer to the observation beside it.
+    errors and their covariance), ``instruments`` (`Instruments`, the datasheets) and ``note`` (of a log). With
+    ``reveal_truth`` every info holds ``truth``, the (3, 3) array that would be the perfect answer to the observation
+    beside it (NaN in what the reference of a log lacks).
 
     Parameters
     ----------
@@ -132,6 +133,11 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             scenario = load(scenario)
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode is 'human', 'rgb_array' or None, not {render_mode!r}")
+        if closed_loop and scenario.recorded:
+            raise ValueError(
+                f"scenario {scenario.id} is a recorded log: its vessel cannot steer by the estimate; "
+                "leave closed_loop out"
+            )
         self.scenario = scenario
         self.reveal_truth = reveal_truth
         self.closed_loop = closed_loop
@@ -166,18 +172,18 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         observation : dict
             The measurements of the first step.
         info : dict
-            ``seed``, ``start``, ``instruments`` (and ``truth``).
+            ``seed``, ``start``, ``instruments``, ``note`` (and ``truth``).
         """
         super().reset(seed=seed)
         if seed is None:
             seed = int(self.np_random.integers(2**63 - 1))
-        self._source = _open(self.scenario, seed)
-        self._steps, self._size = 0, 1 if self.closed_loop else _FIRST_STRETCH
+        self._source, note = _open(self.scenario, seed)
+        self._stretch, self._steps, self._size = None, 0, 1 if self.closed_loop else _FIRST_STRETCH
         start: InitialState = self._source.start
         if self.closed_loop:
             truth = self._source.initial_truth
             row = _rows(truth.position)[0]
-            self._steer(*_horizontal(start.position.tolist(), row))
+            self._source.steer_by(*_horizontal(start.position.tolist(), row))
         if not self._load():
             raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
         if self.render_mode is not None:
@@ -188,7 +194,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             self._chart.clear()
             if self.render_mode == "human":
                 self._chart.show()
-        info = {"seed": seed, "start": start, "instruments": self._source.instruments}
+        info = {"seed": seed, "start": start, "instruments": self._source.instruments, "note": note}
         return self._observation(), self._reveal(info)
 
     def step(self, action: Array) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -216,7 +222,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         if self._chart is not None:
             self._draw(self._chart, estimate)
         if self.closed_loop:
-            self._steer(north, east)
+            self._source.steer_by(north, east)
         self._row += 1
         if self._row < len(stretch.rows) or self._load():
             return self._observation(), reward, False, False, self._reveal({})
@@ -249,23 +255,14 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             total = int(source.duration / source.step + 1e-6)
             if self._steps >= total:
                 return False
-            begin = self._steps
-            self._steps = min(total, begin + self._size)
+            self._steps = min(total, self._steps + self._size)
             if not self.closed_loop:
                 self._size = min(2 * self._size, _LONGEST_STRETCH)
             block = source.advance(source.duration if self._steps == total else self._steps * source.step)
             if len(block.truth):
-                self._stretch, self._row = _pack(block, self._most), 0
+                begin = block.start if self._stretch is None else float(self._stretch.intervals[-1, 1])
+                self._stretch, self._row = _pack(block, begin, self._most), 0
                 return True
-
-    def _steer(self, north: float, east: float) -> None:
-        steer = getattr(self._source, "steer_by", None)
-        if steer is None:
-            raise ValueError(
-                f"scenario {self.scenario.id} is a recorded log: its vessel cannot steer by the estimate; "
-                "leave closed_loop out"
-            )
-        steer(north, east)
 
     def _observation(self) -> Observation:
         stretch, i = self._stretch, self._row
@@ -289,8 +286,10 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         return info
 
     def _error(self, estimate: list[float], north: float, east: float, row: list[float]) -> float:
+        """The weighted error; what the reference of a log lacks counts nothing."""
         if self._weights is None:
-            return math.hypot(north, east)
+            error = math.hypot(north, east)
+            return error if error == error else 0.0
         assert self._stretch is not None
         truth = self._stretch.truth[self._row]
         down = row[2] - estimate[2]
@@ -301,7 +300,8 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             "velocity": lambda: math.dist(estimate[3:6], truth[1].tolist()),
             "attitude": lambda: _attitude_angle(np.array(estimate[6:]), truth[2]),
         }
-        return sum(weight * measures[name]() for name, weight in self._weights.items())
+        terms = [weight * measures[name]() for name, weight in self._weights.items()]
+        return sum(term for term in terms if term == term)
 
     def _draw(self, chart: Chart, estimate: list[float]) -> None:
         stretch, i = self._stretch, self._row
@@ -315,10 +315,23 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             chart.show()
 
 
-def _open(scenario: Scenario, seed: int) -> Any:
+def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
+    """The source of a run, and its note: what in a log is not measured, or was left out of it."""
     from simnav.source import open_source
 
-    return open_source(scenario, seed)
+    if not scenario.recorded:
+        source = open_source(scenario, seed)
+        return source, source.note
+    from simnav.log import LogWarning
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", LogWarning)
+        source = open_source(scenario, seed)
+    for other in caught:
+        if not issubclass(other.category, LogWarning):
+            warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)
+    said = dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, LogWarning))
+    return source, "; ".join(filter(None, [source.note, *said]))
 
 
 # ------------------------------------------------------------------------------------------------- spaces
@@ -332,7 +345,10 @@ def _most_samples(scenario: Scenario) -> dict[str, int]:
         raise ValueError(f"scenario {scenario.id}: {clash.pop()!r} is no name for an aiding instrument")
     if instruments.imu is not None:
         rates = {"imu": instruments.imu.rate, **rates}
-    return {name: max(1, math.ceil(rate * step - 1e-6)) for name, rate in rates.items()}
+    most = {name: max(1, math.ceil(rate * step - 1e-6)) for name, rate in rates.items()}
+    if scenario.recorded:  # real instruments are late, and then deliver several at once; the IMU is on a grid
+        most = {name: k if name == "imu" else 2 * k + 1 for name, k in most.items()}
+    return most
 
 
 def _observation_space(most: Mapping[str, int], widths: Mapping[str, int]) -> spaces.Dict:
@@ -389,8 +405,8 @@ def _weights(reward: str | Mapping[str, float]) -> dict[str, float] | None:
 # ------------------------------------------------------------------------------------------------- data
 
 
-def _pack(block: Block, most: Mapping[str, int]) -> _Stretch:
-    """Sort the data of a block into its steps."""
+def _pack(block: Block, begin: float, most: Mapping[str, int]) -> _Stretch:
+    """Sort the data of a block into its steps, the first of which begins at ``begin``."""
     truth, n = block.truth, len(block.truth)
     edges = truth.time + 0.5e-6  # as `simnav.recording.packets`
     columns: dict[str, dict[str, NDArray[Any]]] = {}
@@ -427,7 +443,7 @@ def _pack(block: Block, most: Mapping[str, int]) -> _Stretch:
         for key, a in arrays.items():
             columns[name][key] = out = np.zeros((n, k, *a.shape[1:]), a.dtype)
             out[where] = a[: cut[-1]]
-    intervals = np.stack([np.concatenate(([block.start], truth.time[:-1])), truth.time], axis=1)
+    intervals = np.stack([np.concatenate(([begin], truth.time[:-1])), truth.time], axis=1)
     states = np.stack([truth.position, truth.velocity, truth.attitude], axis=1)
     return _Stretch(intervals, columns, states, _rows(truth.position), block.aids, cuts)
 
@@ -435,7 +451,7 @@ def _pack(block: Block, most: Mapping[str, int]) -> _Stretch:
 def _rows(position: Array) -> list[list[float]]:
     """Per position: latitude, longitude, height, and metres per radian of latitude and of longitude."""
     meridian, prime_vertical = principal_radii(position[:, 0])
-    height = position[:, 2]
+    height = np.nan_to_num(position[:, 2])  # a log may have no reference of it
     scale = np.stack([meridian + height, (prime_vertical + height) * np.cos(position[:, 0])], axis=1)
     rows: list[list[float]] = np.concatenate([position, scale], axis=1).tolist()
     return rows
@@ -448,91 +464,7 @@ def _horizontal(estimate: list[float], row: list[float]) -> tuple[float, float]:
 
 
 def _attitude_angle(estimate: Array, truth: Array) -> float:
+    if np.isnan(truth).any():
+        return math.nan
     error = dcm_from_rpy(estimate) @ dcm_from_rpy(truth).T
     return float(np.linalg.norm(rotation_vector_from_dcm(error)))
-
-
-# ------------------------------------------------------------------------------------------------- estimators as agents
-
-
-def unpack(observation: Mapping[str, Any], instruments: Instruments) -> Measurements:
-    """The packet that an estimator is fed, from an observation.
-
-    Parameters
-    ----------
-    observation : dict
-        Of a `NavigationEnv`.
-    instruments : Instruments
-        From the info of `NavigationEnv.reset`.
-
-    Returns
-    -------
-    Measurements
-        The same numbers, in the same order, as `Recording.steps` gives.
-    """
-    start, time = observation["interval"].tolist()
-    imu = None
-    if instruments.imu is not None:
-        entry = observation["imu"]
-        n = int(entry["valid"].sum())
-        imu = ImuSamples(entry["time"][:n], entry["length"][:n], entry["angular_rate"][:n], entry["specific_force"][:n])
-    aids = []
-    for name, sheet in instruments.items():
-        entry = observation[name]
-        for i in range(int(entry["valid"].sum())):
-            aids.append(Measurement(float(entry["time"][i]), name, sheet.kind, entry["value"][i]))
-    aids.sort(key=lambda m: m.time)
-    return Measurements(start, time, imu, aids)
-
-
-class EstimatorAgent:
-    """An estimator as the agent of a `NavigationEnv`: it gives the numbers that it gives outside.
-
-    Parameters
-    ----------
-    estimator : Estimator
-        Not one that is told the truth (``reference``): the environment does not tell it.
-
-    Attributes
-    ----------
-    estimate : Estimate or None
-        The last one, with its covariance and diagnostics, which the action does not carry.
-
-    Raises
-    ------
-    ValueError
-        If the estimator is a reference that needs the truth.
-    """
-
-    def __init__(self, estimator: Estimator):
-        if estimator.reference:
-            raise ValueError(
-                f"estimator {estimator.name or type(estimator).__name__!r} is a reference that is told the truth; "
-                "an environment does not tell it"
-            )
-        self.estimator = estimator
-        self.estimate: Estimate | None = None
-
-    def reset(self, info: Mapping[str, Any]) -> None:
-        """Begin a run, with the info of the environment's reset."""
-        start: InitialState = info["start"]
-        self._instruments: Instruments = info["instruments"]
-        self._start = np.stack([start.position, start.velocity, start.attitude])
-        self.estimate = None
-        self.estimator.reset(start, self._instruments)
-
-    def act(self, observation: Mapping[str, Any]) -> Array:
-        """The action: the estimate, with the initial state in place of what is not estimated.
-
-        Parameters
-        ----------
-        observation : dict
-
-        Returns
-        -------
-        (3, 3) array
-        """
-        self.estimate = estimate = self.estimator.update(unpack(observation, self._instruments))
-        vectors = (estimate.position, estimate.velocity, estimate.attitude)
-        given = np.stack([self._start[i] if v is None else v for i, v in enumerate(vectors)])
-        return np.where(estimate.mask().reshape(3, 3), given, self._start)

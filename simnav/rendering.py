@@ -130,7 +130,7 @@ class Chart:
             self._pending.append((position, faulty))
 
     def add(self, time: float, truth: Array, estimate: Array) -> None:
-        """Add the end of a step.
+        """Add the end of a step; nothing where a log has no reference.
 
         Parameters
         ----------
@@ -138,10 +138,11 @@ class Chart:
         truth, estimate : (3,) array
             Geodetic [rad, rad, m].
         """
-        if self._silent:
+        if self._silent or np.isnan(truth[:2]).any():
             return
+        truth, estimate = (np.append(position[:2], 0.0) for position in (truth, estimate))  # in the plane
         if self._origin is None:
-            self._origin = truth.copy()
+            self._origin = truth
         north, east, _ = relative_position(np.stack([truth, estimate]), self._origin).T.tolist()
         error = relative_position(estimate, truth)
         self._truth.add(east[0], north[0])
@@ -149,7 +150,7 @@ class Chart:
         self._now = (time, math.hypot(error[0], error[1]))
         self._error.add(*self._now)
         for position, faulty in self._pending:
-            flat = np.concatenate([position, np.full((len(position), 1), self._origin[2])], axis=1)
+            flat = np.concatenate([position, np.zeros((len(position), 1))], axis=1)
             offsets = relative_position(flat, self._origin)
             for (n, e, _), bad in zip(offsets.tolist(), faulty.tolist(), strict=True):
                 (self._faults if bad else self._fixes).add(e, n)

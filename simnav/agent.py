@@ -1,0 +1,96 @@
+"""An estimator as an agent: the bridge from observations to measurements and from estimates to actions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from simnav.estimator import Estimator
+from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurement, Measurements
+
+__all__ = ["EstimatorAgent", "unpack"]
+
+
+def unpack(observation: Mapping[str, Any], instruments: Instruments) -> Measurements:
+    """The packet that an estimator is fed, from an observation.
+
+    Parameters
+    ----------
+    observation : dict
+        Of a `NavigationEnv`.
+    instruments : Instruments
+        From the info of `NavigationEnv.reset`.
+
+    Returns
+    -------
+    Measurements
+        The same numbers, in the same order, as `Recording.steps` gives.
+    """
+    start, time = observation["interval"].tolist()
+    imu = None
+    if instruments.imu is not None:
+        entry = observation["imu"]
+        n = int(entry["valid"].sum())
+        imu = ImuSamples(entry["time"][:n], entry["length"][:n], entry["angular_rate"][:n], entry["specific_force"][:n])
+    aids = []
+    for name, sheet in instruments.items():
+        entry = observation[name]
+        for i in range(int(entry["valid"].sum())):
+            aids.append(Measurement(float(entry["time"][i]), name, sheet.kind, entry["value"][i]))
+    aids.sort(key=lambda m: m.time)
+    return Measurements(start, time, imu, aids)
+
+
+class EstimatorAgent:
+    """An estimator as the agent of a `NavigationEnv`: it gives the numbers that it gives outside.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        Not one that is told the truth (``reference``): the environment does not tell it.
+
+    Attributes
+    ----------
+    estimate : Estimate or None
+        The last one, with its covariance and diagnostics, which the action does not carry.
+
+    Raises
+    ------
+    ValueError
+        If the estimator is a reference that needs the truth.
+    """
+
+    def __init__(self, estimator: Estimator):
+        if estimator.reference:
+            raise ValueError(
+                f"estimator {estimator.name or type(estimator).__name__!r} is a reference that is told the truth; "
+                "an environment does not tell it"
+            )
+        self.estimator = estimator
+        self.estimate: Estimate | None = None
+
+    def reset(self, info: Mapping[str, Any]) -> None:
+        """Begin a run, with the info of the environment's reset."""
+        start: InitialState = info["start"]
+        self._instruments: Instruments = info["instruments"]
+        self._start = np.stack([start.position, start.velocity, start.attitude])
+        self.estimate = None
+        self.estimator.reset(start, self._instruments)
+
+    def act(self, observation: Mapping[str, Any]) -> Array:
+        """The action: the estimate, with the initial state in place of what is not estimated.
+
+        Parameters
+        ----------
+        observation : dict
+
+        Returns
+        -------
+        (3, 3) array
+        """
+        self.estimate = estimate = self.estimator.update(unpack(observation, self._instruments))
+        vectors = (estimate.position, estimate.velocity, estimate.attitude)
+        given = np.stack([self._start[i] if v is None else v for i, v in enumerate(vectors)])
+        return np.where(estimate.mask().reshape(3, 3), given, self._start)

@@ -1,0 +1,156 @@
+"""The chart: what is in it is where it belongs, and its memory is bounded."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import numpy as np
+import pytest
+
+from simnav import rendering
+from simnav.earth import displace
+from simnav.rendering import Chart, Trace
+
+START = np.array([0.9, 0.1, 0.0])
+
+
+def place(north, east):
+    return displace(START, np.array([north, east, 0.0]))
+
+
+def pixels(frame, colour, tolerance=12):
+    """Rows and columns of the pixels of a colour (``#rrggbb``)."""
+    rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
+    return np.argwhere((np.abs(frame.astype(int) - rgb) <= tolerance).all(axis=2))
+
+
+def test_a_trace_thins_evenly_and_keeps_the_ends():
+    trace = Trace(1, capacity=8)
+    for k in range(1000):
+        trace.add(float(k))
+        assert len(trace) <= 8
+    kept = trace.points[:, 0]
+    assert kept[0] == 0.0
+    assert set(np.diff(kept)) == {128.0}
+    trace.clear()
+    assert len(trace) == 0
+
+
+def test_a_trace_loses_no_peak():
+    rng = np.random.default_rng(1)
+    for peak in rng.integers(0, 3000, 20):
+        trace = Trace(2, capacity=16, largest=1)
+        for k in range(3000):
+            trace.add(float(k), 7.0 if k == peak else rng.random())
+        assert trace.points[:, 1].max() == 7.0
+        t = trace.points[:, 0]
+        at = trace.points[trace.points[:, 1].argmax(), 0]
+        assert at <= peak < at + (t[1] - t[0])
+
+
+def test_the_frame_shows_truth_estimate_and_fixes_where_they_are():
+    chart = Chart("here", 600.0)
+    for k in range(200):  # truth goes north, the estimate 400 m east of it; a fix to the west now and then
+        if k % 10 == 0:
+            chart.add_fixes(place(5.0 * k, -300.0)[None, :2], np.array([k % 20 == 0]))
+        chart.add(float(k), place(5.0 * k, 0.0), place(5.0 * k, 400.0))
+    frame = chart.frame()
+    assert frame.dtype == np.uint8
+    assert frame.ndim == 3
+    assert frame.shape[2] == 3
+    upper = frame[60 : int(0.6 * len(frame)), 90:]  # the chart, without its legend and numbers
+    truth = np.median(pixels(upper, rendering._TRUTH)[:, 1])
+    estimate = np.median(pixels(upper, rendering._ESTIMATE)[:, 1])
+    fault = np.median(pixels(upper, rendering._FAULT)[:, 1])
+    fix = np.median(np.argwhere(upper[..., 2].astype(int) - upper[..., 0] > 60)[:, 1])  # the only blue
+    assert fix == pytest.approx(fault, abs=2.0)
+    assert estimate - truth == pytest.approx((truth - fault) * 400.0 / 300.0, abs=3.0)
+    assert estimate - truth > 80.0
+    lower = pixels(frame[int(0.74 * len(frame)) :], rendering._ESTIMATE)
+    assert np.median(np.abs(lower[:, 0] - np.median(lower[:, 0]))) < 3.0  # the error is constant
+
+
+def test_a_frame_after_thousands_of_steps_and_after_a_new_run():
+    chart = Chart("long", 20_000.0)
+    empty = chart.frame()
+    for k in range(20_000):
+        chart.add_fixes(place(k, 0.0)[None, :2], np.array([False]))
+        chart.add(float(k), place(k, 0.0), place(k + 3.0, 4.0))
+        if k % 4000 == 0:
+            chart.frame()
+    assert max(len(t) for t in (chart._truth, chart._estimate, chart._fixes, chart._error)) <= 2048
+    assert not np.array_equal(chart.frame(), empty)
+    assert chart._now[1] == pytest.approx(5.0, rel=1e-2)
+    chart.clear()
+    np.testing.assert_array_equal(chart.frame(), empty)
+
+
+def test_a_diverged_estimate_does_not_shrink_the_truth_to_a_dot():
+    chart = Chart("off", 600.0)
+    for k in range(100):
+        chart.add(float(k), place(10.0 * k, 0.0), place(10.0 * k, 1e5 * k))
+    chart.frame()
+    (low, high) = chart._chart.get_ylim()
+    assert (high - low) / chart._scale < 5000.0
+
+
+def test_both_axes_of_the_chart_have_one_scale():
+    chart = Chart("scale", 600.0)
+    for k in range(100):
+        chart.add(float(k), place(2.0 * k, 30.0 * k), place(2.0 * k, 30.0 * k))
+    chart.frame()
+    box = chart._chart.bbox
+    x, y = np.ptp(chart._chart.get_xlim()) / box.width, np.ptp(chart._chart.get_ylim()) / box.height
+    assert x == pytest.approx(y)
+
+
+def test_without_a_display_there_is_one_sentence_and_no_error(monkeypatch, caplog):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with caplog.at_level(logging.WARNING, logger="simnav"):
+        chart = Chart("blind", 60.0, human=True)
+        for k in range(3):
+            chart.add(float(k), START, START)
+            chart.show()
+        chart.close()
+    assert [r.getMessage() for r in caplog.records] == [
+        "there is no display here, so nothing is shown; use render_mode='rgb_array'"
+    ]
+
+
+def test_with_a_display_the_window_is_kept_up_to_date(monkeypatch):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    class Canvas(FigureCanvasAgg):
+        drawn = flushed = 0
+
+        def draw_idle(self):
+            self.drawn += 1
+            self.draw()
+
+        def flush_events(self):
+            self.flushed += 1
+
+    def window():
+        figure = Figure()
+        Canvas(figure)
+        return figure
+
+    monkeypatch.setattr(rendering, "_open_window", window)
+    chart = Chart("seen", 60.0, human=True)
+    canvas = chart._figure.canvas
+    for k in range(30):
+        chart.add(float(k), place(k, 0.0), place(k, 5.0))
+        chart.show()
+    assert canvas.drawn == canvas.flushed == 30
+    assert len(pixels(np.asarray(canvas.buffer_rgba())[..., :3], rendering._ESTIMATE)) > 50
+    chart.close()
+    chart.show()
+
+
+def test_the_clock():
+    assert rendering._clock(3723.9) == "1:02:03"
+    assert math.isclose(rendering.Trace(1).points.size, 0)

@@ -1,0 +1,168 @@
+"""The vector form: each run is the one that its seed gives alone."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from simnav.environment import NavigationEnv
+from simnav.scenario import parse
+from simnav.vector import NavigationVectorEnv, spawn_seeds
+
+TOML = """
+name = "short"
+version = 1
+title = "twelve steps"
+duration_s = 12.0
+[start]
+latitude_deg = 50.0
+longitude_deg = -5.0
+speed_m_s = 5.0
+[instruments.imu]
+rate_hz = 20.0
+gyroscope = { random_walk_deg_sqrt_h = 0.05 }
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 0.5
+sigma_m = [2.0, 2.0, 4.0]
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return parse(TOML)
+
+
+def start_of(infos):
+    return np.stack([np.stack([s.position, s.velocity, s.attitude]) for s in infos["start"]])
+
+
+def assert_run(batch, i, observation):
+    np.testing.assert_array_equal(batch["interval"][i], observation["interval"])
+    for name in ("imu", "gnss"):
+        assert batch[name].keys() == observation[name].keys()
+        for key, array in observation[name].items():
+            np.testing.assert_array_equal(batch[name][key][i], array)
+
+
+def test_every_run_is_the_one_of_its_seed(scenario):
+    envs = NavigationVectorEnv(scenario, 3, reveal_truth=True)
+    seeds = [5, 99, 5]
+    batch, infos = envs.reset(seed=seeds)
+    assert infos["seed"].tolist() == seeds
+    assert batch in envs.observation_space
+    alone = [NavigationEnv(scenario, reveal_truth=True) for _ in seeds]
+    for i, (env, seed) in enumerate(zip(alone, seeds, strict=True)):
+        assert_run(batch, i, env.reset(seed=seed)[0])
+    rates = batch["imu"]["angular_rate"]
+    np.testing.assert_array_equal(rates[0], rates[2])
+    assert (rates[0] != rates[1]).all()
+    actions = start_of(infos)
+    for k in range(12):
+        batch, rewards, terminated, truncated, infos = envs.step(actions)
+        assert not terminated.any()
+        assert truncated.tolist() == [k == 11] * 3
+        for i, env in enumerate(alone):
+            observation, reward, _, _, info = env.step(actions[i])
+            assert_run(batch, i, observation)
+            assert rewards[i] == reward
+            np.testing.assert_array_equal(infos["truth"][i], info["truth"])
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        envs.step(actions)
+
+
+def test_spawned_seeds_do_not_overlap_between_neighbours():
+    seeds = [seed for base in range(100) for seed in spawn_seeds(base, 50)]
+    assert len(set(seeds)) == len(seeds)
+    assert all(0 <= seed < 2**63 for seed in seeds)
+    assert spawn_seeds(7, 50)[:10] == spawn_seeds(7, 10)
+
+
+def test_an_integer_seed_spawns_and_no_seed_draws(scenario):
+    envs = NavigationVectorEnv(scenario, 4)
+    _, infos = envs.reset(seed=1)
+    assert infos["seed"].tolist() == spawn_seeds(1, 4)
+    _, fresh = envs.reset()
+    _, infos = envs.reset(seed=1)
+    _, again = envs.reset()
+    assert fresh["seed"].tolist() == again["seed"].tolist()
+    assert len({*fresh["seed"].tolist(), *infos["seed"].tolist()}) == 8
+    _, infos = envs.reset(seed=[3, None, 4, None])
+    assert infos["seed"][[0, 2]].tolist() == [3, 4]
+
+
+def test_a_mask_begins_some_runs_anew_and_the_others_go_on(scenario):
+    envs = NavigationVectorEnv(scenario, 2)
+    _, infos = envs.reset(seed=[1, 2])
+    actions = start_of(infos)
+    for _ in range(4):
+        before, *_ = envs.step(actions)
+    batch, infos = envs.reset(seed=[8, 9], options={"reset_mask": np.array([False, True])})
+    assert batch["interval"].tolist() == [[4.0, 5.0], [0.0, 1.0]]
+    assert infos["seed"].tolist() == [0, 9]
+    assert infos["_seed"].tolist() == [False, True]
+    assert_run(batch, 0, {k: v[0] if k == "interval" else {n: a[0] for n, a in v.items()} for k, v in before.items()})
+
+    # The first run ends eight steps on; it stands still while the second is followed to its end.
+    for k in range(12):
+        if k == 8:
+            actions[0] = np.nan  # not read
+        batch, rewards, _, truncated, _ = envs.step(actions)
+        assert truncated.tolist() == [k >= 7, k == 11]
+        assert batch["interval"].tolist() == [[min(5.0 + k, 12.0), min(6.0 + k, 12.0)], [1.0 + k, min(2.0 + k, 12.0)]]
+        assert (rewards[0] == 0.0) == (k >= 8)
+        assert rewards[1] < 0.0
+
+
+def test_batches_do_not_share_memory(scenario):
+    envs = NavigationVectorEnv(scenario, 2)
+    first, infos = envs.reset(seed=1)
+    kept = first["imu"]["angular_rate"].copy()
+    second, *_ = envs.step(start_of(infos))
+    second["imu"]["angular_rate"][...] = 0.0
+    np.testing.assert_array_equal(first["imu"]["angular_rate"], kept)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda e, a: e.step(a[:1]), r"\(2, 3, 3\) array, one for each run, not 1"),
+        (lambda e, a: e.step(np.where(np.arange(2)[:, None, None] == 1, np.nan, a)), "run 1: an action must be finite"),
+        (lambda e, a: e.step(a.reshape(2, 9)), r"run 0: .*shape \(9,\)"),
+        (lambda e, a: e.reset(seed=[1, 2, 3]), "2 runs need as many seeds, not 3"),
+        (lambda e, a: e.reset(options={"reset_mask": np.array([1, 0])}), "reset_mask is an"),
+        (lambda e, a: e.reset(options={"reset_mask": np.array([False, False])}), "reset_mask is an"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_steps_no_run(scenario, call, message):
+    envs = NavigationVectorEnv(scenario, 2)
+    _, infos = envs.reset(seed=1)
+    actions = start_of(infos)
+    with pytest.raises(ValueError, match=message):
+        call(envs, actions)
+    batch, *_ = envs.step(actions)
+    assert batch["interval"].tolist() == [[1.0, 2.0], [1.0, 2.0]]
+
+
+def test_the_number_of_runs_is_positive(scenario):
+    with pytest.raises(ValueError, match="num_envs is a positive integer, not 0"):
+        NavigationVectorEnv(scenario, 0)
+
+
+def test_the_first_reset_begins_all(scenario):
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        NavigationVectorEnv(scenario, 2).reset(options={"reset_mask": np.array([True, False])})
+
+
+def test_make_vec_uses_it():
+    envs = gymnasium.make_vec("simnav:simnav/OpenSea-v1", num_envs=4, reward="position")
+    assert isinstance(envs, NavigationVectorEnv)
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.DISABLED
+    batch, infos = envs.reset(seed=3)
+    assert batch in envs.observation_space
+    assert envs.action_space.shape == (4, 3, 3)
+    _, rewards, *_ = envs.step(start_of(infos))
+    assert rewards.shape == (4,)
+    envs.close()
