@@ -18,7 +18,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -67,12 +67,6 @@ class InitialError(Spec):
         return np.diag(np.square([*self.position, *self.velocity, *self.attitude]))
 
 
-class _Imu(ImuSpec):
-    """The IMU among the instruments: a table that is told by its name."""
-
-    kind: Literal["imu"] = "imu"
-
-
 class Scenario(Spec):
     """A run, described; simulated unless it has a ``[log]``."""
 
@@ -94,7 +88,7 @@ class Scenario(Spec):
     manoeuvres: tuple[Manoeuvre, ...] = entries("manoeuvre", (), description="in order; the last holds to the end")
     sea: Sea | None = Field(None, description="waves; absent: flat calm")
     current: Current | None = Field(None, description="absent: none")
-    instruments: dict[str, InstrumentSpec | _Imu] = Field(
+    instruments: dict[str, InstrumentSpec | ImuSpec] = Field(
         default_factory=dict, description="by name; the IMU, if there is one, is called imu"
     )
     faults: tuple[FaultSpec, ...] = entries("fault", (), description="laid over the measurements, in order")

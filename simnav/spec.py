@@ -330,7 +330,7 @@ def _sentence(cls: type[Spec], error: ValidationError, table: Mapping[str, Any],
         name, words = _BOUNDS[first["type"]]
         unit = unit_of(info) if info is not None else None
         bound = float(context[name]) if unit is None else toml_number(float(context[name]), unit)
-        message = f"{words} {bound:g}"
+        message = f"{words} {bound:.4g}" if abs(bound) < 1e4 else f"{words} {bound:g}"
     elif first["type"] == "literal_error" and info is not None:
         # repr of a str in pydantic's "expected": 'a', 'b' or 'c'
         message += closest(
