@@ -5,5 +5,6 @@ Importing the package registers the rows; compiled code and large libraries load
 
 from estimators.ekf import Ekf
 from estimators.inertial import PureInertial
+from estimators.ship_ekf import ShipEkf
 
-__all__ = ["Ekf", "PureInertial"]
+__all__ = ["Ekf", "PureInertial", "ShipEkf"]

@@ -1,12 +1,12 @@
 """The 15-state inertial error model: position, velocity, attitude, gyroscope and accelerometer bias.
 
 The state is propagated by `simnav.strapdown` at IMU rate. Between measurements one kernel accumulates the transition
-matrix and the process noise of the error from blocks of at most `BLOCK` seconds, so that the covariance is touched once a
-measurement.
+matrix and the process noise of the error from blocks of at most `BLOCK` seconds, so that the covariance is touched once
+a measurement.
 
-Error: estimate minus truth; position ``(R_M + h) dlat, (R_N + h) cos(lat) dlon, -dh`` [m], velocity [m/s] and the rotation
-vector phi of C_est C_true' [rad], all in north-east-down, and the biases [rad/s], [m/s^2]. Its dynamics (phi-angle form,
-Groves 2013, section 14.2.4, with his signs turned to estimate minus truth):
+Error: estimate minus truth; position ``(R_M + h) dlat, (R_N + h) cos(lat) dlon, -dh`` [m], velocity [m/s] and the
+rotation vector phi of C_est C_true' [rad], all in north-east-down, and the biases [rad/s], [m/s^2]. Its dynamics
+(phi-angle form, Groves 2013, section 14.2.4, with his signs turned to estimate minus truth):
 
 - dr' = dv + (curvature terms of order v/R) dr
 - dv' = -[f_n x] phi - C db_a - (2 w_ie + w_en) x dv - (2 dw_ie + dw_en) x v + 2 g/R dr_D
@@ -14,13 +14,14 @@ Groves 2013, section 14.2.4, with his signs turned to estimate minus truth):
 - db' = -db/T + noise
 
 Beyond the 15 there are calibration states, as the datasheets ask for them: a bias for every component of an aiding
-instrument that has a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor and
-the current along the keel. With instruments of white noise only, n is 15; with ``calibrate=False`` it always is, and those
-errors count as white noise.
+instrument that has a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor
+and the current along the keel. With instruments of white noise only, n is 15; with ``calibrate=False`` it always is, and
+those errors count as white noise.
 
-An IMU's scale factor and misalignment are not states. On a level vehicle gravity turns the accelerometers' into a bias, which
-is added to the turn-on bias; the gyroscopes' act in turns, as noise in proportion to the turn rate, averaged over
-`TURN_TIME` so that a seaway does not count.
+An IMU's scale factor and misalignment are not states. On a level vehicle gravity turns the accelerometers' into a bias,
+which is added to the turn-on bias; the gyroscopes' act in turns, as noise in proportion to the turn rate, averaged over
+`TURN_TIME` so that a seaway does not count. Quantization carries its residual over, so that its sum stays within a step:
+it counts for nothing.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_ma
 from simnav.compiled import kernel
 from simnav.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
 from simnav.estimator import UnsuitableScenario
-from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy
+from simnav.rotation import cross, dcm_from_rpy, rotation_coefficients
 from simnav.strapdown import mechanize_step
 from simnav.types import (
     Array,
@@ -145,7 +146,7 @@ def _advance_rows(F, dt, M, A, B):  # type: ignore[no-untyped-def]
 
 @kernel()
 def _add_noise(Q, c, dt, turn, noise, held):  # type: ignore[no-untyped-def]
-    """Add the noise of dt seconds: white, of the bias states, of turning with scale errors, and of a time without data."""
+    """Add the noise of dt seconds: white, of the bias states, of turning with scale errors, of a time without data."""
     scale, misalignment = noise[6], noise[7]
     t0, t1, t2 = turn[0] * turn[0], turn[1] * turn[1], turn[2] * turn[2]
     g0 = (noise[0] + scale * t0 + misalignment * (t1 + t2)) * dt
@@ -161,17 +162,17 @@ def _add_noise(Q, c, dt, turn, noise, held):  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    "i8(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, "
-    "f8, f8[::1], f8[:, ::1], f8[:, ::1])"
+    "i8(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], "
+    "i8, f8, f8[::1], f8[:, ::1], f8[:, ::1])"
 )
-def propagate_inertial(
+def propagate_inertial(  # type: ignore[no-untyped-def]
     position, velocity, dcm, memory, bias, turn, clock,
     time, interval, rate, force, first, until, noise, transition, process_noise,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """Advance an inertial state to a time that need not be a sample's, in place.
 
-    A sample that spans ``until`` is used in part, the rest by the next call. Where samples are missing or absurd the state
-    is held at its velocity and attitude, and the noise of that time is added.
+    A sample that spans ``until`` is used in part, the rest by the next call. Where samples are missing or absurd the
+    state is held at its velocity and attitude, and the noise of that time is added.
 
     Parameters
     ----------
@@ -311,20 +312,31 @@ def propagate_inertial(
     return i
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
-def propagate_covariance(covariance, transition, process_noise, decay, noise):  # type: ignore[no-untyped-def]
-    """``P = Phi P Phi' + Q`` in place, where the states from the 15th on are biases of their own.
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
+def propagate_covariance(covariance, transition, process_noise, calibration, rate, density, elapsed):  # type: ignore[no-untyped-def]
+    """``P = Phi P Phi' + Q`` in place, where the states from the m-th on are Gauss-Markov biases of their own.
 
     Parameters
     ----------
     covariance : (n, n) array
     transition, process_noise : (m, m) arrays
         Of the first m states.
-    decay, noise : (n - m,) arrays
-        Factor and added variance of the others.
+    calibration : (n - m,) array
+        Values of the others; they decay.
+    rate, density : (n - m,) arrays
+        Inverse of their correlation times [1/s], and their noise densities.
+    elapsed : float
+        [s]. The discretisation is exact, so that a stationary state stays stationary in a step of any length.
     """
     n, m = covariance.shape[0], transition.shape[0]
     X = np.zeros((m, n))
+    decay, noise = np.empty(n - m), np.empty(n - m)
+    for i in range(n - m):
+        decay[i] = exp(-rate[i] * elapsed)
+        calibration[i] *= decay[i]
+        noise[i] = density[i] * elapsed
+        if rate[i] > 0.0:
+            noise[i] = density[i] * (1.0 - decay[i] * decay[i]) / (2.0 * rate[i])
     for i in range(m):
         for k in range(m):
             x = transition[i, k]
@@ -356,6 +368,30 @@ def propagate_covariance(covariance, transition, process_noise, decay, noise):  
         covariance[i, i] += noise[i - m]
 
 
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def correct_inertial(position, velocity, dcm, bias, calibration, dx):  # type: ignore[no-untyped-def]
+    """Add the correction ``dx`` to a state, in place; the attitude is turned by ``exp(dx[6:9] x)`` from the left."""
+    meridian, prime = radii_scalar(sin(position[0]))
+    position[1] += dx[1] / ((prime + position[2]) * cos(position[0]))
+    position[0] += dx[0] / (meridian + position[2])
+    position[2] -= dx[2]
+    r0, r1, r2 = dx[6], dx[7], dx[8]
+    a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
+    for j in range(3):
+        c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
+        x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
+        y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
+        dcm[0, j] = c0 + a * x0 + b * y0
+        dcm[1, j] = c1 + a * x1 + b * y1
+        dcm[2, j] = c2 + a * x2 + b * y2
+    for j in range(3):
+        velocity[j] += dx[3 + j]
+    for j in range(6):
+        bias[j] += dx[9 + j]
+    for j in range(calibration.size):
+        calibration[j] += dx[15 + j]
+
+
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
 
@@ -377,8 +413,10 @@ class InertialModel(ErrorModel):
         Of the aiding instruments.
     bias_at, scale_at : dict of str to int
         Index in the error state of an instrument's first bias, and of its scale factor.
-    white : dict of str to (d,) array
-        Variance of an instrument's white noise.
+    noise : dict of str to (d, d) array
+        White noise of an instrument.
+    raw_rate : (3,) array
+        Angular rate of the last IMU sample used, as measured.
     transition, process_noise : (15, 15) array
         Of the last propagation.
     """
@@ -399,6 +437,7 @@ class InertialModel(ErrorModel):
         self.bias, self._memory, self._turn = np.zeros(6), np.zeros(6), np.zeros(3)
         self._clock = np.zeros(9)
         self._clock[0], self._clock[1] = start.time, -1e9
+        self.raw_rate = self._clock[3:6]
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.load(None)
         gyro, level, vertical = self._sensors(imu)
@@ -417,23 +456,23 @@ class InertialModel(ErrorModel):
         # A level vehicle: gravity on the vertical axis, and on the others through their misalignment.
         level, vertical = triad_bias(a, a.misalignment * _GRAVITY), triad_bias(a, a.scale * _GRAVITY)
         dt = 1.0 / imu.rate
-        gyro_white = g.random_walk**2 + gyro.white + g.quantization**2 / 12.0 / dt
+        gyro_white = g.random_walk**2 + gyro.white
         self._noise = np.array([
             gyro_white,
-            a.random_walk**2 + level.white + a.quantization**2 / 12.0 / dt,
+            a.random_walk**2 + level.white,
             gyro.decay, gyro.noise,
             min(level.decay, vertical.decay), max(level.noise, vertical.noise),
             g.scale**2 * TURN_TIME, g.misalignment**2 * TURN_TIME,
             dt,
         ])  # fmt: skip
-        self.rate_variance = gyro_white / dt
+        self._rate_variance = gyro_white / dt
         return gyro.variance, level.variance, vertical.variance
 
     def _aids(self) -> None:
         """Calibration states and white noise of the aiding instruments."""
         self.bias_at: dict[str, int] = {}
         self.scale_at: dict[str, int] = {}
-        self.white: dict[str, Array] = {}
+        self.noise: dict[str, Array] = {}
         self._jacobians: dict[str, Array] = {}
         self._states: list[tuple[float, float, float]] = []  # initial variance, decay, noise density
         for sheet in self.instruments.values():
@@ -446,9 +485,8 @@ class InertialModel(ErrorModel):
             if sheet.kind == "speed_log":
                 current = GaussMarkov(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME, 0.0)
                 states = [GaussMarkov(states[0].variance + current.variance, current.decay, current.noise, 0.0)]
-            white = sheet.sigma**2
-            if np.isfinite(sheet.correlation_time) and sheet.correlation_time < 0.5 / sheet.rate:
-                white = white + sheet.bias_instability**2
+            fast = sheet.correlation_time < 0.5 / sheet.rate
+            white = sheet.bias_instability**2 if fast else np.zeros(len(states))
             if not self.calibrate:
                 white = white + [s.variance for s in states]
             elif any(s.variance or s.noise for s in states):
@@ -458,11 +496,11 @@ class InertialModel(ErrorModel):
                 self.scale_at[sheet.name] = _NAV + len(self._states)
                 extra = sheet.misalignment if sheet.kind == "dvl" else ()
                 self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
-            self.white[sheet.name] = white
+            self.noise[sheet.name] = measurements.white_noise(sheet, white, self._rate_variance)
         self.size = _NAV + len(self._states)
         self.calibration = np.zeros(len(self._states))
         self._decay = np.array([d for _, d, _ in self._states])
-        self._walk = np.array([q for _, _, q in self._states])
+        self._density = np.array([q for _, _, q in self._states])
 
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument."""
@@ -471,12 +509,14 @@ class InertialModel(ErrorModel):
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self._first = 0
+        self._samples: tuple[Array, Array, Array, Array]
         if imu is None or len(imu) == 0:
             self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
         else:
             self._samples = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-            if not all(a.flags.c_contiguous and a.flags.writeable for a in self._samples):
-                self._samples = tuple(np.array(a, dtype=np.float64) for a in self._samples)
+            if not all(a.flags.c_contiguous and a.flags.writeable and a.dtype == np.float64 for a in self._samples):
+                time, interval, rate, force = (np.array(a, dtype=np.float64) for a in self._samples)
+                self._samples = (time, interval, rate, force)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
@@ -488,18 +528,9 @@ class InertialModel(ErrorModel):
             *self._samples, self._first, until, self._noise, self.transition, self.process_noise,
         )  # fmt: skip
         self.time = until
-        # An exact discretisation, so that a step of any length keeps a stationary state stationary.
-        rate = self._decay
-        decay = np.exp(-rate * elapsed)
-        lasting = np.where(rate > 0.0, (1.0 - decay * decay) / np.maximum(2.0 * rate, 1e-300), elapsed)
-        self.calibration *= decay
-        propagate_covariance(covariance, self.transition, self.process_noise, decay, self._walk * lasting)
-
-    @property
-    def angular_rate(self) -> tuple[float, float, float]:
-        """Body rate relative to the inertial frame, less the bias, of the last sample [rad/s]."""
-        c, b = self._clock, self.bias
-        return float(c[3] - b[0]), float(c[4] - b[1]), float(c[5] - b[2])
+        propagate_covariance(
+            covariance, self.transition, self.process_noise, self.calibration, self._decay, self._density, elapsed
+        )
 
     @property
     def held(self) -> float:
@@ -516,18 +547,7 @@ class InertialModel(ErrorModel):
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
-        dn, de, dd = dx[0], dx[1], dx[2]
-        position = self.position
-        latitude = float(position[0])
-        meridian, prime = measurements.radii(latitude)
-        height = float(position[2])
-        position[0] = latitude + dn / (meridian + height)
-        position[1] += de / ((prime + height) * cos(latitude))
-        position[2] = height - dd
-        self.velocity += dx[3:6]
-        self.dcm = np.ascontiguousarray(dcm_from_rotation_vector(dx[6:9]) @ self.dcm)
-        self.bias += dx[9:15]
-        self.calibration += dx[15:]
+        correct_inertial(self.position, self.velocity, self.dcm, self.bias, self.calibration, dx)
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""

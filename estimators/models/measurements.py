@@ -13,7 +13,8 @@ velocity v, DCM C, lever arm l, body rate relative to the Earth w (Groves 2013, 
 - speed log: forward component of the DVL's, through the water
 - terrain fix: horizontal part of ``p + C l``
 
-A bias adds to every one of them, with a Jacobian of 1. The noise is the datasheet's, and the gyroscopes' over the lever arm.
+A bias adds to every one of them, with a Jacobian of 1. The noise is the datasheet's, and the gyroscopes' over the lever
+arm.
 """
 
 from __future__ import annotations
@@ -25,13 +26,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimators.models.base import Linearised
+from simnav.compiled import kernel
 from simnav.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS
+from simnav.rotation import cross
 from simnav.types import Array, Datasheet
 
 if TYPE_CHECKING:
     from estimators.models.inertial import InertialModel
 
-__all__ = ["MODELS", "plausible", "wrap"]
+__all__ = ["MODELS", "plausible", "velocity_of_arm", "white_noise", "wrap"]
 
 #: Largest speed [m/s], height and depth [m] that a measurement is believed to mean.
 LARGEST_SPEED, LARGEST_HEIGHT = 200.0, 20000.0
@@ -44,7 +47,7 @@ def wrap(angle: float) -> float:
 
 def plausible(kind: str, value: Array) -> bool:
     """Whether a value can be a measurement of its kind at all: finite, on Earth, and no faster than any vehicle."""
-    x = value.tolist()
+    x: list[float] = value.tolist()
     if not all(map(isfinite, x)):
         return False
     if kind in ("gnss_position", "terrain_fix"):
@@ -64,20 +67,6 @@ def radii(latitude: float) -> tuple[float, float]:
     return prime * (1.0 - ECCENTRICITY_SQUARED) / x, prime
 
 
-def _cross(a: Sequence3, b: Sequence3) -> tuple[float, float, float]:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-Sequence3 = tuple[float, float, float] | list[float]
-
-
-def _minus_skew(jacobian: Array, column: int, u: Sequence3) -> None:
-    """Put ``-[u x]`` into three columns of a three-row Jacobian."""
-    jacobian[0, column + 1], jacobian[0, column + 2] = u[2], -u[1]
-    jacobian[1, column], jacobian[1, column + 2] = -u[2], u[0]
-    jacobian[2, column], jacobian[2, column + 1] = u[1], -u[0]
-
-
 def _bias(model: InertialModel, sheet: Datasheet, jacobian: Array, predicted: list[float]) -> list[float]:
     """Add the instrument's estimated bias, and its Jacobian."""
     at = model.bias_at.get(sheet.name)
@@ -89,16 +78,66 @@ def _bias(model: InertialModel, sheet: Datasheet, jacobian: Array, predicted: li
     return predicted
 
 
-def _earth_rate_body(model: InertialModel) -> tuple[float, float, float]:
-    """Body rate relative to the Earth, body axes; the transport rate (under 1e-6 rad/s) is left out."""
-    latitude = float(model.position[0])
+@kernel("void(b1, f8, f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
+def velocity_of_arm(body, latitude, dcm, velocity, rate, bias, arm, jacobian, predicted):  # type: ignore[no-untyped-def]
+    """Velocity at the end of a lever arm, in body axes or north-east-down, and its Jacobian (equations in the module).
+
+    Parameters
+    ----------
+    body : bool
+        True for ``C' v + w x l``, false for ``v + C (w x l)``.
+    latitude : float
+    dcm : (3, 3) array
+    velocity, rate, bias, arm : (k,) arrays, k >= 3
+        Body rate relative to the inertial frame as measured, and its bias.
+    jacobian : (3, n) array
+        Columns 3 to 11 are filled.
+    predicted : (3,) array
+        Filled.
+    """
+    # Relative to the Earth; the transport rate, under 1e-6 rad/s, is left out.
     e0, e2 = ROTATION_RATE * cos(latitude), -ROTATION_RATE * sin(latitude)
-    w, c = model.angular_rate, model.dcm
-    return (
-        w[0] - float(c[0, 0]) * e0 - float(c[2, 0]) * e2,
-        w[1] - float(c[0, 1]) * e0 - float(c[2, 1]) * e2,
-        w[2] - float(c[0, 2]) * e0 - float(c[2, 2]) * e2,
-    )
+    w0 = rate[0] - bias[0] - dcm[0, 0] * e0 - dcm[2, 0] * e2
+    w1 = rate[1] - bias[1] - dcm[0, 1] * e0 - dcm[2, 1] * e2
+    w2 = rate[2] - bias[2] - dcm[0, 2] * e0 - dcm[2, 2] * e2
+    l0, l1, l2 = arm[0], arm[1], arm[2]
+    u0, u1, u2 = cross(w0, w1, w2, l0, l1, l2)
+    v0, v1, v2 = velocity[0], velocity[1], velocity[2]
+    if body:
+        for i in range(3):
+            c0, c1, c2 = dcm[0, i], dcm[1, i], dcm[2, i]
+            predicted[i] = c0 * v0 + c1 * v1 + c2 * v2
+            jacobian[i, 3], jacobian[i, 4], jacobian[i, 5] = c0, c1, c2
+            jacobian[i, 6], jacobian[i, 7], jacobian[i, 8] = cross(c0, c1, c2, v0, v1, v2)
+        predicted[0], predicted[1], predicted[2] = predicted[0] + u0, predicted[1] + u1, predicted[2] + u2
+        jacobian[0, 10], jacobian[0, 11] = -l2, l1
+        jacobian[1, 9], jacobian[1, 11] = l2, -l0
+        jacobian[2, 9], jacobian[2, 10] = -l1, l0
+    else:
+        t0 = dcm[0, 0] * u0 + dcm[0, 1] * u1 + dcm[0, 2] * u2
+        t1 = dcm[1, 0] * u0 + dcm[1, 1] * u1 + dcm[1, 2] * u2
+        t2 = dcm[2, 0] * u0 + dcm[2, 1] * u1 + dcm[2, 2] * u2
+        predicted[0], predicted[1], predicted[2] = v0 + t0, v1 + t1, v2 + t2
+        jacobian[0, 3], jacobian[1, 4], jacobian[2, 5] = 1.0, 1.0, 1.0
+        jacobian[0, 7], jacobian[0, 8] = t2, -t1
+        jacobian[1, 6], jacobian[1, 8] = -t2, t0
+        jacobian[2, 6], jacobian[2, 7] = t1, -t0
+        for i in range(3):
+            # Row i of C times [l x]
+            jacobian[i, 9], jacobian[i, 10], jacobian[i, 11] = cross(dcm[i, 0], dcm[i, 1], dcm[i, 2], l0, l1, l2)
+
+
+def white_noise(sheet: Datasheet, faster: Array | float, rate_variance: float) -> Array:
+    """(d, d) noise: the instrument's own, what is ``faster`` than a state can follow, and the rate's over the arm."""
+    noise = np.diag(sheet.sigma**2 + faster)
+    arm = sheet.lever_arm
+    if sheet.kind == "gnss_velocity":
+        noise += rate_variance * (arm @ arm) * np.eye(3)
+    elif sheet.kind == "dvl":
+        noise += rate_variance * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    elif sheet.kind == "speed_log":
+        noise += rate_variance * (arm[1:] @ arm[1:])
+    return noise
 
 
 def gnss_position(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Array) -> Linearised | None:
@@ -120,60 +159,45 @@ def gnss_position(model: InertialModel, sheet: Datasheet, value: Array, jacobian
         jacobian[2, 6], jacobian[2, 7] = lever[1], -lever[0]
     offset = _bias(model, sheet, jacobian, [0.0] * len(innovation))
     residual = np.array([i - o for i, o in zip(innovation, offset)])
-    return Linearised(residual, jacobian, np.diag(model.white[sheet.name]))
+    return Linearised(residual, jacobian, model.noise[sheet.name])
 
 
 def gnss_velocity(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Array) -> Linearised | None:
     """Velocity of an antenna, north-east-down."""
-    lever = sheet.lever_arm.tolist()
-    noise = np.diag(model.white[sheet.name])
-    jacobian[0, 3] = jacobian[1, 4] = jacobian[2, 5] = 1.0
-    predicted = model.velocity.tolist()
-    if any(lever):
-        turning = (model.dcm @ _cross(_earth_rate_body(model), lever)).tolist()
-        predicted = [p + t for p, t in zip(predicted, turning)]
-        _minus_skew(jacobian, 6, turning)
-        arm = np.array([[0.0, -lever[2], lever[1]], [lever[2], 0.0, -lever[0]], [-lever[1], lever[0], 0.0]])
-        by_rate = model.dcm @ arm
-        jacobian[:, 9:12] = by_rate
-        noise = noise + model.rate_variance * (by_rate @ by_rate.T)
-    predicted = _bias(model, sheet, jacobian, predicted)
-    return Linearised(value - predicted, jacobian, noise)
+    predicted = _velocity(model, False, sheet, jacobian)
+    return Linearised(value - _bias(model, sheet, jacobian, predicted), jacobian, model.noise[sheet.name])
+
+
+def _velocity(model: InertialModel, body: bool, sheet: Datasheet, jacobian: Array) -> list[float]:
+    predicted = np.empty(3)
+    velocity_of_arm(
+        body, model.position[0], model.dcm, model.velocity, model.raw_rate, model.bias, sheet.lever_arm,
+        jacobian, predicted,
+    )  # fmt: skip
+    listed: list[float] = predicted.tolist()
+    return listed
 
 
 def dvl(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Array) -> Linearised | None:
     """Velocity over the ground of a transducer, body axes."""
-    to_body = model.dcm.T
-    lever = sheet.lever_arm.tolist()
-    v = model.velocity.tolist()
-    u = (to_body @ model.velocity).tolist()
-    noise = model.white[sheet.name]
-    jacobian[:, 3:6] = to_body
-    skew = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    jacobian[:, 6:9] = to_body @ skew
-    if any(lever):
-        u = [a + b for a, b in zip(u, _cross(_earth_rate_body(model), lever))]
-        _minus_skew(jacobian, 9, [-x for x in lever])
-        squares = [x * x for x in lever]
-        total = sum(squares)
-        noise = noise + [model.rate_variance * (total - s) for s in squares]
+    u = _velocity(model, True, sheet, jacobian)
+    noise = model.noise[sheet.name]
     at = model.scale_at.get(sheet.name)
     if at is not None:
         # The effect of s and a on the other Jacobians is of second order.
-        jacobian[0, at], jacobian[1, at], jacobian[2, at] = u
-        scale, *misalignment = model.calibration[at - 15 : at - 11].tolist()
-        # u x a = [u x] a
-        _minus_skew(jacobian, at + 1, [-x for x in u])
-        u = [(1.0 + scale) * a + b for a, b in zip(u, _cross(u, misalignment))]
+        u0, u1, u2 = u
+        jacobian[0, at], jacobian[0, at + 2], jacobian[0, at + 3] = u0, -u2, u1
+        jacobian[1, at], jacobian[1, at + 1], jacobian[1, at + 3] = u1, u2, -u0
+        jacobian[2, at], jacobian[2, at + 1], jacobian[2, at + 2] = u2, -u1, u0
+        s, a0, a1, a2 = model.calibration[at - 15 : at - 11].tolist()
+        s += 1.0
+        u = [s * u0 + u1 * a2 - u2 * a1, s * u1 + u2 * a0 - u0 * a2, s * u2 + u0 * a1 - u1 * a0]
     elif sheet.scale or sheet.misalignment.any():
-        m = sheet.misalignment
-        squares = [x * x for x in u]
-        noise = noise + [
-            sheet.scale**2 * squares[0] + m[1] ** 2 * squares[2] + m[2] ** 2 * squares[1],
-            sheet.scale**2 * squares[1] + m[0] ** 2 * squares[2] + m[2] ** 2 * squares[0],
-            sheet.scale**2 * squares[2] + m[0] ** 2 * squares[1] + m[1] ** 2 * squares[0],
-        ]
-    return Linearised(value - _bias(model, sheet, jacobian, u), jacobian, np.diag(noise))
+        noise = noise + np.diag((sheet.scale * np.array(u)) ** 2)
+        m = sheet.misalignment**2
+        q = np.square(u)
+        noise += np.diag([m[1] * q[2] + m[2] * q[1], m[0] * q[2] + m[2] * q[0], m[0] * q[1] + m[1] * q[0]])
+    return Linearised(value - _bias(model, sheet, jacobian, u), jacobian, noise)
 
 
 def heading(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Array) -> Linearised | None:
@@ -186,7 +210,7 @@ def heading(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Arra
     slope = -c20 / level / level
     jacobian[0, 6], jacobian[0, 7], jacobian[0, 8] = slope * c00, slope * c10, 1.0
     predicted = _bias(model, sheet, jacobian, [atan2(c10, c00)])
-    return Linearised(np.array([wrap(float(value[0]) - predicted[0])]), jacobian, np.diag(model.white[sheet.name]))
+    return Linearised(np.array([wrap(float(value[0]) - predicted[0])]), jacobian, model.noise[sheet.name])
 
 
 def depth(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Array) -> Linearised | None:
@@ -195,26 +219,22 @@ def depth(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Array)
     jacobian[0, 2] = 1.0
     jacobian[0, 6], jacobian[0, 7] = lever[1], -lever[0]
     predicted = _bias(model, sheet, jacobian, [-float(model.position[2]) + lever[2]])
-    return Linearised(value - predicted, jacobian, np.diag(model.white[sheet.name]))
+    return Linearised(value - predicted, jacobian, model.noise[sheet.name])
 
 
 def speed_log(model: InertialModel, sheet: Datasheet, value: Array, jacobian: Array) -> Linearised | None:
     """Forward speed through the water; the current is part of the bias state."""
-    c, v = model.dcm, model.velocity.tolist()
-    forward: list[float] = c[:, 0].tolist()
-    lever = sheet.lever_arm.tolist()
-    u = forward[0] * v[0] + forward[1] * v[1] + forward[2] * v[2] + _cross(_earth_rate_body(model), lever)[0]
-    jacobian[0, 3], jacobian[0, 4], jacobian[0, 5] = forward
-    jacobian[0, 6], jacobian[0, 7], jacobian[0, 8] = _cross(forward, v)
-    jacobian[0, 10], jacobian[0, 11] = -lever[2], lever[1]
-    variance = model.white[sheet.name] + model.rate_variance * (lever[1] ** 2 + lever[2] ** 2)
+    work = np.zeros((3, 12))
+    u = _velocity(model, True, sheet, work)[0]
+    jacobian[0, :12] = work[0]
+    noise = model.noise[sheet.name]
     at = model.scale_at.get(sheet.name)
     if at is not None:
         jacobian[0, at] = u
         u *= 1.0 + float(model.calibration[at - 15])
-    else:
-        variance = variance + (sheet.scale * u) ** 2
-    return Linearised(value - _bias(model, sheet, jacobian, [u]), jacobian, np.diag(variance))
+    elif sheet.scale:
+        noise = noise + (sheet.scale * u) ** 2
+    return Linearised(value - _bias(model, sheet, jacobian, [u]), jacobian, noise)
 
 
 #: The measurement model of every kind of instrument.

@@ -3,8 +3,8 @@
 Every measurement is used at its own time of validity: the state is propagated to it, inside the step. The covariance is
 updated in Joseph's form, which stays symmetric and positive semi-definite for any gain.
 
-Measurements that cannot be used are counted, in the diagnostic ``skipped``: values that mean nothing (not finite, not on
-Earth), those older than the state, repetitions, and innovations whose covariance is singular.
+Measurements that cannot be used are counted, in the diagnostic ``skipped``: values that mean nothing (not finite, not
+on Earth), those older than the state, repetitions, and innovations whose covariance is singular.
 
 Source: P. D. Groves 2013, sections 3.2 and 3.4.3; G. J. Bierman, *Factorization Methods for Discrete Sequential
 Estimation*, 1977, for Joseph's form.
@@ -12,6 +12,7 @@ Estimation*, 1977, for Joseph's form.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -145,10 +146,8 @@ class KalmanEstimator(Estimator):
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
         aids = measurements.aids
-        for before, after in zip(aids, aids[1:]):
-            if before.time > after.time:
-                aids = sorted(aids, key=_time)
-                break
+        if any(before.time > after.time for before, after in pairwise(aids)):
+            aids = sorted(aids, key=_time)
         for m in aids:
             used = self._used.get(m.instrument)
             if used is None:
