@@ -49,7 +49,7 @@ class Dvl(AidSpec):
 class _Dvl(Instrument):
     def __init__(self, spec: Dvl, name: str, seed: int, water_depth: float | None):
         super().__init__(spec, name, seed)
-        turn = np.asarray(spec.misalignment) * self._normals("misalignment", 3) + spec.fixed_misalignment
+        turn = self._drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
         self.misalignment = turn
         self._matrix: Array = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
         self._speed_noise = spec.speed_noise

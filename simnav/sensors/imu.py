@@ -8,7 +8,7 @@ S scale factors, M non-orthogonality (six small angles), b turn-on bias, g first
 instability), r rate random walk, w white noise (angle or velocity random walk). The output then saturates at the range,
 and its increment y dt is quantized with the residual carried over.
 
-Each process has its own random stream, and one that is zero draws nothing. g and r step on a grid of at most T/1000 (or
+Each process has its own random stream, and one that is zero draws nothing. g and r step on a grid of at most T/100 (or
 1 s) and are held between (`HeldGaussMarkov`), since they change far more slowly than an IMU samples.
 """
 
@@ -168,19 +168,21 @@ class _Triad:
     """The realised errors of one triad."""
 
     def __init__(self, spec: TriadSpec, name: str, rate: float, seed: int):
-        def normals(process: str, n: int) -> Array:
-            return stream(seed, "instrument", "imu", name, process).standard_normal(n)
+        def drawn(process: str, sigma: float, n: int) -> Array:
+            if sigma <= 0.0:
+                return np.zeros(n)
+            return sigma * stream(seed, "instrument", "imu", name, process).standard_normal(n)
 
         def held(process: str, sigma: float, correlation_time: float) -> HeldGaussMarkov | _Still:
             if sigma <= 0.0:
                 return _Still()
-            hold = min(1.0, max(correlation_time / 1000.0, 1.0 / rate))
+            hold = min(1.0, max(correlation_time / 100.0, 1.0 / rate))
             rng = stream(seed, "instrument", "imu", name, process)
             return HeldGaussMarkov(np.full(3, sigma), correlation_time, hold, rng)
 
-        self.matrix = np.eye(3) + np.diag(spec.scale * normals("scale", 3) + spec.fixed_scale)
-        self.matrix[~np.eye(3, dtype=bool)] = spec.misalignment * normals("misalignment", 6)
-        self.bias = spec.bias * normals("bias", 3) + spec.fixed_bias
+        self.matrix = np.eye(3) + np.diag(drawn("scale", spec.scale, 3) + spec.fixed_scale)
+        self.matrix[~np.eye(3, dtype=bool)] = drawn("misalignment", spec.misalignment, 6)
+        self.bias = drawn("bias", spec.bias, 3) + spec.fixed_bias
         self.instability = held("bias_instability", spec.bias_instability, spec.correlation_time)
         self.walk = held("rate_random_walk", spec.rate_random_walk, inf)
         self.density = spec.random_walk

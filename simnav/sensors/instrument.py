@@ -25,7 +25,7 @@ from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.values import add_error
 from simnav.spec import NonNegative, Positive, Spec, Vector, quantity
 from simnav.streams import stream
-from simnav.types import KINDS, Array, Datasheet, TapStates
+from simnav.types import Array, Datasheet, TapStates
 
 __all__ = ["ZERO", "AidSpec", "Instrument", "Pair", "SigmaPair", "SigmaTriple", "Triple", "turn_to_body", "turn_to_ned"]
 
@@ -155,9 +155,8 @@ class Instrument(ABC):
         sheet = spec.datasheet(name)
         self.sigma = sheet.sigma
         self.lever_arm = sheet.lever_arm
-        d = len(KINDS[self.kind].errors)
-        self.bias = sheet.bias * self._normals("bias", d) + spec.figure("fixed_bias")
-        self.scale = float(sheet.scale * self._normals("scale", 1)[0] + spec.figure("fixed_scale"))
+        self.bias = self._drawn("bias", sheet.bias) + spec.figure("fixed_bias")
+        self.scale = float(self._drawn("scale", np.array([sheet.scale]))[0] + spec.figure("fixed_scale"))
         self._noise = stream(seed, "instrument", name, "noise") if self.sigma.any() else None
         self._instability = None
         if sheet.bias_instability.any():
@@ -165,8 +164,10 @@ class Instrument(ABC):
             self._instability = GaussMarkov(sheet.bias_instability, sheet.correlation_time, rng)
         self._levered = bool(self.lever_arm.any())
 
-    def _normals(self, process: str, n: int) -> Array:
-        return stream(self._seed, "instrument", self.name, process).standard_normal(n)
+    def _drawn(self, process: str, sigma: Array) -> Array:
+        if not sigma.any():
+            return np.zeros(len(sigma))
+        return sigma * stream(self._seed, "instrument", self.name, process).standard_normal(len(sigma))
 
     @abstractmethod
     def observe(self, tap: TapStates) -> Array:

@@ -168,7 +168,7 @@ class HeldGaussMarkov:
 
     For a bias that changes slowly against the sample rate. Each value has the stationary variance, the
     autocovariance at multiples of h is exact, and the power density at low frequencies, which is what a navigator
-    integrates, is that of the continuous process but for a factor 1 + (h/T)^2 / 12: 1e-7 for h = T/1000.
+    integrates, is that of the continuous process but for a factor 1 + (h/T)^2 / 12: 1e-5 for h = T/100.
 
     Parameters
     ----------

@@ -161,18 +161,22 @@ class FaultSpec(Spec):
                 raise SpecError(f"fault {self.kind!r}: there is no instrument {name!r}{closest(name, valid)}")
         names = self.touched(instruments)
         for stem in self.stems:
-            needed = {quantity_of(instruments[n]) for n in names}
-            for q in ("position", "velocity", "heading"):
-                given = getattr(self, f"{stem}_{q}") is not None
-                if given and q not in needed:
-                    kinds = ", ".join(f"{n} ({instruments[n]})" for n in names)
-                    raise SpecError(f"fault {self.kind!r}: {self._key(stem, q)!r} is of no use to {kinds}")
-                if q in needed and not given and self.sizes_required:
-                    n = next(n for n in names if quantity_of(instruments[n]) == q)
-                    where = f"fault {self.kind!r} on {n!r} ({instruments[n]})"
-                    raise SpecError(f"{where}: required key {self._key(stem, q)!r} is missing")
+            self._check_units(stem, {n: instruments[n] for n in names})
             for n in names:
                 self._check_axes(stem, n, instruments[n])
+
+    def _check_units(self, stem: str, touched: Mapping[str, str]) -> None:
+        needed = {quantity_of(kind): name for name, kind in touched.items()}
+        given = {q for q in ("position", "velocity", "heading") if getattr(self, f"{stem}_{q}") is not None}
+        for q in sorted(given.difference(needed)):
+            right = " and ".join(repr(self._key(stem, r)) for r in sorted(needed))
+            kinds = ", ".join(f"{name} ({kind})" for name, kind in touched.items())
+            raise SpecError(f"fault {self.kind!r}: {self._key(stem, q)!r} is of no use to {kinds}; that takes {right}")
+        for q in sorted(set(needed).difference(given)):
+            if self.sizes_required:
+                name = needed[q]
+                where = f"fault {self.kind!r} on {name!r} ({touched[name]})"
+                raise SpecError(f"{where}: required key {self._key(stem, q)!r} is missing")
 
     def _check_axes(self, stem: str, name: str, kind: str) -> None:
         size, d = self.size(stem, kind), len(KINDS[kind].errors)
