@@ -1,0 +1,182 @@
+"""The scenarios of the catalogue: each loads, is itself, and carries the figures of the paper that it follows."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simnav.catalogue import Header, headers
+from simnav.scenario import Scenario, load
+
+FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
+CATALOGUE = [h for h in headers() if h.path.parent == FOLDER]
+SIMULATED = [h for h in CATALOGUE if not load(h.id).recorded]
+
+
+def test_the_catalogue_is_complete():
+    assert {h.path for h in CATALOGUE} == set(FOLDER.glob("*.toml"))
+    # Issue 2, item 5, and the paper that each of the six follows.
+    wanted = {"open-sea", "coastal-voyage", "gnss-noise-step", "ship-dead-reckoning", "uuv-surface", "auv-survey"}
+    assert wanted <= {h.name for h in CATALOGUE}
+
+
+def test_ids_are_unique():
+    assert len({h.id for h in CATALOGUE}) == len({h.gym_id for h in CATALOGUE}) == len(CATALOGUE)
+
+
+@pytest.mark.parametrize("header", CATALOGUE, ids=lambda h: h.id)
+def test_every_scenario_loads_and_is_what_its_head_says(header: Header):
+    scenario = load(header.id)
+    assert (scenario.id, scenario.gym_id) == (header.id, header.gym_id)
+    assert (scenario.duration, scenario.title, scenario.tags) == (header.duration, header.title, header.tags)
+    assert header.path.stem in (scenario.name, scenario.id)
+    assert load(header.path) == scenario
+
+
+@pytest.mark.parametrize("header", CATALOGUE, ids=lambda h: h.id)
+def test_every_scenario_survives_the_way_to_toml_and_back(header: Header):
+    scenario = load(header.id)
+    again = Scenario.from_toml(scenario.to_toml())
+    assert again == scenario
+    assert again.content_hash() == scenario.content_hash()
+
+
+@pytest.mark.parametrize("header", CATALOGUE, ids=lambda h: h.id)
+def test_every_scenario_tells_its_reader_what_it_is(header: Header):
+    scenario = load(header.id)
+    assert len(scenario.title) < 80
+    assert len(scenario.description) > 80
+    assert scenario.recorded or re.match(r"(ours|paper 00[0-4])\b", scenario.source)
+    assert scenario.source
+    assert scenario.tags
+
+
+@pytest.mark.parametrize("header", SIMULATED, ids=lambda h: h.id)
+def test_simulated_scenarios_suit_a_quick_campaign(header: Header):
+    scenario = load(header.id)
+    assert scenario.duration <= 6000.0
+    assert all(fault.start < scenario.duration for fault in scenario.faults)
+    # The last fault leaves time to recover, unless it is meant to last.
+    ends = [f.end for f in scenario.faults]
+    assert not ends or max(ends) <= scenario.duration
+
+
+@pytest.mark.parametrize("header", CATALOGUE, ids=lambda h: h.id)
+def test_unit_keys_are_as_a_person_types_them(header: Header):
+    """A figure in radians or in metres per second squared slipped into a TOML file would be far out of these ranges."""
+    sheets = load(header.id).instruments_sheet()
+    if sheets.imu is not None:
+        assert 1e-8 < sheets.imu.gyroscope.bias + sheets.imu.gyroscope.bias_instability < 1e-2
+        assert 1e-6 < sheets.imu.accelerometer.bias + sheets.imu.accelerometer.bias_instability < 0.5
+        assert sheets.imu.rate >= 10.0
+    for sheet in sheets.values():
+        low, high = {"magnetic_compass": (1e-4, 0.1), "gyrocompass": (1e-4, 0.1)}.get(sheet.kind, (1e-4, 30.0))
+        assert np.all((sheet.sigma >= low) & (sheet.sigma <= high)), (sheet.name, sheet.sigma)
+
+
+def test_open_sea_is_matched_and_clean():
+    scenario = load("open-sea")
+    sheets = scenario.instruments_sheet()
+    assert scenario.faults == ()
+    assert sheets.imu is not None
+    for triad in (sheets.imu.gyroscope, sheets.imu.accelerometer):
+        assert triad.bias_instability == triad.scale == triad.misalignment == triad.quantization == 0.0
+    for sheet in sheets.values():
+        assert not np.any(sheet.bias)
+        assert not np.any(sheet.bias_instability)
+        assert sheet.scale == 0.0
+        assert not np.any(sheet.misalignment)
+    # Nothing that a datasheet does not tell, either.
+    for spec in scenario.aids.values():
+        assert not any(np.any(getattr(spec, name)) for name in type(spec).model_fields if name.startswith("fixed_"))
+
+
+def test_paper_000():
+    scenario = load("coastal-voyage")
+    sheets = scenario.instruments_sheet()
+    assert scenario.duration == 6000.0
+    assert sheets.imu is not None
+    assert sheets.imu.rate == 100.0
+    # 2.5 m CEP of a circular normal distribution: sigma = CEP / sqrt(2 ln 2).
+    np.testing.assert_allclose(sheets["gnss"].sigma[:2], 2.5 / math.sqrt(2.0 * math.log(2.0)), atol=0.005)
+    np.testing.assert_allclose(sheets["dvl"].sigma, 0.008)
+    assert sheets["gnss"].rate == sheets["dvl"].rate == 1.0
+    assert {(f.start, f.end) for f in scenario.faults} == {(3200.0, 4800.0)}
+
+
+def test_paper_001():
+    scenario = load("gnss-noise-step")
+    sheets = scenario.instruments_sheet()
+    assert scenario.duration == 320.0
+    (fault,) = scenario.faults
+    assert (fault.kind, fault.start, fault.end) == ("noise_step", 160.0, 240.0)
+    np.testing.assert_allclose(sheets["gnss"].sigma, 1.0)
+    np.testing.assert_allclose(sheets["gnss"].sigma * fault.factor, 10.0)
+    # Table 1.
+    assert sheets.imu is not None
+    assert sheets.imu.gyroscope.random_walk == pytest.approx(math.radians(0.4) / 60.0)
+    assert sheets.imu.gyroscope.bias == pytest.approx(math.radians(8.0) / 3600.0)
+    assert sheets.imu.accelerometer.bias == pytest.approx(30e-6 * 9.80665)
+    assert sheets.imu.accelerometer.random_walk == pytest.approx(0.02 / 60.0, rel=0.01)
+
+
+def test_paper_002():
+    for name in ("ship-dead-reckoning", "ship-straight", "ship-turn"):
+        sheets = load(name).instruments_sheet()
+        assert sheets.imu is None
+        assert {s.kind for s in sheets.values()} == {"gnss_position", "gyrocompass", "speed_log"}
+        assert all(s.rate == 1.0 for s in sheets.values())
+    faults = load("ship-dead-reckoning").faults
+    assert [(f.kind, f.start, f.end) for f in faults] == [("outage", 500.0, 560.0), ("outage", 1100.0, 1160.0)]
+
+
+def test_paper_003():
+    scenario = load("uuv-surface")
+    sheets = scenario.instruments_sheet()
+    assert scenario.duration == 2400.0
+    assert scenario.start is not None
+    assert scenario.start.speed * scenario.duration == pytest.approx(4011.0, abs=1.0)
+    assert sheets.imu is not None
+    assert sheets.imu.gyroscope.bias == pytest.approx(math.radians(0.01) / 3600.0)
+    assert sheets.imu.accelerometer.bias == pytest.approx(1000e-6 * 9.80665)
+    np.testing.assert_allclose(sheets["dvl"].sigma, 0.005)
+    assert sheets["dvl"].scale == pytest.approx(0.0255)
+    np.testing.assert_allclose(np.degrees(sheets["dvl"].misalignment), [0.028, 0.010, 0.266])
+    disturbance, positions, velocities = scenario.faults
+    assert (disturbance.start, disturbance.end, disturbance.specific_force) == (0.0, 500.0, (0.5, 0.5, 0.5))
+    assert (positions.start, positions.end, positions.size_position) == (500.0, 2400.0, (1.0, 60.0))
+    assert velocities.size_velocity == (0.5, 1.0)
+
+
+def test_paper_004():
+    scenario = load("auv-survey")
+    sheets = scenario.instruments_sheet()
+    intervals = {name: 1.0 / sheet.rate for name, sheet in sheets.items()}
+    assert intervals == pytest.approx({"dvl": 1.0, "terrain_fix": 3.0, "magnetic_compass": 0.5, "depth": 2.0})
+    outages = {f.instruments[0]: (f.start, f.end) for f in scenario.faults}
+    assert outages == {
+        "dvl": (150.0, 350.0),
+        "terrain_fix": (250.0, 400.0),
+        "magnetic_compass": (800.0, 850.0),
+        "depth": (650.0, 700.0),
+    }
+
+
+def test_the_bias_fills_the_window():
+    (fault,) = load("window-bias").faults
+    assert fault.kind == "bias_step"
+    assert fault.end - fault.start == 100.0
+    assert np.linalg.norm(fault.offset_position) == pytest.approx(25.0, abs=0.01)
+
+
+def test_the_catalogue_is_packaged():
+    """The wheel takes the files that pyproject.toml names."""
+    with (FOLDER.parent / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)
+    assert project["tool"]["setuptools"]["package-data"]["scenarios"] == ["*.toml"]
+    assert project["project"]["entry-points"]["simnav.scenarios"] == {"simnav": "scenarios"}
