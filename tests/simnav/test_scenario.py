@@ -258,7 +258,7 @@ def test_a_recorded_scenario_has_no_world():
         (
             'kind = "outage"',
             'kind = "bias_step"\noffset_m_s = 1.0',
-            "fault[0] 'bias_step' on 'gnss' (gnss_position): required key 'offset_m' is missing",
+            "fault[0] 'bias_step': 'offset_m_s' is of no use to gnss (gnss_position); that takes 'offset_m'",
         ),
         (
             'kind = "outage"',
@@ -267,8 +267,8 @@ def test_a_recorded_scenario_has_no_world():
         ),
         (
             'kind = "outage"',
-            'kind = "bias_step"\noffset_m = 1.0\noffset_m_s = 1.0',
-            "fault[0] 'bias_step': 'offset_m_s' is of no use to gnss (gnss_position)",
+            'kind = "bias_step"',
+            "fault[0] 'bias_step' on 'gnss' (gnss_position): required key 'offset_m' is missing",
         ),
         (
             "start_s = 20.0\nend_s = 30.0",
