@@ -1,0 +1,191 @@
+"""Statistics of a few runs: interquartile mean, stratified bootstrap, multiple paired tests, tiers.
+
+- `interquartile_mean`: robust like the median, far less noisy with few runs (Agarwal et al., *Deep reinforcement
+  learning at the edge of the statistical precipice*, NeurIPS 2021).
+- `bootstrap_means`, `interval`: percentile bootstrap, resampled within each stratum (scenario).
+- `holm`: p-values adjusted for many tests (Holm, *A simple sequentially rejective multiple test procedure*, 1979).
+- `tiers`: who cannot be told from the best, who not from the best of the rest, and so on.
+
+The paired test itself is `simnav.scoring.paired_test`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simnav.scoring import paired_test
+
+__all__ = ["RESAMPLES", "Place", "bootstrap_means", "holm", "interquartile_mean", "interval", "tiers"]
+
+Array = NDArray[np.float64]
+
+#: Bootstrap resamples.
+RESAMPLES = 2000
+
+
+def _weights(n: int) -> Array:
+    """Weights of n sorted values in their interquartile mean: how much of [i/n, (i+1)/n] is within [1/4, 3/4]."""
+    edges = np.clip(np.arange(n + 1) / n, 0.25, 0.75)
+    return np.asarray(2.0 * np.diff(edges))
+
+
+def interquartile_mean(values: ArrayLike) -> float:
+    """Mean of the middle half of the values; one that the quartiles cut counts in part.
+
+    Parameters
+    ----------
+    values : (n,) array_like
+        Finite, at least one.
+
+    Raises
+    ------
+    ValueError
+        If there are none, or one is not finite.
+
+    Examples
+    --------
+    >>> interquartile_mean([1.0, 2.0, 3.0, 100.0])
+    2.5
+    """
+    x: Array = np.sort(np.asarray(values, dtype=np.float64))
+    if x.ndim != 1 or len(x) == 0 or not np.isfinite(x).all():
+        raise ValueError("an interquartile mean needs a list of finite values, at least one")
+    return float(_weights(len(x)) @ x)
+
+
+@lru_cache(maxsize=32)
+def _sorted_draws(n: int, resamples: int, seed: int) -> tuple[NDArray[np.int32], Array]:
+    """Ranks of the values in each resample of n, ascending; only those that the interquartile mean weighs."""
+    draws = np.random.default_rng([seed, n]).integers(0, n, (resamples, n), dtype=np.int32)
+    draws.sort(axis=1)
+    weights = _weights(n)
+    used = np.flatnonzero(weights)
+    return np.ascontiguousarray(draws[:, used]), weights[used]
+
+
+def bootstrap_means(strata: Sequence[ArrayLike], *, resamples: int = RESAMPLES, seed: int = 0) -> Array:
+    """Bootstrap distribution of the interquartile mean of each stratum, resampled independently.
+
+    Parameters
+    ----------
+    strata : sequence of (n_s,) array_like
+        Finite values, for example of one scenario each.
+    resamples : int
+        B.
+    seed : int
+        The same seed gives the same draws, whatever the order of the values.
+
+    Returns
+    -------
+    (B, len(strata)) array
+    """
+    columns = []
+    for j, values in enumerate(strata):
+        x: Array = np.sort(np.asarray(values, dtype=np.float64))
+        # Sorting what is drawn is drawing ranks and sorting those: the costly half does not depend on the values.
+        ranks, weights = _sorted_draws(len(x), resamples, seed * 1009 + j)
+        columns.append(x[ranks] @ weights)
+    return np.stack(columns, axis=1)
+
+
+def interval(distribution: ArrayLike, level: float = 0.95) -> tuple[float, float]:
+    """Percentile interval of a bootstrap distribution.
+
+    Parameters
+    ----------
+    distribution : (B,) array_like
+    level : float
+    """
+    low, high = np.quantile(np.asarray(distribution), [0.5 * (1.0 - level), 0.5 * (1.0 + level)])
+    return float(low), float(high)
+
+
+def holm(p_values: ArrayLike) -> Array:
+    """P-values adjusted so that rejecting those below alpha keeps the family-wise error rate at alpha.
+
+    Parameters
+    ----------
+    p_values : (m,) array_like
+
+    Returns
+    -------
+    (m,) array
+        In the order given.
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03, 0.005])
+    array([0.03, 0.06, 0.06, 0.02])
+    """
+    p: Array = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(p, kind="stable")
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)))
+    return adjusted
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an entry stands.
+
+    Attributes
+    ----------
+    tier : int
+        From 1, the best.
+    p_value : float or None
+        Holm-adjusted, against the best of all; None for the best itself.
+    """
+
+    tier: int
+    p_value: float | None
+
+
+def tiers(
+    scores: Mapping[str, float], differences: Callable[[str, str], ArrayLike], *, level: float = 0.05
+) -> dict[str, Place]:
+    """Sort entries into tiers that hold together what cannot be told apart.
+
+    The entry with the lowest score leads the first tier; all others are tested against it, paired and Holm-corrected,
+    and those that are not significantly worse join it. The same again with the rest, until nobody is left. An entry
+    with few or noisy runs may thus join a better tier than one with a lower score.
+
+    Parameters
+    ----------
+    scores : mapping of name to float
+        Lower is better; ties go by name.
+    differences : callable
+        ``differences(a, b)``: the paired differences a - b over the runs that both have; empty if there are none.
+    level : float
+        Family-wise error rate of the tests within one tier.
+
+    Returns
+    -------
+    dict of name to Place
+        In order of tier, then score.
+    """
+    left = sorted(scores, key=lambda name: (scores[name], name))
+    places: dict[str, Place] = {}
+    from_best: dict[str, float] = {}
+    tier = 0
+    while left:
+        tier += 1
+        leader, others = left[0], left[1:]
+        p = dict(zip(others, holm([_worse(differences(name, leader)) for name in others]).tolist(), strict=True))
+        if tier == 1:
+            from_best = p
+        joined = [name for name in others if p[name] >= level]
+        for name in [leader, *joined]:
+            places[name] = Place(tier, from_best.get(name))
+        left = [name for name in others if name not in places]
+    return places
+
+
+def _worse(differences: ArrayLike) -> float:
+    """Two-sided p-value of paired differences; 1 where they do not point upwards."""
+    d: Array = np.asarray(differences, dtype=np.float64)
+    return paired_test(d) if len(d) and np.median(d) >= 0.0 else 1.0
