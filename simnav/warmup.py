@@ -1,0 +1,109 @@
+"""Compile every kernel ahead, once, so that nobody waits for it in the middle of a run."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import multiprocessing
+import os
+import pkgutil
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from importlib.metadata import entry_points
+
+from simnav.compiled import Kernel, kernels, prune
+
+__all__ = ["warmup"]
+
+#: Called with how many kernels are ready, how many there are, and the name of the last one.
+Callback = Callable[[int, int, str], None]
+
+_WORTH_A_PROCESS = 4  # fewer kernels than this are compiled in this process
+
+
+def warmup(progress: Callback | None = None, *, load: bool = True, processes: int | None = None) -> None:
+    """Compile all kernels of simnav, of the estimators and of installed plug-ins that are not in the cache.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        ``progress(done, total, name)``.
+    load : bool
+        Load them into this process, too.
+    processes : int, optional
+        Compile in this many processes at once; default: as many as there are cores, at most 4.
+    """
+    report = progress or (lambda done, total, name: None)
+    _import_all()
+    every = kernels()
+    missing = [k for k in every if not k.cached()]
+    done = len(every) - len(missing)
+    report(done, len(every), "")
+    if len(missing) >= _WORTH_A_PROCESS:
+        for name in _compile_beside(missing, processes or min(4, _cores())):
+            done += 1
+            report(done, len(every), name)
+        prune()
+    for kernel in every if load else missing:
+        kernel.compile()  # from the cache by now, or here if there is none
+        if kernel in missing and done < len(every):
+            done += 1
+            report(done, len(every), _name(kernel))
+
+
+def _name(kernel: Kernel) -> str:
+    return f"{kernel.__module__}.{kernel.__name__}"
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _import_all() -> None:
+    """Import every module of our two packages, and whatever plug-ins import; a broken one harms nobody."""
+    for package in ("simnav", "estimators"):
+        with contextlib.suppress(ImportError):
+            top = importlib.import_module(package)
+            for module in pkgutil.walk_packages(top.__path__, f"{package}.", onerror=lambda name: None):
+                _try_import(module.name)
+    for point in entry_points(group="simnav.estimators"):
+        _try_import(point.module)
+
+
+def _try_import(name: str) -> None:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            importlib.import_module(name)
+    except (Exception, SystemExit) as error:
+        warnings.warn(f"{name} cannot be imported, so its kernels are not compiled ahead: {error}", stacklevel=3)
+
+
+def _compile_beside(missing: list[Kernel], processes: int) -> Iterator[str]:
+    """Compile kernels in several forked processes, which leave them in the cache; yield their names.
+
+    Where processes cannot be forked, or one dies, the rest is left to the caller.
+    """
+    if processes < 2 or "fork" not in multiprocessing.get_all_start_methods():
+        return
+    context = multiprocessing.get_context("fork")
+    _todo[:] = missing
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads
+            with ProcessPoolExecutor(processes, mp_context=context) as pool:
+                futures = [pool.submit(_compile, i) for i in range(len(missing))]
+                for future in as_completed(futures):
+                    with contextlib.suppress(Exception):
+                        yield future.result()
+    finally:
+        _todo.clear()
+
+
+_todo: list[Kernel] = []
+
+
+def _compile(index: int) -> str:
+    _todo[index].compile()
+    return _name(_todo[index])
