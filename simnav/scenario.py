@@ -68,7 +68,11 @@ class InitialError(Spec):
 
 
 class Scenario(Spec):
-    """A run, described; simulated unless it has a ``[log]``."""
+    """A run, described; simulated unless it has a ``[log]``.
+
+    The fields carry their own descriptions (``Scenario.model_fields``) and hold SI units and radians;
+    ``docs/scenarios.md`` lists their TOML keys. Build one with `load` or `parse`, or from Python.
+    """
 
     name: str = Field(description="kebab-case; with the version it is the scenario's id")
     version: int = Field(ge=1, description="raise it whenever a change alters the numbers of a run")
@@ -81,7 +85,9 @@ class Scenario(Spec):
     world_seed: int | None = Field(
         None, ge=0, description="fixes sea and truth for all runs, which then differ in errors and faults only"
     )
-    water_depth: Positive | None = quantity("m", None, description="of the sea; absent: deep beyond any bottom lock")
+    water_depth: Positive | None = quantity(
+        "m", None, description="below the mean sea surface; absent: a DVL always has the bottom"
+    )
     start: Start | None = Field(None, description="state of the vessel at time 0")
     initial_error: InitialError = Field(InitialError(), description="what the estimator does not know of it")
     vessel: Vessel | None = Field(None, description="how the vessel answers")
@@ -140,7 +146,8 @@ class Scenario(Spec):
         Title, description, source and tags are words and do not count; neither do the files of a log.
         """
         content = self.model_dump(mode="python", exclude={"title", "description", "source", "tags"})
-        text = json.dumps(content, sort_keys=True, default=str)
+        # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.
+        text = json.dumps(content, default=str)
         return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
     @model_validator(mode="after")
@@ -239,6 +246,12 @@ def _check_faults(s: Scenario) -> None:
 
 def parse(text: str, *, source: str = "<toml>") -> Scenario:
     """Read a scenario from the text of a TOML file.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        What messages call it.
 
     Raises
     ------
