@@ -1,0 +1,42 @@
+# Two commands do it all on a fresh machine: `make leaderboard` and `make test`.
+PYTHON ?= python3
+VENV ?= .venv
+RESULTS ?= results/quick
+SITE ?= site
+BIN := $(VENV)/bin
+
+.PHONY: help leaderboard test bench clean
+
+help:
+	@echo "make leaderboard   set up, run the quick campaign, print the ranking, write the site"
+	@echo "make test          set up and run all tests (lint, types and floors included)"
+	@echo "make bench         set up and run the benchmarks, one table"
+	@echo "make clean         remove the environment, results and site"
+
+$(VENV)/pyvenv.cfg:
+	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("simnav needs Python 3.11 or newer, and $(PYTHON) is " + sys.version.split()[0] + "; say e.g. make PYTHON=python3.12")'
+	$(PYTHON) -m venv $(VENV)
+
+# A stamp for each set of packages: installed again when pyproject.toml changes.
+$(VENV)/installed: $(VENV)/pyvenv.cfg pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/installed-test: $(VENV)/pyvenv.cfg pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@touch $@ $(VENV)/installed
+
+leaderboard: $(VENV)/installed
+	$(BIN)/simnav warmup
+	$(BIN)/simnav campaign --quick --output $(RESULTS)
+	$(BIN)/simnav leaderboard $(RESULTS) --output $(SITE)
+
+test: $(VENV)/installed-test
+	$(BIN)/python -m pytest
+
+bench: $(VENV)/installed-test
+	$(BIN)/simnav warmup
+	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-columns=median,iqr,rounds --benchmark-sort=name
+
+clean:
+	rm -rf $(VENV) $(RESULTS) $(SITE) build dist *.egg-info
