@@ -224,8 +224,8 @@ def rank(
     cells: dict[str, dict[str, _Cell]] = {}
     for r in results:
         cells.setdefault(r.scenario, {}).setdefault(r.estimator, _Cell(r.estimator, score)).add(r)
-    scenarios = [_Scenario(name, cells[name], oracle) for name in sorted(cells)]
-    return Ranking(score, tuple(_overall(scenarios, resamples)), tuple(s.ranking(resamples) for s in scenarios))
+    scenarios = [_Scenario(name, cells[name], oracle, resamples, k) for k, name in enumerate(sorted(cells))]
+    return Ranking(score, tuple(_overall(scenarios)), tuple(s.ranking() for s in scenarios))
 
 
 class _Cell:
@@ -297,7 +297,7 @@ class _Cell:
 class _Scenario:
     """The cells of one scenario with their log ratios."""
 
-    def __init__(self, name: str, cells: Mapping[str, _Cell], oracle: str):
+    def __init__(self, name: str, cells: Mapping[str, _Cell], oracle: str, resamples: int, index: int):
         self.name = name
         self.unsuitable = {n: why for n in sorted(cells) if (why := cells[n].unsuitable())}
         self.cells = {n: cells[n] for n in sorted(cells) if n not in self.unsuitable}
@@ -308,6 +308,7 @@ class _Scenario:
                 cell.logs[run] = _log_ratio(good[run], errors.get(run, constant)) if run in good else _CAP
         self.strata = {n: np.array(list(c.logs.values())) for n, c in self.cells.items()}
         self.means = {n: interquartile_mean(x) for n, x in self.strata.items()}
+        self.draws = {n: bootstrap_means([x], resamples=resamples, seed=index)[:, 0] for n, x in self.strata.items()}
 
     def _baseline(self, oracle: str) -> tuple[str, dict[Run, float], float]:
         """In words, by run, and for runs without one."""
@@ -324,24 +325,24 @@ class _Scenario:
             return f"median of {name}, the best here: no oracle ran", {}, ranked[name]
         return "none: no run was completed", {}, 1.0
 
-    def differences(self, a: str, b: str) -> list[float]:
+    def differences(self, a: str, b: str) -> Array:
         """Paired differences of log ratios over the runs that both have."""
         mine, other = self.cells[a].logs, self.cells[b].logs
-        return [mine[run] - other[run] for run in sorted(mine) if run in other]
+        if mine.keys() == other.keys():
+            return np.asarray(self.strata[a] - self.strata[b])
+        return np.array([mine[run] - other[run] for run in mine if run in other])
 
-    def ranking(self, resamples: int) -> ScenarioRanking:
+    def ranking(self) -> ScenarioRanking:
         ranked = {n: m for n, m in self.means.items() if not self.cells[n].reference}
         places = tiers(ranked, self.differences)
         references = sorted((n for n in self.cells if n not in ranked), key=lambda n: (self.means[n], n))
-        rows = [self._row(n, k + 1, p, resamples) for k, (n, p) in enumerate(places.items())]
-        rows += [self._row(n, None, None, resamples) for n in references]
+        rows = [self._row(n, k + 1, p) for k, (n, p) in enumerate(places.items())]
+        rows += [self._row(n, None, None) for n in references]
         return ScenarioRanking(self.name, self.baseline, tuple(rows), self.unsuitable)
 
-    def _row(self, name: str, position: int | None, place: Place | None, resamples: int) -> ScenarioRow:
+    def _row(self, name: str, position: int | None, place: Place | None) -> ScenarioRow:
         cell, x = self.cells[name], self.strata[name]
-        low = high = math.nan
-        if len(x) > 1:
-            low, high = interval(bootstrap_means([x], resamples=resamples)[:, 0])
+        low, high = interval(self.draws[name]) if len(x) > 1 else (math.nan, math.nan)
         statuses = cell.statuses()
         nees, seconds = cell.numbers("nees_horizontal"), cell.numbers("update_median")
         return ScenarioRow(
@@ -371,70 +372,70 @@ def _log_ratio(value: float, baseline: float) -> float:
     return float(np.clip(math.log(value) - math.log(max(baseline, 1e-300)), -_CAP, _CAP))
 
 
-def _overall(scenarios: Sequence[_Scenario], resamples: int) -> list[OverallRow]:
-    names = sorted({n for s in scenarios for n in (*s.cells, *s.unsuitable)})
+def _overall(scenarios: Sequence[_Scenario]) -> list[OverallRow]:
+    names = sorted({n for s in scenarios for n in s.cells})
     covers = {n: [s for s in scenarios if n in s.cells] for n in names}
     references = [n for n in names if any(s.cells[n].reference for s in covers[n])]
-    entries = [n for n in names if n not in references and covers[n]]
+    entries = [n for n in names if n not in references]
     used = [s for s in scenarios if any(n in s.cells for n in entries)]
 
     pairs = [(n, s) for n in entries for s in covers[n]]
     weights = _adjusted_means([(n, s.name) for n, s in pairs])
-    means = np.array([s.means[n] for n, s in pairs])
-    draws = (
-        np.stack(
-            [bootstrap_means([s.strata[n]], resamples=resamples, seed=1 + scenarios.index(s))[:, 0] for n, s in pairs],
-            axis=1,
-        )
-        if pairs
-        else np.zeros((resamples, 0))
-    )
-    score, spread = {}, {}
+    score, draws = {}, {}
     for n in entries:
-        score[n] = float(weights[n] @ means)
-        single = any(len(s.strata[n]) < 2 for s in covers[n])
-        spread[n] = (math.nan, math.nan) if single else interval(draws @ weights[n])
+        parts = [(w, s, m) for w, (m, s) in zip(weights[n].tolist(), pairs, strict=True) if abs(w) > 1e-12]
+        score[n] = float(sum(w * s.means[m] for w, s, m in parts))
+        draws[n] = np.sum([w * s.draws[m] for w, s, m in parts], axis=0)
     for n in references:  # a plain mean over what they cover
         score[n] = float(np.mean([s.means[n] for s in covers[n]]))
-        parts = [
-            bootstrap_means([s.strata[n]], resamples=resamples, seed=1 + scenarios.index(s))[:, 0] for s in covers[n]
-        ]
-        single = any(len(s.strata[n]) < 2 for s in covers[n])
-        spread[n] = (math.nan, math.nan) if single else interval(np.mean(parts, axis=0))
+        draws[n] = np.mean([s.draws[n] for s in covers[n]], axis=0)
+    several = {n: all(len(s.strata[n]) > 1 for s in covers[n]) for n in names}
+    spread = {n: interval(draws[n]) if several[n] else (math.nan, math.nan) for n in names}
 
     ranked = {n: score[n] for n in entries if len(covers[n]) >= MIN_COVERAGE * len(used)}
     places = tiers(
-        ranked, lambda a, b: [d for s in scenarios if a in s.cells and b in s.cells for d in s.differences(a, b)]
+        ranked,
+        lambda a, b: np.concatenate([s.differences(a, b) if {a, b} <= s.cells.keys() else [] for s in scenarios]),
     )
     order = list(places) + sorted((n for n in entries if n not in places), key=lambda n: (score[n], n))
     order += sorted(references, key=lambda n: (score[n], n))
-    rows = []
-    for k, n in enumerate(order):
-        cells = [s.cells[n] for s in covers[n]]
-        nees = np.concatenate([c.numbers("nees_horizontal") for c in cells])
-        seconds = [float(np.median(x)) for c in cells if len(x := c.numbers("update_median"))]
-        runs = sum(len(c.logs) for c in cells)
-        rows.append(
-            OverallRow(
-                estimator=n,
-                reference=n in references,
-                rank=k + 1 if n in places else None,
-                tier=places[n].tier if n in places else None,
-                score=math.exp(score[n]),
-                low=math.exp(spread[n][0]),
-                high=math.exp(spread[n][1]),
-                p_value=places[n].p_value if n in places else None,
-                covered=len(covers[n]),
-                scenarios=len(scenarios),
-                runs=runs,
-                failed=runs - sum(c.statuses().get("ok", 0) for c in cells),
-                badge=badge(nees),
-                update_median=float(np.median(seconds)) if seconds else math.nan,
-                peak_memory=max(c.peak_memory() for c in cells),
-                ratios={s.name: math.exp(s.means[n]) for s in covers[n]},
-            )
-        )
-    return rows
+    return [
+        _overall_row(n, k + 1, places.get(n), score[n], spread[n], covers[n], len(scenarios))
+        for k, n in enumerate(order)
+    ]
+
+
+def _overall_row(
+    name: str,
+    position: int,
+    place: Place | None,
+    score: float,
+    spread: tuple[float, float],
+    covers: Sequence[_Scenario],
+    scenarios: int,
+) -> OverallRow:
+    cells = [s.cells[name] for s in covers]
+    nees = np.concatenate([c.numbers("nees_horizontal") for c in cells])
+    seconds = [float(np.median(x)) for c in cells if len(x := c.numbers("update_median"))]
+    runs = sum(len(c.logs) for c in cells)
+    return OverallRow(
+        estimator=name,
+        reference=any(c.reference for c in cells),
+        rank=position if place else None,
+        tier=place.tier if place else None,
+        score=math.exp(score),
+        low=math.exp(spread[0]),
+        high=math.exp(spread[1]),
+        p_value=place.p_value if place else None,
+        covered=len(covers),
+        scenarios=scenarios,
+        runs=runs,
+        failed=runs - sum(c.statuses().get("ok", 0) for c in cells),
+        badge=badge(nees),
+        update_median=float(np.median(seconds)) if seconds else math.nan,
+        peak_memory=max(c.peak_memory() for c in cells),
+        ratios={s.name: math.exp(s.means[name]) for s in covers},
+    )
 
 
 def _adjusted_means(cells: Sequence[tuple[str, str]]) -> dict[str, Array]:
