@@ -321,7 +321,7 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
 
     if not scenario.recorded:
         source = open_source(scenario, seed)
-        return source, source.note
+        return source, getattr(source, "note", "")
     from simnav.log import LogWarning
 
     with warnings.catch_warnings(record=True) as caught:
@@ -331,7 +331,7 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
         if not issubclass(other.category, LogWarning):
             warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)
     said = dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, LogWarning))
-    return source, "; ".join(filter(None, [source.note, *said]))
+    return source, "; ".join(filter(None, [getattr(source, "note", ""), *said]))
 
 
 # ------------------------------------------------------------------------------------------------- spaces

@@ -1,4 +1,4 @@
-"""The chart of a run as it goes: truth, fixes and estimate in the plane, and the error over time below.
+"""The chart of a run as it goes: truth, fixes and estimate in the plane; below, the error over time and a close-up.
 
 For people, so the truth is in it. Memory is bounded: when a trace is full, every second point goes. Matplotlib is
 imported with this module's first `Chart` and not before.
@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import deque
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ __all__ = ["Chart", "Trace"]
 _log = logging.getLogger("simnav")
 
 _INK, _GRID = "#33414e", "#dde3e8"
+_RECENT = 200
 _TRUTH, _ESTIMATE, _FIX, _FAULT = "#33414e", "#d1495b", "#6aa9d8", "#edae49"
 
 
@@ -94,6 +97,8 @@ class Chart:
         self._truth, self._estimate = Trace(2), Trace(2)
         self._fixes, self._faults = Trace(2), Trace(2)
         self._error = Trace(2, largest=1)
+        # for the close-up, all of the last steps
+        self._recent: tuple[deque[tuple[float, float]], ...] = tuple(deque(maxlen=_RECENT) for _ in range(4))
         self._origin: Array | None = None
         self._pending: list[tuple[Array, NDArray[np.bool_]]] = []
         self._now = (0.0, 0.0)
@@ -113,6 +118,8 @@ class Chart:
         """Begin a new run."""
         for trace in (self._truth, self._estimate, self._fixes, self._faults, self._error):
             trace.clear()
+        for recent in self._recent:
+            recent.clear()
         self._origin, self._pending, self._now = None, [], (0.0, 0.0)
         self._view: tuple[Array, Array] | None = None
         self._span, self._top = 0.0, 0.0
@@ -138,23 +145,27 @@ class Chart:
         truth, estimate : (3,) array
             Geodetic [rad, rad, m].
         """
-        if self._silent or np.isnan(truth[:2]).any():
+        if self._silent:
+            return
+        pending, self._pending = self._pending, []
+        if np.isnan(truth[:2]).any():
             return
         truth, estimate = (np.append(position[:2], 0.0) for position in (truth, estimate))  # in the plane
         if self._origin is None:
             self._origin = truth
         north, east, _ = relative_position(np.stack([truth, estimate]), self._origin).T.tolist()
+        for trace, recent, point in zip((self._truth, self._estimate), self._recent, zip(east, north)):
+            trace.add(*point)
+            recent.append(point)
         error = relative_position(estimate, truth)
-        self._truth.add(east[0], north[0])
-        self._estimate.add(east[1], north[1])
         self._now = (time, math.hypot(error[0], error[1]))
         self._error.add(*self._now)
-        for position, faulty in self._pending:
+        for position, faulty in pending:
             flat = np.concatenate([position, np.zeros((len(position), 1))], axis=1)
             offsets = relative_position(flat, self._origin)
             for (n, e, _), bad in zip(offsets.tolist(), faulty.tolist(), strict=True):
                 (self._faults if bad else self._fixes).add(e, n)
-        self._pending = []
+                self._recent[3 if bad else 2].append((e, n))
 
     def frame(self) -> NDArray[np.uint8]:
         """The picture as an (h, w, 3) array of bytes."""
@@ -196,27 +207,23 @@ class Chart:
         self._figure.set_size_inches(7.2, 7.2)
         self._figure.set_dpi(100)
         self._chart = chart = self._figure.add_axes((0.11, 0.36, 0.86, 0.58))
-        self._below = below = self._figure.add_axes((0.11, 0.075, 0.86, 0.19))
-        for axes in (chart, below):
+        self._below = below = self._figure.add_axes((0.11, 0.075, 0.6, 0.19))
+        self._close = close = self._figure.add_axes((0.78, 0.075, 0.19, 0.19))
+        for axes in (chart, below, close):
             axes.grid(True, color=_GRID, linewidth=0.8)
             axes.set_axisbelow(True)
             axes.tick_params(colors=_INK, labelsize=8, length=3)
             for side, spine in axes.spines.items():
-                spine.set_visible(side in ("left", "bottom"))
-                spine.set_color(_INK)
-        dot = {"linestyle": "none", "marker": "o", "markeredgewidth": 0}
-        (self._fix_dots,) = chart.plot([], [], color=_FIX, markersize=3.0, alpha=0.7, label="fix", **dot)
-        (self._fault_dots,) = chart.plot([], [], color=_FAULT, markersize=4.0, label="fix, faulty", **dot)
-        (self._truth_line,) = chart.plot([], [], color=_TRUTH, linewidth=1.6, label="truth")
-        (self._estimate_line,) = chart.plot([], [], color=_ESTIMATE, linewidth=1.3, label="estimate")
+                spine.set_visible(axes is close or side in ("left", "bottom"))
+                spine.set_color(_GRID if axes is close else _INK)
+        self._close.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0), xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5])
+        self._close.tick_params(length=0, labelbottom=False, labelleft=False)
         chart.plot([0], [0], color=_TRUTH, marker="o", markersize=5, markerfacecolor="white", linestyle="none")
-        (self._vessel,) = chart.plot([], [], color=_TRUTH, markersize=7, **dot)
-        (self._believed,) = chart.plot([], [], color=_ESTIMATE, markersize=5, **dot)
+        self._on_chart, self._on_close = _track(chart), _track(close)
         (self._error_line,) = below.plot([], [], color=_ESTIMATE, linewidth=1.2)
         below.set_ylabel("horizontal error [m]", fontsize=9, color=_INK)
-        handles = [self._truth_line, self._estimate_line, self._fix_dots, self._fault_dots]
         self._figure.legend(
-            handles=handles,
+            handles=self._on_chart[:4],
             loc="upper right",
             bbox_to_anchor=(0.975, 0.995),
             ncols=4,
@@ -227,9 +234,11 @@ class Chart:
             labelcolor=_INK,
         )
         self._figure.text(0.11, 0.965, self.title, fontsize=11, color=_INK, weight="bold")
-        self._reading = self._figure.text(0.97, 0.272, "", fontsize=9, color=_ESTIMATE, ha="right")
-        dots, lines = [self._fix_dots, self._fault_dots], [self._truth_line, self._estimate_line]
-        self._moving = [*dots, *lines, self._vessel, self._believed, self._error_line, self._reading]
+        self._reading = self._figure.text(0.71, 0.272, "", fontsize=9, color=_ESTIMATE, ha="right")
+        self._width = self._figure.text(0.875, 0.272, "", fontsize=9, color=_INK, ha="center")
+        # dots first: the lines are drawn over them
+        self._moving = [a for track in (self._on_chart, self._on_close) for a in (*track[2:4], *track[:2], *track[4:])]
+        self._moving += [self._error_line, self._reading, self._width]
         for artist in self._moving:
             artist.set_animated(self._window is None)
 
@@ -238,18 +247,22 @@ class Chart:
         truth, estimate, error = self._truth.points, self._estimate.points, self._error.points
         changed = self._limits(truth, estimate)
         changed |= self._error_limits(float(error[:, 1].max()) if len(error) else 0.0)
-        scale = self._scale
-        for artist, trace in (
-            (self._fix_dots, self._fixes.points),
-            (self._fault_dots, self._faults.points),
-            (self._truth_line, truth),
-            (self._estimate_line, estimate),
-            (self._vessel, truth[-1:]),
-            (self._believed, estimate[-1:]),
-        ):
-            artist.set_data(trace[:, 0] * scale, trace[:, 1] * scale)
+        recent = [np.array(points).reshape(-1, 2) for points in self._recent]
+        traces = (truth, estimate, self._fixes.points, self._faults.points, recent[0][-1:], recent[1][-1:])
+        for artist, trace in zip(self._on_chart, traces, strict=True):
+            artist.set_data(trace[:, 0] * self._scale, trace[:, 1] * self._scale)
         self._error_line.set_data(error[:, 0] / self._seconds, error[:, 1])
-        self._reading.set_text(f"{_clock(self._now[0])}    {self._now[1]:.3g} m" if len(truth) else "")
+        if not len(truth):
+            recent, here, half = [np.empty((0, 2))] * 4, np.zeros(2), 1.0
+            self._reading.set_text("")
+            self._width.set_text("")
+        else:
+            here = recent[0][-1]
+            half = _round_up(1.5 * max(self._now[1], 5.0))
+            self._reading.set_text(f"{_clock(self._now[0])}    {self._now[1]:.3g} m")
+            self._width.set_text(f"close-up, {2 * half:g} m")
+        for artist, trace in zip(self._on_close, (*recent, recent[0][-1:], recent[1][-1:]), strict=True):
+            artist.set_data((trace[:, 0] - here[0]) / half, (trace[:, 1] - here[1]) / half)
         return changed
 
     def _limits(self, truth: Array, estimate: Array) -> bool:
@@ -290,6 +303,26 @@ class Chart:
         self._below.set_ylim(0.0, top)
         self._below.set_xlabel(f"time [{letter}]", fontsize=9, color=_INK)
         return True
+
+
+def _track(axes: Any) -> list[Any]:
+    """Empty artists: truth, estimate, fixes, faulty fixes, vessel, where it believes to be."""
+    dot = {"linestyle": "none", "marker": "o", "markeredgewidth": 0}
+    styles: Iterable[dict[str, Any]] = (
+        {"color": _TRUTH, "linewidth": 1.6, "label": "truth"},
+        {"color": _ESTIMATE, "linewidth": 1.3, "label": "estimate"},
+        {"color": _FIX, "markersize": 3.0, "alpha": 0.7, "label": "fix", **dot},
+        {"color": _FAULT, "markersize": 4.0, "label": "fix, faulty", **dot},
+        {"color": _TRUTH, "markersize": 7, **dot},
+        {"color": _ESTIMATE, "markersize": 5, **dot},
+    )
+    return [axes.plot([], [], **style)[0] for style in styles]
+
+
+def _round_up(length: float) -> float:
+    """The next of 1, 2, 5, 10, 20, ..."""
+    decade = 10.0 ** math.floor(math.log10(length))
+    return next(f * decade for f in (1.0, 2.0, 5.0, 10.0) if f * decade >= length * (1.0 - 1e-9))
 
 
 def _clock(time: float) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 
 import numpy as np
 import pytest
@@ -86,6 +85,38 @@ def test_a_frame_after_thousands_of_steps_and_after_a_new_run():
     np.testing.assert_array_equal(chart.frame(), empty)
 
 
+def test_the_close_up_is_centred_on_the_vessel_and_as_wide_as_the_error_asks():
+    chart = Chart("close", 600.0)
+    for k in range(300):
+        chart.add_fixes(place(5.0 * k, 2.0)[None, :2], np.array([False]))
+        chart.add(float(k), place(5.0 * k, 0.0), place(5.0 * k + 12.0, -9.0))
+    chart.frame()
+    drawn = {artist.get_label(): np.array(artist.get_data()).T for artist in chart._on_close[:3]}
+    assert chart._width.get_text() == "close-up, 100 m"  # twice 50, the next after 1.5 times 15 m
+    np.testing.assert_allclose(drawn["truth"][-1], [0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(drawn["estimate"][-1] * 50.0, [-9.0, 12.0], atol=1e-2)
+    np.testing.assert_allclose(drawn["fix"][-2] * 50.0, [2.0, -5.0], atol=1e-2)
+    assert len(drawn["truth"]) == rendering._RECENT
+
+
+def test_steps_without_a_reference_leave_nothing_behind():
+    chart = Chart("gap", 600.0)
+    chart.add(0.0, place(0.0, 0.0), place(1.0, 0.0))
+    for k in range(1, 50):
+        chart.add_fixes(place(5.0, 0.0)[None, :2], np.array([False]))
+        chart.add(float(k), np.full(3, np.nan), place(1.0, 0.0))
+    assert chart._pending == []
+    assert len(chart._truth) == 1
+    assert chart.frame().std() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("length", "rounded"), [(0.3, 0.5), (1.0, 1.0), (7.5, 10.0), (1001.0, 2000.0), (5000.0, 5000.0)]
+)
+def test_round_up(length, rounded):
+    assert rendering._round_up(length) == pytest.approx(rounded)
+
+
 def test_a_diverged_estimate_does_not_shrink_the_truth_to_a_dot():
     chart = Chart("off", 600.0)
     for k in range(100):
@@ -153,4 +184,3 @@ def test_with_a_display_the_window_is_kept_up_to_date(monkeypatch):
 
 def test_the_clock():
     assert rendering._clock(3723.9) == "1:02:03"
-    assert math.isclose(rendering.Trace(1).points.size, 0)
