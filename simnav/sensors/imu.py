@@ -21,7 +21,7 @@ import numpy as np
 from pydantic import model_validator
 
 from simnav.compiled import kernel
-from simnav.sensors.processes import HeldGaussMarkov, quantize_scalar
+from simnav.sensors.processes import HeldGaussMarkov, quantize_scalar, ready
 from simnav.spec import NonNegative, Positive, Spec, Vector, quantity
 from simnav.streams import stream
 from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
@@ -128,14 +128,14 @@ class ImuSpec(Spec):
 
 
 @kernel(
-    "void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, ::1], f8[::1],"
+    "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, ::1], f8[::1],"
     " f8[:, ::1], i8, f8, f8[:, ::1], i8, f8, f8, f8, f8[::1])"
 )
 def _triad_errors(  # type: ignore[no-untyped-def]
-    ideal, out, time, interval, density, matrix, bias,
+    ideal, variates, out, time, interval, density, matrix, bias,
     instability, first_i, per_second_i, walk, first_w, per_second_w, limit, step, residual,
 ):  # fmt: skip
-    """Errors of one triad; ``out`` holds unit variates and is overwritten by the output (see the module)."""
+    """Errors of one triad (see the module); ``out`` may be ``ideal``."""
     last_i = len(instability) - 1
     last_w = len(walk) - 1
     for i in range(len(time)):
@@ -146,7 +146,7 @@ def _triad_errors(  # type: ignore[no-untyped-def]
         x, y, z = ideal[i, 0], ideal[i, 1], ideal[i, 2]
         for j in range(3):
             value = matrix[j, 0] * x + matrix[j, 1] * y + matrix[j, 2] * z
-            value += bias[j] + instability[ki, j] + walk[kw, j] + noise * out[i, j]
+            value += bias[j] + instability[ki, j] + walk[kw, j] + noise * variates[i, j]
             value = min(max(value, -limit), limit)
             if step > 0.0:
                 increment, residual[j] = quantize_scalar(value * dt, step, residual[j])
@@ -190,20 +190,21 @@ class _Triad:
         self.residual = np.zeros(3)
         self._rng = stream(seed, "instrument", "imu", name, "random_walk")
 
-    def sense(self, ideal: Array, time: Array, interval: Array) -> Array:
-        ideal = np.require(ideal, np.float64, ["C", "W"])
-        out = np.empty(ideal.shape)
+        self._variates = np.zeros((_CHUNK, 3))
+
+    def sense(self, ideal: Array, time: Array, interval: Array, overwrite: bool) -> Array:
+        ideal = ready(ideal)
+        out = ideal if overwrite else np.empty(ideal.shape)
         until = float(time[-1])
         instability, first_i = self.instability.table(until)
         walk, first_w = self.walk.table(until)
         for a in range(0, len(time), _CHUNK):
             part = slice(a, a + _CHUNK)
             if self.density > 0.0:
-                self._rng.standard_normal(out=out[part])
-            else:
-                out[part] = 0.0
+                self._rng.standard_normal(out=self._variates[: len(time[part])])
             _triad_errors(
-                ideal[part], out[part], time[part], interval[part], self.density, self.matrix, self.bias,
+                ideal[part], self._variates, out[part], time[part], interval[part],
+                self.density, self.matrix, self.bias,
                 instability, first_i, self.instability.per_second, walk, first_w, self.walk.per_second,
                 self.range, self.step, self.residual,
             )  # fmt: skip
@@ -224,13 +225,16 @@ class Imu:
         self._gyroscope = _Triad(spec.gyroscope, "gyroscope", spec.rate, seed)
         self._accelerometer = _Triad(spec.accelerometer, "accelerometer", spec.rate, seed)
 
-    def sense(self, ideal: ImuSamples) -> ImuSamples:
+    def sense(self, ideal: ImuSamples, *, overwrite: bool = False) -> ImuSamples:
         """Add the errors to the ideal samples of the next block.
 
         Parameters
         ----------
         ideal : ImuSamples
-            Means over each interval; left as they are.
+            Means over each interval.
+        overwrite : bool
+            Put the result into the arrays of ``ideal``, where they can be written: saves the time that fresh memory
+            takes, which on a long run is as long as the errors take.
 
         Returns
         -------
@@ -239,13 +243,10 @@ class Imu:
         """
         if len(ideal) == 0:
             return ideal
-        time, interval = (
-            np.require(ideal.time, np.float64, ["C", "W"]),
-            np.require(ideal.interval, np.float64, ["C", "W"]),
-        )
+        time, interval = ready(ideal.time), ready(ideal.interval)
         return ImuSamples(
             ideal.time,
             ideal.interval,
-            self._gyroscope.sense(ideal.angular_rate, time, interval),
-            self._accelerometer.sense(ideal.specific_force, time, interval),
+            self._gyroscope.sense(ideal.angular_rate, time, interval, overwrite),
+            self._accelerometer.sense(ideal.specific_force, time, interval, overwrite),
         )

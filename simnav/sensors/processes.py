@@ -19,8 +19,6 @@ from simnav.types import Array
 
 __all__ = ["GaussMarkov", "HeldGaussMarkov", "Quantizer", "RandomWalk", "WhiteNoise"]
 
-_NO_TIMES = np.empty(0)
-
 
 @kernel()
 def quantize_scalar(increment, step, residual):  # type: ignore[no-untyped-def]
@@ -63,6 +61,14 @@ def _quantize(increments, residual, step):  # type: ignore[no-untyped-def]
     for i in range(increments.shape[0]):
         for j in range(increments.shape[1]):
             increments[i, j], residual[j] = quantize_scalar(increments[i, j], step, residual[j])
+
+
+def ready(array: Array) -> Array:
+    """The array itself, or a copy, such that kernels take it: float64, C-contiguous and writable."""
+    flags = array.flags
+    if flags.c_contiguous and flags.writeable and array.dtype == np.float64:
+        return array
+    return np.array(array, dtype=np.float64, order="C")
 
 
 def _vector(value: Array | float, size: int | None = None) -> Array:
@@ -139,7 +145,7 @@ class GaussMarkov:
         n = len(time)
         x = self._rng.standard_normal((n, len(self.sigma)))
         if n:
-            t = np.require(time, np.float64, ["C", "W"])
+            t = ready(time)
             if not self._started:
                 self._time = min(0.0, float(t[0]))
                 self._started = True

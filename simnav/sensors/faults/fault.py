@@ -32,8 +32,23 @@ TOLERANCE = 0.5e-6
 #: A number for all axes, or one per axis.
 Size = float | tuple[float, ...] | None
 
+
+def _names(value: Any) -> Any:
+    names = (value,) if isinstance(value, str) else value
+    if not isinstance(names, (list, tuple)) or not all(isinstance(n, str) for n in names):
+        raise ValueError("should be the name of an instrument, or a list of names")
+    return tuple(names)
+
+
+def _intervals(value: Any) -> Any:
+    if not isinstance(value, (list, tuple)) or not all(isinstance(v, (list, tuple)) and len(v) == 2 for v in value):
+        raise ValueError("should be a list of [start, end]")
+    return tuple(value)
+
+
 #: Names of instruments; TOML may give one alone.
-Names = Annotated[tuple[str, ...], BeforeValidator(lambda x: (x,) if isinstance(x, str) else x)]
+Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
+_Intervals = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_intervals)]
 
 _QUANTITIES = {
     "gnss_position": "position",
@@ -81,7 +96,7 @@ class FaultSpec(Spec):
     instruments: Names
     start: NonNegative = quantity("s", 0.0)
     end: Positive = quantity("s", inf)
-    intervals: tuple[tuple[float, float], ...] = quantity("s", ())
+    intervals: _Intervals = quantity("s", ())
     mean_active: Positive | None = quantity("s", None)
     mean_gap: Positive | None = quantity("s", None)
     name: str = ""

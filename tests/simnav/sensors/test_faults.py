@@ -397,6 +397,8 @@ def test_faults_that_do_not_fit_the_instruments(table, message):
         ({"kind": "outage", "instruments": "gnss", "start_s": 20, "end_s": 10}, "before it starts"),
         ({"kind": "outage", "instruments": "gnss", "start_s": -1}, "start_s = -1"),
         ({"kind": "outage", "instruments": "gnss", "intervals_s": [[20, 10]]}, "start before end"),
+        ({"kind": "outage", "instruments": "gnss", "intervals_s": [10, 20]}, "list of \\[start, end\\]"),
+        ({"kind": "outage", "instruments": 5}, "list of names"),
         ({"kind": "outage", "instruments": "gnss", "intervals_s": [[10, 20], [15, 30]]}, "without overlap"),
         ({"kind": "outage", "instruments": "gnss", "intervals_s": [[10, 20]], "start_s": 5}, "exclude each other"),
         ({"kind": "outage", "instruments": "gnss", "mean_active_s": 5}, "belong together"),

@@ -206,6 +206,16 @@ def test_ideal_samples_are_left_alone_even_where_read_only():
     assert np.isfinite(real.specific_force).all()
 
 
+def test_overwriting_the_ideal_samples_gives_the_same():
+    build = ImuSpec.from_toml(NAVIGATION_GRADE).build
+    kept = build(1).sense(samples(5000, angular_rate=(0.1, 0.2, 0.3)))
+    ideal = samples(5000, angular_rate=(0.1, 0.2, 0.3))
+    over = build(1).sense(ideal, overwrite=True)
+    assert over.angular_rate is ideal.angular_rate
+    assert np.array_equal(over.angular_rate, kept.angular_rate)
+    assert np.array_equal(over.specific_force, kept.specific_force)
+
+
 def test_mistakes_are_named():
     with pytest.raises(SpecError, match="correlation_time_s"):
         GyroscopeSpec.from_toml({"bias_instability_deg_h": 1.0})
