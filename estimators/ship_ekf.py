@@ -37,7 +37,7 @@ class ShipEkf(KalmanEstimator):
         turn_time: float = 10.0,
         current: float = 0.3,
         current_time: float = 3600.0,
-        sway: float = 0.1,
+        sway: float = 0.2,
     ):
         super().__init__(ShipModel(acceleration, radians(turn_rate_deg), turn_time, current, current_time, sway))
 

@@ -60,7 +60,7 @@ class ShipModel(ErrorModel):
         turn_time: float = 10.0,
         current: float = 0.3,
         current_time: float = 3600.0,
-        sway: float = 0.1,
+        sway: float = 0.2,
     ):
         self.acceleration = acceleration
         self.turn_rate, self.turn_time = turn_rate, turn_time

@@ -1,0 +1,25 @@
+"""The row ``gnss-only``: what the GNSS receiver alone can do."""
+
+from __future__ import annotations
+
+from estimators.models.kinematic import KinematicModel
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimator import register
+
+__all__ = ["GnssOnly"]
+
+
+@register("gnss-only", aliases=("gnss",))
+class GnssOnly(KalmanEstimator):
+    """GNSS alone: fixes (and velocities, if any) smoothed by a constant-velocity Kalman filter.
+
+    Between fixes and in an outage the ship goes on as she went (`estimators.models.kinematic`).
+
+    Parameters
+    ----------
+    acceleration : float
+        Noise density of the velocity, each axis [m/s/sqrt(s)].
+    """
+
+    def __init__(self, acceleration: float = 0.2):
+        super().__init__(KinematicModel(acceleration))

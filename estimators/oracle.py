@@ -1,0 +1,61 @@
+"""The reference row ``oracle``: the EKF that is told the true noise and the faults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimators.adaptations.truth import TrueNoise, imu_faults
+from estimators.models.inertial import InertialModel
+from estimators.models.ship import ShipModel
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimator import UnsuitableScenario, register
+from simnav.recording import Recording
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
+
+__all__ = ["Oracle"]
+
+
+@register("oracle")
+class Oracle(KalmanEstimator):
+    """EKF that knows each measurement's true noise and faults; what any real-time estimator is measured against.
+
+    The inertial model where there is an IMU, the ship model where there is none. Measurements that a fault spoilt are left
+    out (`estimators.adaptations.truth`); a disturbance of the IMU is taken off its samples. On a run without faults it is
+    ``ekf`` or ``ship-ekf``. It is not ranked.
+    """
+
+    reference = True
+
+    def __init__(self) -> None:
+        self._truth = TrueNoise()
+        self._imu_faults: tuple[Array, Array] | None = None
+        self._revealed = False
+        super().__init__(InertialModel(), self._truth)
+
+    def reveal(self, recording: Recording) -> None:
+        """Take the labels."""
+        self._truth.reveal(recording)
+        self._imu_faults = imu_faults(recording)
+        self._revealed = True
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; needs an IMU or what the ship model needs, and `reveal` before."""
+        if not self._revealed:
+            raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
+        if not instruments:
+            raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
+        self.model = InertialModel() if instruments.imu is not None else ShipModel()
+        super().reset(start, instruments)
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step, without what a fault did to the IMU."""
+        imu = measurements.imu
+        if imu is not None and len(imu) and self._imu_faults is not None:
+            times, error = self._imu_faults
+            k = int(np.searchsorted(times, imu.time[0] - 1e-9))
+            e = error[k : k + len(imu)]
+            imu = replace(imu, angular_rate=imu.angular_rate - e[:, :3], specific_force=imu.specific_force - e[:, 3:])
+            measurements = Measurements(measurements.start, measurements.time, imu, measurements.aids)
+        return super().update(measurements)
