@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.earth import displace, relative_position
-from simnav.log.channel import Series
-from simnav.rotation import wrap_angle
+from simnav.earth import displace, earth_rate, relative_position
+from simnav.log.channel import ImuSeries, Series
+from simnav.rotation import dcm_from_rpy, wrap_angle
 from simnav.types import Array, NavigationStates, TapStates
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 __all__ = ["Reference"]
+
+#: Half the time over which the gyroscopes are averaged for a lever arm [s].
+_AROUND = 0.025
 
 
 class _Track:
@@ -34,13 +38,13 @@ class _Track:
 
     def covered(self, time: Array) -> NDArray[np.bool_]:
         tolerance = 1e-6
-        after = np.clip(np.searchsorted(self.time, time), 1, max(1, len(self.time) - 1))
-        before = after - 1
         if len(self.time) == 1:
             return np.asarray(np.abs(time - self.time[0]) < tolerance)
-        left, right = time - self.time[before], self.time[after] - time
+        after = np.clip(np.searchsorted(self.time, time), 1, len(self.time) - 1)
+        left, right = time - self.time[after - 1], self.time[after] - time
         inside = (left > -tolerance) & (right > -tolerance)
-        return np.asarray(inside & ((left + right <= self.max_gap) | (np.minimum(left, right) <= self.near)))
+        near = np.minimum(np.abs(left), np.abs(right)) <= self.near
+        return np.asarray(inside & ((left + right <= self.max_gap) | near))
 
     def __call__(self, time: Array, derivative: int = 0) -> Array:
         """(n, 3) values, or derivatives, at n times; without regard to holes."""
@@ -57,6 +61,10 @@ class Reference:
     velocity, attitude : Series or None
     max_gap : float or None
         Longest hole that is interpolated [s]; default one and a half times the usual spacing.
+    lever_arm : sequence of 3 floats
+        From the IMU to the point that the series describe, body axes [m].
+    imu : ImuSeries or None
+        Its gyroscopes give the angular rate for the lever arm; without them that of the interpolated attitude is taken.
 
     Attributes
     ----------
@@ -65,18 +73,26 @@ class Reference:
     """
 
     def __init__(
-        self, position: Series, velocity: Series | None, attitude: Series | None, max_gap: float | None = None
+        self,
+        position: Series,
+        velocity: Series | None,
+        attitude: Series | None,
+        max_gap: float | None = None,
+        lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+        imu: ImuSeries | None = None,
     ):
         self.time = position.time
-        self._origin = position.value[0]
-        self._position = _Track(position.time, relative_position(position.value, self._origin), max_gap)
-        self._velocity = None if velocity is None else _Track(velocity.time, velocity.value, max_gap)
         self._attitude = None if attitude is None else _Track(attitude.time, np.unwrap(attitude.value, axis=0), max_gap)
-
-    @property
-    def has_attitude(self) -> bool:
-        """Whether there is any attitude in it."""
-        return self._attitude is not None
+        places, speeds = position.value, None if velocity is None else velocity.value
+        lever = np.asarray(lever_arm, dtype=np.float64)
+        if lever.any():
+            places = displace(places, -self._rotate(position.time, np.broadcast_to(lever, places.shape)))
+            if velocity is not None:
+                turning = np.cross(self._angular_rate(velocity.time, float(places[0, 0]), imu), lever)
+                speeds = velocity.value - self._rotate(velocity.time, turning)
+        self._origin = places[0]
+        self._position = _Track(position.time, relative_position(places, self._origin), max_gap)
+        self._velocity = None if velocity is None or speeds is None else _Track(velocity.time, speeds, max_gap)
 
     def states(self, time: Array) -> NavigationStates:
         """The reference at n times; not a number where it has nothing to say (outside, or in a hole)."""
@@ -99,7 +115,7 @@ class Reference:
         """What a simulated instrument sees at n times, holes interpolated.
 
         Velocity comes from the positions where the reference has none. The water is taken to rest. Angular rate is that
-        of the interpolated roll, pitch and yaw (Groves eq. 2.58, inverted).
+        of the interpolated attitude.
 
         Raises
         ------
@@ -111,7 +127,40 @@ class Reference:
         time = np.asarray(time, dtype=np.float64)
         derived, _ = self.motion(time)
         velocity = derived if self._velocity is None else self._velocity(time)
-        velocity = np.where(np.isfinite(velocity), velocity, derived)
+        return TapStates(
+            time,
+            displace(self._origin, self._position(time)),
+            np.where(np.isfinite(velocity), velocity, derived),
+            wrap_angle(np.nan_to_num(self._attitude(time))),
+            self._attitude_rate(time),
+            np.zeros((len(time), 3)),
+        )
+
+    def _dcm(self, time: Array) -> Array:
+        assert self._attitude is not None
+        return dcm_from_rpy(np.nan_to_num(self._attitude(time)))
+
+    def _rotate(self, time: Array, vector: Array) -> Array:
+        """Body vectors to north-east-down."""
+        return np.einsum("nij,nj->ni", self._dcm(time), vector)
+
+    def _angular_rate(self, time: Array, latitude: float, imu: ImuSeries | None) -> Array:
+        """(n, 3) rates of the body relative to the Earth [rad/s]: of the gyroscopes where there are some."""
+        rate = self._attitude_rate(time)
+        if imu is None:
+            return rate
+        integral = np.zeros((len(imu.edge), 3))
+        np.cumsum(imu.mean[:, :3] * np.diff(imu.edge)[:, None], axis=0, out=integral[1:])
+        before, after = time - _AROUND, time + _AROUND
+        inside = (before >= imu.edge[0]) & (after <= imu.edge[-1])
+        turned = [np.interp(after, imu.edge, a) - np.interp(before, imu.edge, a) for a in integral.T]
+        earth = np.einsum("nji,j->ni", self._dcm(time), earth_rate(latitude))
+        measured = np.stack(turned, axis=-1) / (2.0 * _AROUND) - earth
+        return np.where(inside[:, None], measured, rate)
+
+    def _attitude_rate(self, time: Array) -> Array:
+        """The rates of the interpolated roll, pitch and yaw, in body axes (Groves eq. 2.58, inverted)."""
+        assert self._attitude is not None
         angle, rate = np.nan_to_num(self._attitude(time)), np.nan_to_num(self._attitude(time, 1))
         sr, cr = np.sin(angle[:, 0]), np.cos(angle[:, 0])
         sp, cp = np.sin(angle[:, 1]), np.cos(angle[:, 1])
@@ -120,11 +169,4 @@ class Reference:
             rate[:, 1] * cr + rate[:, 2] * cp * sr,
             rate[:, 2] * cp * cr - rate[:, 1] * sr,
         ]
-        return TapStates(
-            time,
-            displace(self._origin, self._position(time)),
-            velocity,
-            wrap_angle(angle),
-            np.stack(body, axis=-1),
-            np.zeros((len(time), 3)),
-        )
+        return np.stack(body, axis=-1)

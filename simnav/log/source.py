@@ -74,8 +74,8 @@ class LogSource:
         self.recording = names[seed % len(names)]
         self.instruments = scenario.instruments_sheet()
         self.step = float(scenario.step)
-        reference = _reference(log, self.recording)
         imu = None if log.imu is None else read_imu(log, log.imu, self.recording)
+        reference = _reference(log, self.recording, imu)
         begin = _begin(log, reference, imu)
         end = min(reference.time[-1], math.inf if imu is None else imu.edge[-1])
         self.duration = self._length(scenario.duration, float(end - begin))
@@ -179,7 +179,7 @@ def _cut(s: AidStream, begin: float, until: float) -> AidStream:
     return replace(s, **parts, dropped=s.dropped[c:d])
 
 
-def _reference(log: RecordedSpec, recording: str) -> Reference:
+def _reference(log: RecordedSpec, recording: str, imu: ImuSeries | None) -> Reference:
     spec = log.reference
 
     def series(name: str) -> Series | None:
@@ -188,7 +188,7 @@ def _reference(log: RecordedSpec, recording: str) -> Reference:
 
     position = series("position")
     assert position is not None
-    return Reference(position, series("velocity"), series("attitude"), spec.max_gap)
+    return Reference(position, series("velocity"), series("attitude"), spec.max_gap, spec.lever_arm, imu)
 
 
 def _begin(log: RecordedSpec, reference: Reference, imu: ImuSeries | None) -> float:

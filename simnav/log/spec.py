@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from simnav.spec import UNITS, NonNegative, Positive, Spec, closest, quantity
+from simnav.spec import UNITS, NonNegative, Positive, Spec, Vector, closest, quantity
 
 __all__ = [
     "LOG_UNITS",
@@ -215,6 +215,9 @@ class ReferenceSpec(Spec):
     velocity, attitude : ChannelSpec or None
         North-east-down; roll, pitch, yaw. Where absent they are not scored, and the start is made from the positions
         (velocity, heading along the course) and from the accelerometers (roll, pitch).
+    lever_arm : (float, float, float)
+        From the IMU (or the vessel's reference point) to the point that the reference describes, body axes [m];
+        position and velocity are brought back to the IMU with it.
     max_gap : float or None
         The reference is interpolated across holes up to this long [s]; default one and a half times its usual spacing.
     """
@@ -222,6 +225,7 @@ class ReferenceSpec(Spec):
     position: ChannelSpec
     velocity: ChannelSpec | None = None
     attitude: ChannelSpec | None = None
+    lever_arm: Vector = quantity("m", (0.0, 0.0, 0.0))
     max_gap: Positive | None = quantity("s", None)
 
 
@@ -287,6 +291,8 @@ class RecordedSpec(Spec):
                 raise ValueError(f"{name}: 'columns' is missing")
             if channel.frame != "geodetic" and self.origin is None:
                 raise ValueError(f"{name}.frame = {channel.frame!r} needs [log.origin]")
+        if any(reference.lever_arm) and reference.attitude is None:
+            raise ValueError("reference.lever_arm_m needs [log.reference.attitude]")
         if not isinstance(self.recordings, str) and not self.recordings:
             raise ValueError("recordings = [] is empty; name at least one, or leave it out")
         return self
