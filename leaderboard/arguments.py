@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from leaderboard.console import UserError, mistakes
+from leaderboard.console import Output, UserError, mistakes, sentence
 
 if TYPE_CHECKING:
     from leaderboard.campaign import EstimatorRequest
@@ -61,12 +61,14 @@ def _settings(given: Iterable[str]) -> dict[str, str]:
 def requests(given: Iterable[str] | None, settings: Sequence[str] | None = None) -> list[EstimatorRequest]:
     """The estimators that were asked for, all registered ones where none was.
 
+    Files are not imported here: whoever runs them does so, in a process of its own where it can.
+
     Parameters
     ----------
     given : iterable of str or None
         As for `split_estimators`.
     settings : sequence of str or None
-        ``name=value``; each goes to every estimator that has a parameter of that name.
+        ``name=value``; of several estimators each gets those that it has a parameter for.
 
     Raises
     ------
@@ -79,18 +81,22 @@ def requests(given: Iterable[str] | None, settings: Sequence[str] | None = None)
     asked = split_estimators(given) or [(name, {}) for name in names()]
     common = _settings(settings or ())
     unused = set(common)
-    made: dict[Any, EstimatorRequest] = {}
+    made: dict[str, EstimatorRequest] = {}
     for name, values in asked:
         with mistakes():
-            known = {p.name for p in describe(name).parameters}
-            mine = {k: v for k, v in common.items() if k in known}
+            mine = common
+            if len(asked) > 1 and common:
+                known = {p.name for p in describe(name).parameters}
+                mine = {k: v for k, v in common.items() if k in known}
             unused -= set(mine)
-            make(name, **{**mine, **values})  # so that a mistake shows now, not in a worker
-        request = EstimatorRequest(name, {**mine, **values})
-        made.setdefault((name, tuple(sorted(request.parameters.items()))), request)
+            request = EstimatorRequest(name, {**mine, **values})
+            if ".py" not in name:
+                make(name, **request.parameters)  # so that a mistake shows now, not in a worker
+        made.setdefault(request.label, request)
     if unused:
-        which = asked[0][0] if len(asked) == 1 else "any of the estimators"
-        raise UserError(f"--set {sorted(unused)[0]}: no such parameter of {which}; 'simnav list estimators' shows them")
+        raise UserError(
+            f"--set {min(unused)}: none of the estimators has it; 'simnav list estimators' shows what they have"
+        )
     return list(made.values())
 
 
@@ -102,8 +108,25 @@ def scenario(name: str) -> Scenario:
         return load(name)
 
 
-def scenarios(given: Iterable[str] | None) -> list[Scenario]:
-    """The scenarios that were asked for, the whole catalogue where none was."""
+def scenarios(given: Iterable[str] | None, out: Output) -> list[Scenario]:
+    """The scenarios that were asked for; where none was, all of the catalogue but logs whose files are not here."""
     from simnav.scenario import names
 
-    return [scenario(name) for name in dict.fromkeys(split_names(given) or names())]
+    asked = split_names(given)
+    found = []
+    for name in dict.fromkeys(asked or names()):
+        chosen = scenario(name)
+        if chosen.log is not None:
+            from simnav.source import open_source
+
+            try:
+                open_source(chosen, 0)
+            except (ValueError, OSError) as error:
+                if asked:
+                    raise UserError(sentence(error)) from error
+                out.note(f"simnav: {name} is left out: {sentence(error)}")
+                continue
+        found.append(chosen)
+    if not found:
+        raise UserError("there is no scenario to run")
+    return found

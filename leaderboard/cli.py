@@ -41,8 +41,15 @@ Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", he
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the run.")]
 FirstSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the first run; the others count up.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes.")]
-TimeLimit = Annotated[float, typer.Option("--time-limit", min=0.1, help="Seconds that one estimator may take a run.")]
-MemoryLimit = Annotated[int, typer.Option("--memory-limit", min=128, help="MiB that a worker may take.")]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        "--time-limit", min=0.1, help="Seconds an estimator may take a run. [a fifth of real time, at least 60]"
+    ),
+]
+MemoryLimit = Annotated[
+    int, typer.Option("--memory-limit", min=16, help="MiB an estimator may take beyond the recording.")
+]
 
 
 class Topic(StrEnum):
@@ -151,7 +158,7 @@ def new_estimator(
 ) -> None:
     """Write a small estimator that works, to start from."""
     with session(json, debug) as out:
-        from leaderboard import arguments, single
+        from leaderboard import single
 
         single.scaffold(out, name, output)
 
@@ -167,8 +174,8 @@ def evaluate(
     set_: Set = None,
     seed: FirstSeed = 0,
     workers: Workers = 2,
-    time_limit: TimeLimit = 600.0,
-    memory_limit: MemoryLimit = 4096,
+    time_limit: TimeLimit = None,
+    memory_limit: MemoryLimit = 2048,
     results: Annotated[Path | None, typer.Option(help="Keep the results in this folder. [thrown away]")] = None,
     json: Json = False,
     debug: Debug = False,
@@ -179,7 +186,7 @@ def evaluate(
 
         mine = arguments.requests([estimator], set_)[0]
         out.code = monte_carlo.evaluate(
-            out, mine, arguments.requests(against, None), arguments.scenarios(scenario), range(seed, seed + runs),
+            out, mine, arguments.requests(against, None), arguments.scenarios(scenario, out), range(seed, seed + runs),
             monte_carlo.Limits(workers, time_limit, memory_limit), results,
         )  # fmt: skip
 
@@ -194,8 +201,8 @@ def campaign(
     quick: Annotated[bool, typer.Option("--quick", help="A preset that ends within minutes.")] = False,
     set_: Set = None,
     workers: Workers = 2,
-    time_limit: TimeLimit = 600.0,
-    memory_limit: MemoryLimit = 4096,
+    time_limit: TimeLimit = None,
+    memory_limit: MemoryLimit = 2048,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -205,7 +212,7 @@ def campaign(
 
         seeds = range(seed, seed + (runs or (10 if quick else 50)))
         out.code = monte_carlo.campaign(
-            out, arguments.scenarios(scenario), arguments.requests(estimator, set_), seeds,
+            out, arguments.scenarios(scenario, out), arguments.requests(estimator, set_), seeds,
             monte_carlo.Limits(workers, time_limit, memory_limit), output,
         )  # fmt: skip
 
@@ -219,7 +226,7 @@ def leaderboard_(
 ) -> None:
     """Rank the results of a campaign and write the site."""
     with session(json, debug) as out:
-        from leaderboard import arguments, monte_carlo
+        from leaderboard import monte_carlo
 
         out.code = monte_carlo.leaderboard(out, results, output)
 
@@ -228,7 +235,7 @@ def leaderboard_(
 def warmup(json: Json = False, debug: Debug = False) -> None:
     """Compile every kernel, once; later starts are quick."""
     with session(json, debug) as out:
-        from leaderboard import arguments, single
+        from leaderboard import single
 
         single.warmup(out)
 

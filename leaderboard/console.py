@@ -33,11 +33,10 @@ class UserError(Exception):
 @contextlib.contextmanager
 def mistakes(*kinds: type[Exception]) -> Iterator[None]:
     """Turn exceptions of the given kinds (by default those of wrong input) into `UserError`."""
+    expected = kinds or (ValueError, LookupError, TypeError, OSError, SyntaxError, ImportError, AttributeError)
     try:
         yield
-    except UserError:
-        raise
-    except kinds or (ValueError, LookupError, TypeError, OSError, SyntaxError, ImportError, AttributeError) as error:
+    except expected as error:
         raise UserError(sentence(error)) from error
 
 
@@ -118,15 +117,22 @@ class Progress:
         if not self._console.is_terminal and self._done:
             self._line("")
 
-    def __call__(self, done: int, total: int | None = None, note: str = "") -> None:
-        """Tell how many of how many are done, and what was last."""
+    def __call__(self, done: int, total: int | None = None, note: str = "", left: float | None = None) -> None:
+        """Tell how many of how many are done, what was last, and the seconds left where the caller knows better."""
         self._done, self._total = done, self._total if total is None else total
-        left = _clock(self.left())
-        self._bar.update(self._task, completed=done, total=self._total, note=note, left=left)
+        left_text = _clock(self.left() if left is None else left)
+        self._bar.update(self._task, completed=done, total=self._total, note=note, left=left_text)
         now = time.monotonic()
         if not self._console.is_terminal and now - self._said >= self._PAUSE:
             self._said = now
-            self._line(f", {left} left")
+            self._line(f", {left_text} left")
+
+    def begin(self, text: str) -> None:
+        """Another stage: its name, from nothing."""
+        if text != self._text:
+            self._text, self._done, self._total = text, 0, None
+            self._start = self._said = time.monotonic()
+            self._bar.reset(self._task, description=text, total=None, note="", left="–")
 
     def left(self) -> float | None:
         """Seconds left by the mean pace so far, or None."""
@@ -253,9 +259,10 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
             import traceback
 
             traceback.print_exc()
-        mistake = isinstance(error, UserError) or type(error).__name__ in ("SpecError", "UnsuitableScenario")
+        mistake = isinstance(error, (UserError, _spec_error()))
         text = sentence(error)
-        if not mistake and not isinstance(error, OSError):
+        ours = type(error).__module__.partition(".")[0] in ("simnav", "leaderboard")  # their messages are sentences
+        if not mistake and not ours and not isinstance(error, OSError):
             text = f"{type(error).__name__}: {text}" + ("" if debug else " (--debug shows where)")
         out.note(f"simnav: {text}")
         code = USER if mistake else FAILED
@@ -267,6 +274,12 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     out.flush()
     if out.code:
         raise typer.Exit(out.code)
+
+
+def _spec_error() -> type[Exception]:
+    from simnav.spec import SpecError
+
+    return SpecError
 
 
 def absolute(path: Path | str) -> Path:

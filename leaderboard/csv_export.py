@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.types import KINDS, Array
 
@@ -76,7 +77,7 @@ def _unit(name: str) -> str:
     return _UNITS.get(stem, _VELOCITY)
 
 
-def _table(path: Path, time: Array, names: list[str], values: Array, faults: Array | None = None) -> Path:  # type: ignore[type-arg]
+def _table(path: Path, time: Array, names: list[str], values: Array, faults: NDArray[np.uint32] | None = None) -> Path:
     units = [_unit(n) for n in names]
     scale = np.array([np.degrees(1.0) if u.startswith("deg") else 1.0 for u in units])
     header = ["time_s", *(f"{n}_{u}" for n, u in zip(names, units, strict=True))]

@@ -54,9 +54,9 @@ _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
 INK, GREY, GRID, SHADE, PAPER = "#1b2430", "#66707d", "#dfe3e8", "#eceff3", "#fefefe"
 _DARK = {INK: "#e8ebef", GREY: "#9aa5b1", GRID: "#343c46", SHADE: "#262d36", PAPER: "#161b21"}
 TRUTH = INK
-_POINTS = 400  # of a curve over time: more cannot be seen
+_POINTS = 300  # of a curve over time: more cannot be seen
 
-_RC = {
+_RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.titlesize": 9.5,
@@ -72,7 +72,6 @@ _RC = {
     "axes.axisbelow": True,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.formatter.use_mathtext": True,
     "grid.color": GRID,
     "grid.linewidth": 0.6,
     "xtick.color": GREY,
@@ -225,23 +224,35 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
     -------
     list of Path
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     written = []
-    for kind in formats:
-        buffer = io.BytesIO()
-        with _styled():
-            # No date, so that the same results give the same file.
-            metadata = {"Date": None} if kind == "svg" else {"CreationDate": None} if kind == "pdf" else None
-            ground = {"transparent": True} if kind == "svg" else {"facecolor": "white"}
-            fig.savefig(buffer, format=kind, dpi=dpi, metadata=metadata, **ground)
-        fig.set_layout_engine("none")  # laid out once: the other formats look the same, and come quicker
-        content = buffer.getvalue()
-        if kind == "svg":
-            content = _follow_theme(content.decode()).encode()
-        target = path.with_suffix(f".{kind}")
-        partial = target.with_name(f".{target.name}.part")
-        partial.write_bytes(content)
-        os.replace(partial, target)
-        written.append(target)
+    with _styled():
+        FigureCanvasAgg(fig)
+        fig.draw_without_rendering()
+        fig.set_layout_engine("none")  # laid out once: all formats look the same, and come quicker
+        for kind in formats:
+            # The canvases' own methods: Figure.savefig draws everything twice. No date, so that the same results
+            # give the same file.
+            buffer = io.BytesIO()
+            fig.set_facecolor("none" if kind == "svg" else "white")
+            if kind == "svg":
+                FigureCanvasSVG(fig).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
+            elif kind == "pdf":
+                FigureCanvasPdf(fig).print_pdf(buffer, metadata={"CreationDate": None})  # type: ignore[no-untyped-call]
+            else:
+                fig.set_dpi(dpi)
+                FigureCanvasAgg(fig).print_png(buffer)  # type: ignore[no-untyped-call]
+            content = buffer.getvalue()
+            if kind == "svg":
+                content = _follow_theme(content.decode()).encode()
+            target = path.with_suffix(f".{kind}")
+            partial = target.with_name(f".{target.name}.part")
+            partial.write_bytes(content)
+            os.replace(partial, target)
+            written.append(target)
     return written
 
 
@@ -341,7 +352,7 @@ def error_over_time(
             _shade(ax, outages, factor, named=ax is axes[0])
             floor = math.inf
             for band in sorted(bands, key=lambda b: style.order(b.label), reverse=True):
-                every = max(1, len(band.time) // _POINTS)
+                every = max(1, -(-len(band.time) // _POINTS))
                 low, middle, high = _percentiles(band.values[:, ::every], (5.0, 50.0, 95.0))
                 colour, t = style.colour(band.label), band.time[::every] * factor
                 if len(band.values) > 1:
@@ -486,8 +497,8 @@ def run_chart(
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
             ax.tick_params(labelbottom=row == len(right) - 1)
         if first is not None:
-            first.set_title("Error; dashed: claimed ±3σ" if any(c.bound is not None for cs in errors.values() for c in cs)
-                            else "Error")  # fmt: skip
+            claimed = any(c.bound is not None for curves in errors.values() for c in curves)
+            first.set_title("Error; dashed: claimed ±3σ" if claimed else "Error")
             fig.axes[-1].set_xlabel(f"Time [{unit}]")
     return fig
 
@@ -517,11 +528,14 @@ def _time_unit(longest: float) -> tuple[str, float]:
 
 def _percentiles(values: Array, levels: Sequence[float]) -> Array:
     """Over the runs, (levels, n); NaN where fewer than half of the runs have a value."""
-    present = np.isfinite(values).sum(axis=0)
+    finite = np.isfinite(values)
+    if finite.all():
+        return np.asarray(np.percentile(values, levels, axis=0))
+    present = finite.sum(axis=0)
     result = np.full((len(levels), values.shape[1]), np.nan)
     enough = present >= max(1.0, 0.5 * len(values))
     if enough.any():
-        result[:, enough] = np.nanpercentile(np.where(np.isfinite(values), values, np.nan)[:, enough], levels, axis=0)
+        result[:, enough] = np.nanpercentile(np.where(finite, values, np.nan)[:, enough], levels, axis=0)
     return result
 
 
@@ -544,7 +558,7 @@ def _log_scale(ax: Axes, floor: float) -> None:
 
 def _plain_log_ticks(axis: Any) -> None:
     """Powers of ten as 0.1, 1, 10, 100, 1k; more ticks where the range is short."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     low, high = sorted(axis.get_view_interval())
     decades = math.log10(high / low) if low > 0.0 else 9.0
@@ -557,7 +571,7 @@ def _plain_log_ticks(axis: Any) -> None:
     subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0, 3.0) if decades < 3.2 else (1.0,)
     axis.set_major_locator(LogLocator(base=10.0, subs=subs, numticks=12))
     axis.set_major_formatter(FuncFormatter(text))
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_locator(NullLocator())
 
 
 def _legend_below(fig: Figure, ax: Axes) -> None:

@@ -78,8 +78,6 @@ def _specs(annotation: Any) -> Iterator[type[Spec]]:
     """The Spec classes of a (nested, annotated) union."""
     from simnav.spec import Spec
 
-    if isinstance(annotation, typing.TypeAliasType) if hasattr(typing, "TypeAliasType") else False:
-        annotation = annotation.__value__
     if isinstance(annotation, type) and issubclass(annotation, Spec):
         yield annotation
     else:
@@ -107,7 +105,7 @@ def table_of(topic: str, entries: list[dict[str, Any]]) -> Table:
     if topic == "scenarios":
         rows = [[e["name"], f"v{e['id'].rpartition('-v')[2]}", tables.duration(e["duration"]), e["title"],
                  ", ".join(e["tags"])] for e in entries]  # fmt: skip
-        return tables.table("Scenarios", ["name", "", "duration", "title", "tags"], rows, numeric=["duration"])
+        return tables.table("Scenarios", ["name", "version", "duration", "title", "tags"], rows, numeric=["duration"])
     if topic == "estimators":
         rows = [[e["name"] + (" *" if e["reference"] else ""), e["summary"], tables.parameters(e["parameters"])]
                 for e in entries]  # fmt: skip

@@ -22,7 +22,7 @@ def number(value: Any, digits: int = 3) -> str:
     """
     if value is None:
         return MISSING
-    if isinstance(value, bool) or isinstance(value, str):
+    if isinstance(value, (bool, str)):
         return str(value)
     if isinstance(value, int):
         return str(value)
@@ -68,14 +68,14 @@ def duration(seconds: Any) -> str:
     """A time with the unit that suits it.
 
     >>> duration(3.2e-5), duration(0.25), duration(90), duration(5400)
-    ('32.0 µs', '250 ms', '90.0 s', '1.50 h')
+    ('32.0 µs', '250 ms', '90.0 s', '90.0 min')
     """
     if not _finite(seconds):
         return MISSING
     for factor, unit in ((1e-6, "µs"), (1e-3, "ms"), (1.0, "s")):
         if seconds < 999.5 * factor:
             return f"{number(seconds / factor)} {unit}"
-    return f"{number(seconds / 3600.0)} h"
+    return f"{number(seconds / 60.0)} min" if seconds < 7200.0 else f"{number(seconds / 3600.0)} h"
 
 
 def size(count: Any) -> str:
