@@ -142,7 +142,7 @@ class Reference:
 
     def _rotate(self, time: Array, vector: Array) -> Array:
         """Body vectors to north-east-down."""
-        return np.einsum("nij,nj->ni", self._dcm(time), vector)
+        return np.asarray(np.einsum("nij,nj->ni", self._dcm(time), vector))
 
     def _angular_rate(self, time: Array, latitude: float, imu: ImuSeries | None) -> Array:
         """(n, 3) rates of the body relative to the Earth [rad/s]: of the gyroscopes where there are some."""
@@ -169,4 +169,4 @@ class Reference:
             rate[:, 1] * cr + rate[:, 2] * cp * sr,
             rate[:, 2] * cp * cr - rate[:, 1] * sr,
         ]
-        return np.stack(body, axis=-1)
+        return np.asarray(np.stack(body, axis=-1))
