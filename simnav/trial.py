@@ -44,6 +44,8 @@ _TIME_TOLERANCE = 1e-6  # s; steps are multiples of the sample interval up to ro
 _ROUNDING = 1e-6  # of a correlation coefficient: asymmetry, and negative eigenvalues, up to this are rounding
 _CHUNK = 1024  # covariances checked together
 _EARTH_RADIUS = 6371e3
+_ALL = np.ones(9, dtype=bool)
+_PLACES = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9)}  # in `COMPONENTS`
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +201,7 @@ class _Log:
     def __init__(self, steps: int, keep_covariance: bool):
         self.n = 0
         self.time = np.full(steps, np.nan)
-        self.vectors = {name: np.full((steps, 3), np.nan) for name in ("position", "velocity", "attitude")}
+        self.vectors = {name: np.full((steps, 3), np.nan) for name in _PLACES}
         self.estimated = np.zeros((steps, 9), dtype=bool)
         self.seconds = np.full(steps, np.nan)
         self.diagnostics: dict[str, list[tuple[int, Array]]] = {}
@@ -219,32 +221,21 @@ class _Log:
         vectors = {n: _array(getattr(estimate, n), n, (3,)) for n in self.vectors if getattr(estimate, n) is not None}
         if estimate.estimated is not None and np.shape(estimate.estimated) != (9,):
             raise _InvalidOutputError(f"estimated has shape {np.shape(estimate.estimated)}, expected (9,)")
-        mask = estimate.mask()
-        for j, name in enumerate(self.vectors):
-            # Roll, pitch and yaw are not the components of the attitude error one by one: `_attitude_given` knows.
-            wanted = mask[3 * j : 3 * j + 3]
-            if name == "attitude":
-                wanted = _attitude_given(wanted)
-            if name in vectors and not np.isfinite(vectors[name][wanted]).all():
-                raise _InvalidOutputError(f"{name} is not finite: {vectors[name].tolist()}")
-        covariance = None
-        if estimate.covariance is not None:
-            covariance = _array(estimate.covariance, "covariance", (9, 9))
-            if not mask.all():
-                covariance = np.where(np.outer(mask, mask), covariance, np.nan)
-            if not np.isfinite(covariance[mask][:, mask]).all():
-                raise _InvalidOutputError("covariance is not finite")
-            if np.diagonal(covariance)[mask].min(initial=0.0) < 0.0:
-                j = int(np.nanargmin(np.diagonal(covariance)))
-                raise _InvalidOutputError(f"variance of {COMPONENTS[j]} is negative: {covariance[j, j]:g}")
+        mask = _ALL if estimate.estimated is None and len(vectors) == 3 else estimate.mask()
+        for name, vector in vectors.items():
+            if not all(map(math.isfinite, vector.tolist())):
+                wanted = mask[_PLACES[name]] if name != "attitude" else _attitude_given(mask[6:])
+                if not np.isfinite(vector[wanted]).all():
+                    raise _InvalidOutputError(f"{name} is not finite: {vector.tolist()}")
+        covariance = None if estimate.covariance is None else _array(estimate.covariance, "covariance", (9, 9)).copy()
         diagnostics = {str(n): _array(v, f"diagnostic {n!r}", None) for n, v in estimate.diagnostics.items()}
         for name, value in diagnostics.items():
             if name in self.diagnostics and self.diagnostics[name][0][1].ndim != value.ndim:
                 raise _InvalidOutputError(f"diagnostic {name!r} changes its number of dimensions")
         flags = [_flag(f) for f in estimate.flagged]
-        if mask[:2].all() and np.isfinite(truth[:2]).all():
+        if mask[0] and mask[1]:
             distance = _distance(vectors["position"], truth)
-            if distance > DIVERGENCE_LIMIT:
+            if distance > DIVERGENCE_LIMIT:  # never where the truth is not known
                 raise _DivergedError(
                     f"horizontal error {distance / 1e3:.0f} km is above the limit of {DIVERGENCE_LIMIT / 1e3:.0f} km"
                 )
@@ -257,7 +248,7 @@ class _Log:
             self.diagnostics.setdefault(name, []).append((k, value.copy()))
         self.flags += [(k, *f) for f in flags]
         if covariance is not None:
-            self.chunk.append((k, covariance.copy()))
+            self.chunk.append((k, covariance))
             if len(self.chunk) >= _CHUNK:
                 self.check_covariances()
 
@@ -268,7 +259,9 @@ class _Log:
         epochs = np.array([k for k, _ in self.chunk])
         p = np.stack([c for _, c in self.chunk])
         self.chunk = []
-        bad, why = _first_bad_covariance(p, self.estimated[epochs])
+        known = self.estimated[epochs]
+        p[~(known[:, :, None] & known[:, None, :])] = np.nan
+        bad, why = _first_bad_covariance(p, known)
         if bad is not None:
             self.n = int(epochs[bad])
             epochs, p = epochs[:bad], p[:bad]
@@ -346,24 +339,30 @@ def _distance(position: Array, truth: Array) -> float:
 
 
 def _first_bad_covariance(p: Array, estimated: NDArray[np.bool_]) -> tuple[int | None, str]:
-    """Index of the first covariance that is not symmetric positive semi-definite up to rounding, and why."""
-    known = estimated[:, :, None] & estimated[:, None, :]
-    p = np.where(known, p, 0.0)
-    sigma = np.sqrt(np.diagonal(p, axis1=1, axis2=2))
-    sigma = np.where(sigma > 0.0, sigma, 1.0)
-    correlation = p / sigma[:, :, None] / sigma[:, None, :]
-    asymmetric: NDArray[np.bool_] = np.any(np.abs(correlation - correlation.swapaxes(1, 2)) > _ROUNDING, axis=(1, 2))
-    symmetric = 0.5 * (correlation + correlation.swapaxes(1, 2))
+    """Index of the first covariance that is not finite, symmetric and positive semi-definite, and why."""
+    variance = np.diagonal(p, axis1=1, axis2=2)
+    unknown = ~(estimated[:, :, None] & estimated[:, None, :])
+    infinite: NDArray[np.bool_] = ~np.all(np.isfinite(p) | unknown, axis=(1, 2))
+    negative: NDArray[np.bool_] = np.any(variance < 0.0, axis=1)
+    sigma = np.sqrt(np.where(variance > 0.0, variance, 1.0))
+    p = np.where(unknown | infinite[:, None, None], 0.0, p) / sigma[:, :, None] / sigma[:, None, :]
+    asymmetric: NDArray[np.bool_] = np.any(np.abs(p - p.swapaxes(1, 2)) > _ROUNDING, axis=(1, 2))
+    p = 0.5 * (p + p.swapaxes(1, 2))
     try:  # much faster than eigenvalues, and enough where all is well
-        np.linalg.cholesky(symmetric + _ROUNDING * np.eye(9))
+        np.linalg.cholesky(p + _ROUNDING * np.eye(9))
         indefinite = np.zeros(len(p), dtype=bool)
     except np.linalg.LinAlgError:
-        indefinite = np.linalg.eigvalsh(symmetric)[:, 0] < -_ROUNDING
-    bad: NDArray[np.intp] = np.flatnonzero(asymmetric | indefinite)
+        indefinite = np.linalg.eigvalsh(p)[:, 0] < -_ROUNDING
+    bad: NDArray[np.intp] = np.flatnonzero(infinite | negative | asymmetric | indefinite)
     if len(bad) == 0:
         return None, ""
-    first = int(bad[0])
-    return first, "is not symmetric" if asymmetric[first] else "is not positive semi-definite"
+    k = int(bad[0])
+    if infinite[k]:
+        return k, "is not finite"
+    if negative[k]:
+        j = int(np.nanargmin(variance[k]))
+        return k, f"has a negative variance of {COMPONENTS[j]}: {variance[k, j]:g}"
+    return k, "is not symmetric" if asymmetric[k] else "is not positive semi-definite"
 
 
 def _checked_trajectory(states: object, log: _Log) -> NavigationStates | None:
@@ -378,10 +377,8 @@ def _checked_trajectory(states: object, log: _Log) -> NavigationStates | None:
         raise _InvalidOutputError("the times are not the ends of the steps")
     vectors = {name: _array(getattr(states, name), name, (n, 3)).copy() for name in log.vectors}
     given: NDArray[np.bool_] = np.any(log.estimated[:n], axis=0)
-    for j, (name, vector) in enumerate(vectors.items()):
-        wanted = given[3 * j : 3 * j + 3]
-        if name == "attitude":
-            wanted = _attitude_given(wanted)
+    for name, vector in vectors.items():
+        wanted = given[_PLACES[name]] if name != "attitude" else _attitude_given(given[6:])
         if not np.isfinite(vector[:, wanted]).all():
             raise _InvalidOutputError(f"{name} is not finite")
     return NavigationStates(times, **vectors)
