@@ -120,6 +120,15 @@ def test_bias_instability_is_stationary_from_the_first_sample():
     assert np.corrcoef(first, last)[0, 1] == pytest.approx(np.exp(-0.3), abs=0.06)
 
 
+def test_bias_instability_integrates_like_the_continuous_process():
+    # Var of the integral over t: 2 sigma^2 T (t - T (1 - exp(-t / T))); the bias is held for T / 100 at a time.
+    build = spec({"bias_instability_deg_h": 5.0, "correlation_time_s": 10}).build
+    ideal = samples(5000)
+    angle = [build(s).sense(ideal).angular_rate.sum(axis=0) * 0.01 for s in range(300)]
+    sigma = 5 * DEG_H * np.sqrt(2 * 10 * (50 - 10 * (1 - np.exp(-5.0))))
+    assert np.std(angle) == pytest.approx(sigma, rel=0.08)
+
+
 @pytest.mark.parametrize(
     "accelerometer",
     [{"bias_instability_ug": 3.0, "correlation_time_s": float("inf")}, {"rate_random_walk_ug_sqrt_s": 3.0}],
