@@ -43,6 +43,7 @@ __all__ = [
 
 _DEG = math.pi / 180.0
 _G = 9.80665  # standard gravity, for "micro-g"
+_BEYOND = 1e12  # no unit needs larger numbers, and their squares would overflow sooner or later
 
 #: Factor to SI of every unit that may end a key.
 UNITS: Mapping[str, float] = {
@@ -202,11 +203,11 @@ class Spec(BaseModel):
             raise SpecError(_sentence(cls, error, table, source, path)) from None
 
     def to_toml(self) -> dict[str, Any]:
-        """The TOML table that `from_toml` reads back into an equal specification; defaults are written out."""
+        """The TOML table that `from_toml` reads back into an equal specification: what was given, and the kind."""
         table = {}
         for key, (name, info) in self.toml_keys().items():
             value = getattr(self, name)
-            if value is not None:
+            if value is not None and (name in self.model_fields_set or name == "kind"):
                 table[key] = _plain(value, unit_of(info))
         return table
 
@@ -246,6 +247,8 @@ def _convert(raw: Any, factor: float, infinite: bool, source: str, where: str) -
         raise SpecError(f"{source}: {where} = {raw!r} should be a number")
     if math.isnan(raw) or (math.isinf(raw) and not infinite):
         raise SpecError(f"{source}: {where} = {raw!r} should be a finite number")
+    if _BEYOND <= abs(raw) < math.inf:
+        raise SpecError(f"{source}: {where} = {raw!r} is beyond all measure")
     return float(raw) * factor
 
 
@@ -299,6 +302,8 @@ def _one(raw: Any, specs: list[type[Spec]], source: str, where: str, default_kin
         raise SpecError(f"{source}: {where} = {raw!r} should be a table")
     by_kind = {k: s for s in specs if (k := _kind(s)) is not None}
     kind = raw.get("kind", default_kind if default_kind in by_kind else None)
+    if not isinstance(kind, (str, types.NoneType)):
+        raise SpecError(f"{source}: {where}.kind = {kind!r} should be one of: {', '.join(by_kind)}")
     if kind is None:
         raise SpecError(f"{source}: {where} has no key 'kind'; one of: {', '.join(by_kind)}")
     if kind not in by_kind:
@@ -332,18 +337,24 @@ def _sentence(cls: type[Spec], error: ValidationError, table: Mapping[str, Any],
         bound = float(context[name]) if unit is None else toml_number(float(context[name]), unit)
         message = f"{words} {bound:.4g}" if abs(bound) < 1e4 else f"{words} {bound:g}"
     elif first["type"] == "literal_error" and info is not None:
-        # repr of a str in pydantic's "expected": 'a', 'b' or 'c'
-        message += closest(
-            str(first["input"]), str(context["expected"]).replace("'", "").replace(" or ", ", ").split(", ")
-        )
+        # In "expected" the values are quoted: 'a', 'b' or 'c'.
+        valid = str(context["expected"]).replace("'", "").replace(" or ", ", ").split(", ")
+        near = closest(str(first["input"]), valid)
+        message += near if "did you mean" in near else ""
     elif first["type"] in ("missing", "too_long") and info is not None:
         message = f"should have {_length(info.annotation)} numbers"
+    elif first["type"] == "tuple_type" and info is not None:
+        length = _length(info.annotation)
+        message = f"should be an array of {length} numbers" if length else "should be an array"
+    message = message.replace("Tuple should", "should").replace(" items after validation", "")
+    message = message.replace(" item after validation", "")
     return f"{source}: {where} = {table.get(key, first['input'])!r}: {message}"
 
 
 def _length(annotation: Any) -> str:
     """Of the tuple inside an annotation."""
-    if typing.get_origin(annotation) is tuple:
-        return str(len(typing.get_args(annotation)))
-    inside = (_length(a) for a in typing.get_args(annotation))
+    parts = typing.get_args(annotation)
+    if typing.get_origin(annotation) is tuple and Ellipsis not in parts:
+        return str(len(parts))
+    inside = (_length(a) for a in parts)
     return next((n for n in inside if n), "")
