@@ -334,12 +334,12 @@ def _open_window() -> Any:
     try:
         import matplotlib.pyplot as plt
 
-        figure = plt.figure("simnav")
+        figure = plt.figure()
         if figure.canvas.required_interactive_framework is not None:
             figure.show()
             return figure
         plt.close(figure)
-    except ImportError:  # a backend was asked for that cannot run here
-        pass
+    except Exception as error:  # every toolkit has its own kind of error for a display that does not answer
+        _log.debug("no window: %r", error)
     _log.warning("there is no display here, so nothing is shown; use render_mode='rgb_array'")
     return None

@@ -20,7 +20,7 @@ from simnav.agent import EstimatorAgent, unpack
 from simnav.catalogue import headers
 from simnav.earth import displace
 from simnav.environment import NavigationEnv
-from simnav.estimator import Estimator
+from simnav.estimator import Estimator, make, names
 from simnav.log import LogError
 from simnav.recording import AidStream, Block, packets
 from simnav.scenario import load, parse
@@ -436,6 +436,29 @@ def test_an_estimator_gives_the_same_numbers_as_an_agent_and_on_its_own(scenario
         observation, _, _, truncated, _ = env.step(action)
         k += 1
     assert k == len(trial) == 40
+
+
+@pytest.mark.parametrize("name", [n for n in names() if not make(n).reference])
+def test_every_registered_estimator_navigates_in_the_environment_as_in_a_trial(name):
+    for where in ("open-sea", "ship-straight"):
+        short = load(where).model_copy(update={"duration": 60.0})
+        trial = run_trial(make(name), record(short, 4))
+        if trial.status != "unsuitable":
+            break
+    assert trial.status == "ok", trial.reason
+    env, agent = NavigationEnv(short), EstimatorAgent(make(name))
+    observation, info = env.reset(seed=4)
+    agent.reset(info)
+    for k in range(60):
+        action = agent.act(observation)
+        for vector in VECTORS:
+            given = getattr(agent.estimate, vector)
+            expected = getattr(trial, vector)[k]
+            np.testing.assert_array_equal(np.full(3, np.nan) if given is None else given, expected)
+        if trial.covariance is not None:
+            block = np.ix_(trial.estimated[k], trial.estimated[k])
+            np.testing.assert_array_equal(agent.estimate.covariance[block], trial.covariance[k][block])
+        observation, *_ = env.step(action)
 
 
 def test_a_reference_is_no_agent():
