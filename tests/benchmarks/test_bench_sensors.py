@@ -34,10 +34,11 @@ IMU = ImuSpec.from_toml(
 
 
 @pytest.mark.benchmark(group="sensors")
-def test_imu_errors(benchmark):
+@pytest.mark.parametrize("overwrite", [False, True], ids=["fresh memory", "overwriting"])
+def test_imu_errors(benchmark, overwrite):
     n = 200_000
     ideal = ImuSamples(0.01 * np.arange(1, n + 1), np.full(n, 0.01), np.full((n, 3), 0.01), np.full((n, 3), 9.8))
-    real = benchmark(lambda: IMU.build(1).sense(ideal))
+    real = benchmark(lambda: IMU.build(1).sense(ideal, overwrite=overwrite))
     if benchmark.enabled:
         benchmark.extra_info["ns_per_sample"] = benchmark.stats.stats.min / n * 1e9
     assert len(real) == n
