@@ -71,12 +71,12 @@ def test_the_frame_shows_truth_estimate_and_fixes_where_they_are():
 
 
 def test_a_frame_after_thousands_of_steps_and_after_a_new_run():
-    chart = Chart("long", 20_000.0)
+    chart = Chart("long", 6_000.0)
     empty = chart.frame()
-    for k in range(20_000):
+    for k in range(6_000):
         chart.add_fixes(place(k, 0.0)[None, :2], np.array([False]))
         chart.add(float(k), place(k, 0.0), place(k + 3.0, 4.0))
-        if k % 4000 == 0:
+        if k % 2000 == 0:
             chart.frame()
     assert max(len(t) for t in (chart._truth, chart._estimate, chart._fixes, chart._error)) <= 2048
     assert not np.array_equal(chart.frame(), empty)
