@@ -41,7 +41,8 @@ TAP_COLUMNS = 14
 @kernel(fastmath={"reassoc", "contract", "nsz", "arcp"})
 def _waves(phase, table, north, east, dt):  # type: ignore[no-untyped-def]
     """Turn the components' phases by one step (velocity through the water north, east) and sum the seven responses."""
-    s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
+    # Two loops: the first writes what the second only reads, so that the compiler can vectorize both without
+    # checking at run time whether the rows overlap.
     for i in range(phase.shape[1]):
         rate = table[0, i] - table[1, i] * north - table[2, i] * east
         d = rate * dt
@@ -49,11 +50,13 @@ def _waves(phase, table, north, east, dt):  # type: ignore[no-untyped-def]
         # Encounter phases turn by less than 0.2 rad a sample; the series are good to rounding there.
         sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
         cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
-        c0, c1 = phase[0, i], phase[1, i]
-        c = c0 * cd - c1 * sd
-        s = c1 * cd + c0 * sd
-        phase[0, i] = c
-        phase[1, i] = s
+        c, s = phase[0, i], phase[1, i]
+        phase[0, i] = c * cd - s * sd
+        phase[1, i] = s * cd + c * sd
+        phase[2, i] = rate
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
+    for i in range(phase.shape[1]):
+        c, s, rate = phase[0, i], phase[1, i], phase[2, i]
         s0 += rate * (table[4, i] * c - table[3, i] * s)
         s1 += rate * (table[6, i] * c - table[5, i] * s)
         s2 += rate * (table[8, i] * c - table[7, i] * s)

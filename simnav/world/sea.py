@@ -109,15 +109,15 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
 
     Returns
     -------
-    phase : (2, n) array
-        Cosine and sine of the phase at time 0 at the start position.
+    phase : (3, n) array
+        Cosine and sine of the phase at time 0 at the start position, and room for the encounter frequency.
     table : (17, n) array
         Frequency [rad/s], wave number north and east [rad/m]; then pairs of cosine and sine gains of the displacements north, east,
         down [m], and of the slope responses roll-north, roll-east, pitch-north, pitch-east [rad]: the vessel's roll is
         the projection of (roll-north, roll-east) on its axes, and pitch likewise.
     """
     if sea is None or sea.significant_height == 0.0:
-        return np.zeros((2, 0)), np.zeros((ROWS, 0))
+        return np.zeros((3, 0)), np.zeros((ROWS, 0))
     rng = stream(seed, "sea")
     n = sea.components
     peak = 2.0 * np.pi / sea.peak_period
@@ -148,4 +148,4 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     rows = [omega, number * north, number * east]
     for g in gains:
         rows += [np.real(g), np.imag(g)]
-    return np.stack([np.cos(phase), np.sin(phase)]), np.ascontiguousarray(np.stack(rows))
+    return np.stack([np.cos(phase), np.sin(phase), omega]), np.ascontiguousarray(np.stack(rows))

@@ -36,7 +36,7 @@ def test_jonswap_is_higher_at_its_peak_by_its_peakedness():
 def test_components_have_the_sea_states_energy_and_travel_away_from_where_it_comes():
     sea = Sea(significant_height=2.5, peak_period=9.0, direction=np.radians(30), components=256)
     phase, table = components(sea, seed=3)
-    np.testing.assert_allclose(np.hypot(*phase), 1.0)
+    np.testing.assert_allclose(np.hypot(*phase[:2]), 1.0)
     # Deep-water dispersion
     np.testing.assert_allclose(np.hypot(table[1], table[2]), table[0] ** 2 / 9.81)
     towards = np.degrees(np.arctan2(table[2].mean(), table[1].mean())) % 360
