@@ -110,9 +110,7 @@ def test_steps_without_a_reference_leave_nothing_behind():
     assert chart.frame().std() > 0.0
 
 
-@pytest.mark.parametrize(
-    ("length", "rounded"), [(0.3, 0.5), (1.0, 1.0), (7.5, 10.0), (1001.0, 2000.0)]
-)
+@pytest.mark.parametrize(("length", "rounded"), [(0.3, 0.5), (1.0, 1.0), (7.5, 10.0), (1001.0, 2000.0)])
 def test_round_up(length, rounded):
     assert rendering._round_up(length) == pytest.approx(rounded)
 
