@@ -58,4 +58,3 @@ def imu_faults(recording: Recording) -> tuple[Array, Array] | None:
     if data.imu is None or data.imu_labels is None:
         return None
     return data.imu.time, data.imu_labels.fault_error
-

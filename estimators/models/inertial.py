@@ -555,4 +555,3 @@ class InertialModel(ErrorModel):
         c20, c21, c22 = float(c[2, 0]), float(c[2, 1]), float(c[2, 2])
         attitude = np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(c[1, 0]), float(c[0, 0]))])
         return Estimate(self.time, self.position.copy(), self.velocity.copy(), attitude, covariance[:9, :9].copy())
-

@@ -51,9 +51,7 @@ def plausible(kind: str, value: Array) -> bool:
     if not all(map(isfinite, x)):
         return False
     if kind in ("gnss_position", "terrain_fix"):
-        return (
-            abs(x[0]) < 0.5 * pi and abs(x[1]) <= 2.0 * pi and (kind == "terrain_fix" or abs(x[2]) < LARGEST_HEIGHT)
-        )
+        return abs(x[0]) < 0.5 * pi and abs(x[1]) <= 2.0 * pi and (kind == "terrain_fix" or abs(x[2]) < LARGEST_HEIGHT)
     if kind in ("magnetic_compass", "gyrocompass"):
         return abs(x[0]) <= 4.0 * pi
     limit = LARGEST_HEIGHT if kind == "depth" else LARGEST_SPEED
