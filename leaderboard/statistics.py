@@ -152,7 +152,8 @@ def tiers(
 
     The entry with the lowest score leads the first tier; all others are tested against it, paired and Holm-corrected,
     and those that are not significantly worse join it. The same again with the rest, until nobody is left. An entry
-    with few or noisy runs may thus join a better tier than one with a lower score.
+    with few or noisy runs may thus join a better tier than one with a lower score; five runs or fewer never tell
+    anything apart.
 
     Parameters
     ----------

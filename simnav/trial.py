@@ -23,7 +23,7 @@ import inspect
 import math
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -228,6 +228,10 @@ class _Log:
                 if not np.isfinite(vector[wanted]).all():
                     raise _InvalidOutputError(f"{name} is not finite: {vector.tolist()}")
         covariance = None if estimate.covariance is None else _array(estimate.covariance, "covariance", (9, 9)).copy()
+        if not isinstance(estimate.diagnostics, Mapping):
+            raise _InvalidOutputError(f"diagnostics is a dict, not {type(estimate.diagnostics).__name__}")
+        if not isinstance(estimate.flagged, Iterable):
+            raise _InvalidOutputError(f"flagged is a list, not {type(estimate.flagged).__name__}")
         diagnostics = {str(n): _array(v, f"diagnostic {n!r}", None) for n, v in estimate.diagnostics.items()}
         for name, value in diagnostics.items():
             if name in self.diagnostics and self.diagnostics[name][0][1].ndim != value.ndim:
@@ -313,9 +317,11 @@ def _number(value: Any, name: str) -> float:
 
 def _array(value: Any, name: str, shape: tuple[int, ...] | None) -> Array:
     try:
+        if np.iscomplexobj(value):  # conversion would drop the imaginary part
+            raise TypeError
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise _InvalidOutputError(f"{name} is not an array of numbers: {type(value).__name__}") from None
+        raise _InvalidOutputError(f"{name} is not an array of real numbers: {type(value).__name__}") from None
     if shape is not None and array.shape != shape:
         raise _InvalidOutputError(f"{name} has shape {array.shape}, expected {shape}")
     return array

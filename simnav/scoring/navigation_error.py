@@ -45,7 +45,10 @@ def smoothed_errors(trial: Trial, recording: Recording) -> Array | None:
     """Errors of the smoothed trajectory, like `errors`, or None where the estimator does not smooth."""
     if trial.smoothed is None:
         return None
-    given = np.broadcast_to(trial.estimated.any(axis=0), trial.estimated.shape)
+    given: NDArray[np.bool_] = np.any(trial.estimated, axis=0)
+    if not given.any():  # all that it does is smooth
+        given = np.ones(9, dtype=bool)
+    given = np.broadcast_to(given, trial.estimated.shape)
     return state_errors(trial.smoothed, recording.data.truth[: len(trial)], given)
 
 

@@ -141,3 +141,7 @@ def test_smoothed_errors(recording: Recording, make_trial: Any) -> None:
     found = smoothed_errors(trial, recording)
     assert found is not None
     np.testing.assert_allclose(found, 0.05, atol=2e-9)
+    nothing = np.zeros((100, 9), dtype=bool)  # an estimator that only smooths
+    found = smoothed_errors(replace(trial, estimated=nothing), recording)
+    assert found is not None
+    np.testing.assert_allclose(found, 0.05, atol=2e-9)
