@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.log.nmea import DEFAULT_COLUMNS, read_nmea
+from simnav.log.nmea import DEFAULT_COLUMNS, read_nmea, utc_seconds
 from simnav.log.spec import LOG_UNITS, ChannelSpec, FileSpec, LogImuSpec, OriginSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning, Table, check_ascending, read_csv
 from simnav.rotation import wrap_angle
@@ -187,20 +187,16 @@ def _csv_time(table: Table, file: FileSpec, column: str) -> Array:
     if file.time_unit != "iso":
         sign, values = table.column(file.time)
         return sign * values * LOG_UNITS[file.time_unit]
-    cells = table.columns[column]
-    try:
-        moments = np.array([np.datetime64(str(v).removesuffix("Z"), "us") for v in cells])
-    except ValueError:
-        for k, v in enumerate(cells):
-            try:
-                np.datetime64(str(v).removesuffix("Z"), "us")
-            except ValueError:
-                raise LogError(
-                    f"{table.source}, line {table.line[k]}, column {column!r}: {v!r} is not a date like "
-                    f"2014-08-01T00:00:00.124Z"
-                ) from None
-        raise
-    return np.asarray(moments.astype(np.int64) * 1e-6)
+    moments = np.empty(len(table))
+    for k, cell in enumerate(table.columns[column]):
+        try:
+            moments[k] = utc_seconds(str(cell))
+        except ValueError:
+            raise LogError(
+                f"{table.source}, line {table.line[k]}, column {column!r}: {cell!r} is not a date like "
+                f"2014-08-01T00:00:00.124Z"
+            ) from None
+    return moments
 
 
 def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording: str) -> Series:

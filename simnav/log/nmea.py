@@ -22,7 +22,7 @@ from simnav.log.table import LogError, LogWarning, Table
 from simnav.spec import closest
 from simnav.types import KINDS
 
-__all__ = ["DEFAULT_COLUMNS", "SENTENCES", "NmeaFile", "read_nmea"]
+__all__ = ["DEFAULT_COLUMNS", "SENTENCES", "NmeaFile", "read_nmea", "utc_seconds"]
 
 _DEG = math.pi / 180.0
 _KNOT = 1852.0 / 3600.0
@@ -241,12 +241,23 @@ def _checksum_ok(body: str, given: str) -> bool:
         return False
 
 
+def utc_seconds(text: str) -> float:
+    """Seconds since 1970 of a date like ``2014-08-01T00:00:00.124Z``; UTC where it names no zone.
+
+    Raises
+    ------
+    ValueError
+        If it is not one.
+    """
+    moment = datetime.fromisoformat(text.strip())
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
 def _stamp(text: str) -> float:
     try:
-        moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
+        return utc_seconds(text)
     except ValueError:
         return math.nan
-    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 def _near(tod: float, about: float) -> float:

@@ -1,0 +1,69 @@
+"""CSV files: what is read, and every complaint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from simnav.log.table import LogError, read_csv
+
+
+def write(path, text):
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+@pytest.mark.parametrize("header", ["time{0}x{0}y\n", ""])
+def test_delimiters_and_headers(tmp_path, delimiter, header):
+    text = header.format(delimiter) + f"0.5{delimiter}1e3{delimiter}-2\n1.5{delimiter}3{delimiter}4\n\n"
+    table = read_csv(write(tmp_path / "a.csv", text))
+    assert table.names == (("time", "x", "y") if header else ("1", "2", "3"))
+    sign, x = table.column("x" if header else 2)
+    assert sign == 1.0
+    np.testing.assert_array_equal(x, [1000.0, 3.0])
+    assert table.column(-3)[0] == -1.0
+    np.testing.assert_array_equal(table.line, [2, 3] if header else [1, 2])
+
+
+def test_a_minus_flips_the_sign_unless_it_is_part_of_the_name(tmp_path):
+    table = read_csv(write(tmp_path / "a.csv", "t,-x,y\n0,1,2\n"))
+    assert table.column("-x") == (1.0, np.array([1.0]))
+    assert table.column("-y") == (-1.0, np.array([2.0]))
+    np.testing.assert_array_equal(table.column("=2.5")[1], [2.5])
+
+
+def test_missing_cells_are_not_numbers(tmp_path):
+    table = read_csv(write(tmp_path / "a.csv", "t,x\n0,\n1,nan\n2,5\n"))
+    np.testing.assert_array_equal(table.column("x")[1], [np.nan, np.nan, 5.0])
+
+
+def test_a_file_is_parsed_once_until_it_changes(tmp_path):
+    path = write(tmp_path / "a.csv", "t,x\n0,1\n")
+    first = read_csv(path)
+    assert read_csv(path) is first
+    write(path, "t,x\n0,1\n1,22\n")
+    assert len(read_csv(path)) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "message"),
+    [
+        ("t,x\n0,1\n1,abc\n", "x", r"a\.csv, line 3, column 'x': 'abc' is not a number"),
+        ("t,speed\n0,1\n", "sped", r"a\.csv: there is no column 'sped'; did you mean 'speed'"),
+        ("t,speed\n0,1\n", 3, r"a\.csv: there is no column 3; the file has columns 1 to 2"),
+        ("t,speed\n0,1\n", "=two", r"the constant column '=two' should be '=' and a number"),
+        ("t,x\n0,1\n1\n2,3\n", "x", r"a\.csv, line 3: 1 cells where the first line has 2"),
+        ("", "x", r"a\.csv: the file is empty"),
+        ("t,x\n", "x", r"a\.csv: there are no rows"),
+        ("t,x,x\n0,1,2\n", "x", r"a\.csv, line 1: two columns share a name"),
+    ],
+)
+def test_complaints(tmp_path, text, column, message):
+    with pytest.raises(LogError, match=message):
+        read_csv(write(tmp_path / "a.csv", text)).column(column)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(LogError, match=r"nowhere\.csv: there is no such file"):
+        read_csv(tmp_path / "nowhere.csv")

@@ -1,0 +1,112 @@
+"""NMEA logs: sentences against hand-worked values, checksums, clocks."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from simnav.log.nmea import read_nmea
+from simnav.log.table import LogError, LogWarning
+
+
+def checksum(body: str) -> str:
+    total = 0
+    for c in body.encode():
+        total ^= c
+    return f"${body}*{total:02X}"
+
+
+def write(path, *lines):
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_sentences_by_hand(tmp_path):
+    stamp = "2014-08-01T00:00:00.500000Z "
+    file = read_nmea(
+        write(
+            tmp_path / "log",
+            stamp + checksum("GPGGA,000000.25,2230.0000,S,01745.6000,W,1,06,1.3,033.6,M,-002.6,M,,"),
+            stamp + checksum("GPVTG,210.0,T,,M,010.0,N,,K"),
+            stamp + checksum("HEHDT,218.53,T"),
+            stamp + checksum("PSXN,23,0.35,-1.74,218.26,0.58"),
+            stamp + "$PUHAW,UVH,-5.0,0.0,270.0",
+            stamp + checksum("VWVHW,90.0,T,,M,12.0,N,,K"),
+        )
+    )
+    gga = file.table("GGA", "GP")
+    assert math.degrees(gga.columns["latitude"][0]) == pytest.approx(-22.5, abs=1e-12)
+    assert math.degrees(gga.columns["longitude"][0]) == pytest.approx(-17.76, abs=1e-12)
+    assert gga.columns["height"][0] == pytest.approx(31.0)  # altitude above the geoid plus its separation
+    knot = 1852.0 / 3600.0
+    vtg = file.table("VTG")
+    assert vtg.columns["velocity_north"][0] == pytest.approx(-10.0 * knot * math.sqrt(3.0) / 2.0)
+    assert vtg.columns["velocity_east"][0] == pytest.approx(-10.0 * knot * 0.5)
+    assert math.degrees(file.table("HDT").columns["heading"][0]) == pytest.approx(218.53)
+    psxn = file.table("PSXN,23").columns
+    assert [math.degrees(psxn[n][0]) for n in ("roll", "pitch", "heading")] == pytest.approx([0.35, -1.74, 218.26])
+    uvh = file.table("PUHAW,UVH").columns  # 5 kn west, heading west: ahead
+    assert uvh["speed"][0] == pytest.approx(5.0 * knot)
+    assert uvh["speed_starboard"][0] == pytest.approx(0.0, abs=1e-12)
+    assert file.table("VHW").columns["speed"][0] == pytest.approx(12.0 * knot)
+
+
+def test_the_date_of_the_logger_counts_not_that_of_the_receiver(tmp_path):
+    """A receiver 1024 weeks off, with a fix of the second before midnight that is logged after it."""
+    file = read_nmea(
+        write(
+            tmp_path / "log",
+            "2014-08-01T00:00:00.241000Z " + checksum("GPGGA,235959.226,2200.1,S,01756.3,W,1,06,1.3,33,M,-2,M,,"),
+            "2014-08-01T00:00:00.305000Z " + checksum("GPRMC,235959.226,A,2200.1,S,01756.3,W,9.7,220.2,151294,,"),
+            "2014-08-01T00:00:00.400000Z " + checksum("GPHDT,218.5,T"),
+        )
+    )
+    midnight = datetime(2014, 8, 1, tzinfo=UTC).timestamp()
+    for sentence in ("GGA", "RMC", "HDT"):  # HDT has no time of its own: that of the sentence before it
+        assert file.table(sentence).columns["sentence"][0] - midnight == pytest.approx(-0.774, abs=1e-6)
+    assert file.table("HDT").columns["logger"][0] - midnight == pytest.approx(0.4, abs=1e-6)
+
+
+def test_checksums(tmp_path):
+    good, bad = checksum("HEHDT,1.0,T"), checksum("HEHDT,2.0,T")[:-2] + "00"
+    path = write(tmp_path / "log", good, bad, "$HEHDT,3.0,T", "garbage", checksum("HEHDT,x,T"))
+    with pytest.warns(LogWarning) as warned:
+        table = read_nmea(path).table("HDT")
+    np.testing.assert_allclose(np.degrees(table.columns["heading"]), [1.0, 3.0])
+    messages = sorted(str(w.message).split(": ", 1)[1] for w in warned)
+    assert messages == [
+        "1 lines have a bad checksum and are left out, the first is line 2",
+        "2 lines are not understood and are left out, the first is line 4",
+    ]
+    np.testing.assert_array_equal(table.line, [1, 3])
+
+
+def test_a_sentence_without_a_fix_is_no_measurement(tmp_path):
+    path = write(tmp_path / "log", "$GPGGA,000001,,,,,0,,,,M,,M,,", "$GPGGA,000002,2200.1,N,00100.0,E,1,,,,M,,M,,")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(read_nmea(path).table("GGA")) == 1
+
+
+@pytest.mark.parametrize(
+    ("sentence", "talker", "message"),
+    [
+        ("GGA", "GN", "there is no sentence 'GNGGA'; did you mean 'GPGGA'"),
+        ("XYZ", None, r"there is no sentence 'XYZ'.*sentences that are understood: GGA"),
+        ("HDT", None, "several talkers say 'HDT': GP, HE; choose one by 'talker'"),
+    ],
+)
+def test_the_choice_of_a_sentence(tmp_path, sentence, talker, message):
+    path = write(tmp_path / "log", "$GPGGA,000002,2200.1,N,00100.0,E,1,,,,M,,M,,", "$GPHDT,1,T", "$HEHDT,1,T")
+    with pytest.raises(LogError, match=message):
+        read_nmea(path).table(sentence, talker)
+
+
+def test_a_file_without_sentences(tmp_path):
+    path = write(tmp_path / "log", "time,x", "1,2")
+    with pytest.warns(LogWarning), pytest.raises(LogError, match="no NMEA sentence that is understood"):
+        read_nmea(path)
