@@ -1,20 +1,20 @@
 """The row ``dead-reckoning``: heading and speed, carried forward; no position is ever measured.
 
 Heading
-    With an IMU, the gyroscopes' from the initial heading on, drawn slowly (`COMPASS_TIME`) to the compass if there is one;
-    roll and pitch are the gyroscopes', drawn slowly (`LEVEL_TIME`) to the accelerometers' vertical. Without an IMU, the
-    compass as it is.
+    With an IMU, the gyroscopes' from the initial heading on, drawn slowly (`COMPASS_TIME`) to the compass if there is
+    one; roll and pitch are the gyroscopes', drawn slowly (`LEVEL_TIME`) to the accelerometers' vertical. Without an IMU,
+    the compass as it is.
 Speed
     The newest reading of the DVL; of the speed log where there is no DVL, or it has been silent for `SILENCE` seconds.
     Between readings and in a silence the last velocity in body axes is held.
 Height
     The depth sensor's if there is one, else the integral of the DVL's vertical velocity.
 
-The covariance follows from the datasheets: heading error (with the gyroscopes' bias, or the compass's errors), biases of
-the speed forward and starboard (bias, scale factor, misalignment, current), and white noise.
+The covariance follows from the datasheets: heading error (with the gyroscopes' bias, or the compass's errors), biases
+of the speed forward and starboard (bias, scale factor, misalignment, current), and white noise.
 
-Source: N. Bowditch, *The American Practical Navigator*, chapter on dead reckoning; the complementary filter after Groves
-2013, section 6.1.
+Source: N. Bowditch, *The American Practical Navigator*, chapter on dead reckoning; the complementary filter after
+Groves 2013, section 6.1.
 """
 
 from __future__ import annotations

@@ -74,6 +74,8 @@ sigma_m = [5.0, 5.0]
 
 _HALF = 30.0  # s
 
+Factory = Callable[[], Estimator]
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -163,11 +165,7 @@ def contract_recording(seed: int) -> Recording:
     return record(parse(SCENARIO, source="the contract test"), seed)
 
 
-def _guarded(
-    test: Callable[[Callable[[], Estimator], Recording], Finding],
-    factory: Callable[[], Estimator],
-    recording: Recording,
-) -> Finding:
+def _guarded(test: Callable[[Factory, Recording], Finding], factory: Factory, recording: Recording) -> Finding:
     try:
         return test(factory, recording)
     except Exception as error:

@@ -15,13 +15,13 @@ rotation vector phi of C_est C_true' [rad], all in north-east-down, and the bias
 
 Beyond the 15 there are calibration states, as the datasheets ask for them: a bias for every component of an aiding
 instrument that has a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor
-and the current along the keel. With instruments of white noise only, n is 15; with ``calibrate=False`` it always is, and
-those errors count as white noise.
+and the current along the keel. With instruments of white noise only, n is 15; with ``calibrate=False`` it always is,
+and those errors count as white noise.
 
 An IMU's scale factor and misalignment are not states. On a level vehicle gravity turns the accelerometers' into a bias,
 which is added to the turn-on bias; the gyroscopes' act in turns, as noise in proportion to the turn rate, averaged over
-`TURN_TIME` so that a seaway does not count. Quantization carries its residual over, so that its sum stays within a step:
-it counts for nothing.
+`TURN_TIME` so that a seaway does not count. Quantization carries its residual over, so that its sum stays within a
+step: it counts for nothing.
 """
 
 from __future__ import annotations

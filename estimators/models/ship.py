@@ -1,18 +1,18 @@
 """The ship dead-reckoning model: position, speed, heading, turn rate and current, for a ship without an INS.
 
-State: latitude and longitude; forward speed u through the water; heading psi; turn rate r; current c (north, east); and,
-as the datasheets ask for them, a bias for each compass and log and a scale factor for each log. Motion:
+State: latitude and longitude; forward speed u through the water; heading psi; turn rate r; current c (north, east);
+and, as the datasheets ask for them, a bias for each compass and log and a scale factor for each log. Motion:
 
 - p' = u (cos psi, sin psi) + c
 - u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases after `estimators.models.base.gauss_markov`
 
 Speed and heading as states, with log and compass as measurements of them, let their biases be found while there is GNSS
 and carry the position through an outage. Height, roll and pitch are not estimated; a lever arm is turned by the heading
-alone, and what heel does to it is noise. Sideways motion through the water (waves, leeway) is noise on measured velocities
-and in the estimate's velocity.
+alone, and what heel does to it is noise. Sideways motion through the water (waves, leeway) is noise on measured
+velocities and in the estimate's velocity.
 
-After paper 002 (GNSS/DR integrated navigation for ships): position, speed, heading, log bias, compass bias, 1 Hz; the turn
-rate and the current are ours, since a log measures through the water.
+After paper 002 (GNSS/DR integrated navigation for ships): position, speed, heading, log bias, compass bias, 1 Hz; the
+turn rate and the current are ours, since a log measures through the water.
 """
 
 from __future__ import annotations
