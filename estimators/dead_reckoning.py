@@ -2,8 +2,8 @@
 
 Heading
     With an IMU, the gyroscopes' from the initial heading on, drawn slowly (`COMPASS_TIME`) to the compass if there is
-    one; roll and pitch are the gyroscopes', drawn slowly (`LEVEL_TIME`) to the accelerometers' vertical. Without an IMU,
-    the compass as it is.
+    one; roll and pitch are the gyroscopes', drawn slowly (`LEVEL_TIME`) to the accelerometers' vertical. Without an
+    IMU, the compass as it is.
 Speed
     The newest reading of the DVL; of the speed log where there is no DVL, or it has been silent for `SILENCE` seconds.
     Between readings and in a silence the last velocity in body axes is held.

@@ -1,7 +1,8 @@
 """A door for filters of filterpy: fill in four small methods, and a `KalmanFilter` or `UnscentedKalmanFilter` is a row.
 
-The adapter works in metres north, east, down of the initial position, takes the measurements in order and each at its own
-time, and reads position, velocity, heading and covariance off the filter's state. It was written against filterpy 2.0.
+The adapter works in metres north, east, down of the initial position, takes the measurements in order and each at its
+own time, and reads position, velocity, heading and covariance off the filter's state. It was written against filterpy
+2.0.
 
 filterpy's unscented filter draws its sigma points in `predict` only. The adapter therefore calls `predict` before every
 update, of zero length between measurements of the same time; let the process noise be zero then.
@@ -28,8 +29,8 @@ class FilterpyEstimator(Estimator):
     Attributes
     ----------
     components : tuple of str
-        What the first states of the filter are, by their names in `simnav.types.COMPONENTS`; positions in metres from the
-        initial position, ``attitude_down`` the heading. States after these are the filter's own.
+        What the first states of the filter are, by their names in `simnav.types.COMPONENTS`; positions in metres from
+        the initial position, ``attitude_down`` the heading. States after these are the filter's own.
     needs : tuple of str
         Kinds of instruments without which the scenario is unsuitable.
     uses : tuple of str

@@ -22,8 +22,8 @@ class Oracle(KalmanEstimator):
     """EKF that knows each measurement's true noise and faults; what any real-time estimator is measured against.
 
     The inertial model where there is an IMU, the ship model where there is none. Measurements that a fault spoilt are
-    left out (`estimators.adaptations.truth`); a disturbance of the IMU is taken off its samples. On a run without faults
-    it is ``ekf`` or ``ship-ekf``. It is not ranked.
+    left out (`estimators.adaptations.truth`); a disturbance of the IMU is taken off its samples. On a run without
+    faults it is ``ekf`` or ``ship-ekf``. It is not ranked.
     """
 
     reference = True

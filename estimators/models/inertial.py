@@ -313,7 +313,7 @@ def propagate_inertial(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
-def propagate_covariance(covariance, transition, process_noise, calibration, rate, density, elapsed):  # type: ignore[no-untyped-def]
+def propagate_covariance(covariance, transition, process_noise, calibration, rate, density, elapsed):  # type:
     """``P = Phi P Phi' + Q`` in place, where the states from the m-th on are Gauss-Markov biases of their own.
 
     Parameters
