@@ -7,7 +7,6 @@ sources of simnav) and the estimator's (name, label, parameters, sources).
 from __future__ import annotations
 
 import ast
-import functools
 import hashlib
 import importlib.util
 import inspect
@@ -49,12 +48,13 @@ def _files_digest(files: Iterable[tuple[str, Path]]) -> str:
 
 def _package_digest(folder: Path) -> str:
     """Digest of all files of a package, but for what Python makes of them."""
-    files = (p for p in folder.rglob("*") if p.is_file() and p.suffix != ".pyc")
-    named = sorted((p.relative_to(folder).as_posix(), p) for p in files)
-    return _files_digest((n, p) for n, p in named if not any(part.startswith(".") for part in n.split("/")))
+    found = []
+    for place, folders, names in os.walk(folder):
+        folders[:] = [f for f in folders if f != "__pycache__" and not f.startswith(".")]
+        found += [Path(place, n) for n in names if not n.startswith(".") and not n.endswith((".pyc", "~"))]
+    return _files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
 
 
-@functools.cache
 def _installed_digest(package: str) -> str:
     """Digest of an importable package or module, by its top-level name."""
     module = sys.modules.get(package)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
+import importlib.util
 import multiprocessing
 import os
-import pkgutil
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from importlib.metadata import entry_points
+from pathlib import Path
 
 from simnav.compiled import Kernel, kernels, prune
 
@@ -61,12 +61,14 @@ def _cores() -> int:
 
 
 def _import_all() -> None:
-    """Import every module of our two packages, and whatever plug-ins import; a broken one harms nobody."""
+    """Import every module of our two packages that holds kernels, and whatever plug-ins import."""
     for package in ("simnav", "estimators"):
-        with contextlib.suppress(ImportError):
-            top = importlib.import_module(package)
-            for module in pkgutil.walk_packages(top.__path__, f"{package}.", onerror=lambda name: None):
-                _try_import(module.name)
+        spec = importlib.util.find_spec(package)
+        for folder in [] if spec is None else spec.submodule_search_locations or []:
+            for path in sorted(Path(folder).rglob("*.py")):
+                if b"simnav.compiled" in path.read_bytes():
+                    parts = path.relative_to(folder).with_suffix("").parts
+                    _try_import(".".join([package, *(p for p in parts if p != "__init__")]))
     for point in entry_points(group="simnav.estimators"):
         _try_import(point.module)
 
