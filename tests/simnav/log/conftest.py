@@ -1,4 +1,4 @@
-"""A small log whose truth is known: a closed-form trajectory, its exact IMU samples, CSV files in awkward axes and units."""
+"""A small log with a known truth: a closed-form trajectory, its exact IMU samples, files in awkward axes and units."""
 
 from __future__ import annotations
 
