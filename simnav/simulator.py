@@ -144,7 +144,8 @@ class Simulator:
         self.time = until
         imu, imu_labels = None, None
         if self._imu is not None:
-            imu = self._imu.sense(block.imu)
+            # The ideal samples are not needed again, unless other runs share them.
+            imu = self._imu.sense(block.imu, overwrite=self._truth is None)
             if self._label_imu:
                 imu_labels = ImuLabels(np.zeros(len(imu), dtype=np.uint32), np.zeros((len(imu), 6)))
             for layer in self._layers:
