@@ -8,7 +8,7 @@ The kernels take and return scalars and are used by other kernels; the plain fun
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import sqrt
 
 import numpy as np
 

@@ -118,7 +118,8 @@ def dcm_from_rotation_vector(vector: Array) -> Array:
     s = skew(v)
     a = np.sinc(angle / np.pi)
     b = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    return np.eye(3) + a * s + b * (s @ s)
+    dcm: Array = np.eye(3) + a * s + b * (s @ s)
+    return dcm
 
 
 def rotation_vector_from_dcm(dcm: Array) -> Array:
@@ -169,7 +170,8 @@ def quaternion_from_dcm(dcm: Array) -> Array:
     )
     largest = np.argmax(squares, axis=-1)[..., None, None]
     q = np.take_along_axis(candidates, largest, axis=-2)[..., 0, :]
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+    unit: Array = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return unit
 
 
 def dcm_from_quaternion(quaternion: Array) -> Array:

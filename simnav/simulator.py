@@ -1,7 +1,8 @@
 """The simulator: a scenario and a seed to a recording, in one block or step by step.
 
-A `Simulator` is a state machine. The world's truth, the instruments' errors and the faults all carry their state from block to
-block and draw a fixed number of variates per sample, so that one long block and many short ones give the same numbers.
+A `Simulator` is a state machine. The world's truth, the instruments' errors and the faults all carry their state
+from block to block and draw a fixed number of variates per sample, so that one long block and many short ones give
+the same numbers.
 """
 
 from __future__ import annotations

@@ -16,11 +16,11 @@ With the angle and velocity increments alpha, nu of an interval and alpha', nu' 
 - ``C+ = exp(-zeta x) C exp(phi x)``
 
 where vm is the mean of the velocities at both ends, and gravity, radii and rates are taken at the middle of the
-interval. The mean angular rate and specific force of `increments` differ from the true means over an interval by a term of
-third order in dt.
+interval. The mean angular rate and specific force of `increments` differ from the true means over an interval by a
+term of third order in dt.
 
-References: P. G. Savage, *Strapdown inertial navigation integration algorithm design*, J. Guidance, Control and Dynamics
-21(1) and 21(2), 1998. P. D. Groves 2013, chapter 5.
+References: P. G. Savage, *Strapdown inertial navigation integration algorithm design*, J. Guidance, Control and
+Dynamics 21(1) and 21(2), 1998. P. D. Groves 2013, chapter 5.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt):
     v0, v1, v2 = velocity[0], velocity[1], velocity[2]
     # The mean velocity is implicit; each pass gains six digits, so that the second is exact to rounding.
     m0, m1, m2 = v0 + 0.5 * u0, v1 + 0.5 * u1, v2 + 0.5 * (u2 + 9.8 * dt)
-    e0, e2, _, _, _, g, per_north, per_east, hm = local_rates(position[0], position[2], m0, m1, m2, dt)
+    e0, e2, _, _, _, g, per_north, per_east, _ = local_rates(position[0], position[2], m0, m1, m2, dt)
     tangent = -e2 / e0
     east_rate = per_east * e0 * (1.0 / ROTATION_RATE)
     z0, z1, z2 = 0.0, 0.0, 0.0
@@ -172,9 +172,7 @@ def mechanize(position, velocity, dcm, memory, angular_rate, specific_force, int
         )  # fmt: skip
 
 
-@kernel(
-    "void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
-)
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
 def _integrate(position, velocity, dcm, angular_rate, specific_force, interval, positions, velocities, dcms):  # type: ignore[no-untyped-def]
     memory = np.zeros(6)
     for k in range(interval.size):
@@ -238,8 +236,8 @@ def sample_from_motion(latitude, height, v, w, c, d, memory, dt):  # type: ignor
     Returns
     -------
     tuple of 11 floats
-        Mean angular rate and specific force; latitude and longitude change [rad] and height change [m]; the Earth rate, north
-        and down, in the middle.
+        Mean angular rate and specific force; latitude and longitude change [rad] and height change [m]; the Earth
+        rate, north and down, in the middle.
     """
     m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
     e0, e2, k0, k1, k2, g, per_north, per_east, _ = local_rates(latitude, height, m0, m1, m2, dt)

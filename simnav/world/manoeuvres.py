@@ -1,7 +1,7 @@
 """Manoeuvres: what the vessel is told to do, one after the other.
 
-Each is a `Spec`; `table` turns a list of them into the numeric rows that the motion kernel walks through. After the last one
-the vessel holds its course, speed and depth.
+Each is a `Spec`; `table` turns a list of them into the numeric rows that the motion kernel walks through. After the
+last one the vessel holds its course, speed and depth.
 """
 
 from __future__ import annotations

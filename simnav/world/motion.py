@@ -1,8 +1,9 @@
 """The motion kernel: commands, vessel dynamics, waves and current to a smooth truth and ideal inertial samples.
 
-Per sample it walks the manoeuvre table (guidance), advances speed, yaw rate and flight-path angle through critically damped lags,
-turns the wave components by their encounter phase, composes velocity and attitude, and inverts the strapdown equations to
-what perfect instruments deliver (`simnav.strapdown.sample_from_motion`), so that truth and samples agree to rounding.
+Per sample it walks the manoeuvre table (guidance), advances speed, yaw rate and flight-path angle through critically
+damped lags, turns the wave components by their encounter phase, composes velocity and attitude, and inverts the
+strapdown equations to what perfect instruments deliver (`simnav.strapdown.sample_from_motion`), so that truth and
+samples agree to rounding.
 """
 
 from __future__ import annotations
@@ -182,7 +183,9 @@ def _cosine_sine(angle):  # type: ignore[no-untyped-def]
         return cos(angle), sin(angle)
     a = angle * angle
     c = 1.0 - a * (1 / 2 - a * (1 / 24 - a * (1 / 720 - a * (1 / 40320 - a * (1 / 3628800 - a * (1 / 479001600))))))
-    s = 1.0 - a * (1 / 6 - a * (1 / 120 - a * (1 / 5040 - a * (1 / 362880 - a * (1 / 39916800 - a * (1 / 6227020800))))))
+    s = 1.0 - a * (
+        1 / 6 - a * (1 / 120 - a * (1 / 5040 - a * (1 / 362880 - a * (1 / 39916800 - a * (1 / 6227020800)))))
+    )
     return c, s * angle
 
 
@@ -227,7 +230,8 @@ def initialise(x, p, phase, table):  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    "void(f8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+    "void(f8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
 )
 def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force):  # type: ignore[no-untyped-def]
     """Advance the world by n samples.

@@ -1,9 +1,10 @@
 """The sea: a wave spectrum, and the motions that it gives a vessel.
 
 The surface is a sum of long-crested components, each with its own frequency and direction. The vessel answers to
-the elevation (heave), the slope (roll, pitch) and the orbital motion (surge, sway) of each through a second-order response, and
-meets each at its encounter frequency, which follows from the vessel's own speed and course. Sources: DNV-RP-C205 section 3.5
-(spectra); T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, Wiley 2011, chapters 8 and 10.
+the elevation (heave), the slope (roll, pitch) and the orbital motion (surge, sway) of each through a second-order
+response, and meets each at its encounter frequency, which follows from the vessel's own speed and course. Sources:
+DNV-RP-C205 section 3.5 (spectra); T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, Wiley
+2011, chapters 8 and 10.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ class Sea(Spec):
     heave_damping, roll_damping, pitch_damping : float
         Damping ratios.
     roll_gain, pitch_gain, drift_gain : float
-        Response to the wave slope (roll, pitch) and to the orbital motion (surge, sway) well below resonance; a hull that spans
-        several wave lengths averages them, so its gains are below 1.
+        Response to the wave slope (roll, pitch) and to the orbital motion (surge, sway) well below resonance; a hull
+        that spans several wave lengths averages them, so its gains are below 1.
     """
 
     spectrum: Literal["jonswap", "pierson_moskowitz"] = "jonswap"
@@ -112,9 +113,10 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     phase : (3, n) array
         Cosine and sine of the phase at time 0 at the start position, and room for the encounter frequency.
     table : (17, n) array
-        Frequency [rad/s], wave number north and east [rad/m]; then pairs of cosine and sine gains of the displacements north, east,
-        down [m], and of the slope responses roll-north, roll-east, pitch-north, pitch-east [rad]: the vessel's roll is
-        the projection of (roll-north, roll-east) on its axes, and pitch likewise.
+        Frequency [rad/s], wave number north and east [rad/m]; then pairs of cosine and sine gains of the
+        displacements north, east, down [m], and of the slope responses roll-north, roll-east, pitch-north,
+        pitch-east [rad]: the vessel's roll is the projection of (roll-north, roll-east) on its axes, and pitch
+        likewise.
     """
     if sea is None or sea.significant_height == 0.0:
         return np.zeros((3, 0)), np.zeros((ROWS, 0))
@@ -124,7 +126,9 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     # Components of equal energy, one at random within each quantile: the variance is exact in every run and no
     # two runs, and no two hours, repeat.
     grid = peak * np.geomspace(0.4, 4.0, 4000)
-    cumulative = np.concatenate([[0.0], np.cumsum(np.diff(grid) * 0.5 * (spectrum(sea, grid)[1:] + spectrum(sea, grid)[:-1]))])
+    cumulative = np.concatenate(
+        [[0.0], np.cumsum(np.diff(grid) * 0.5 * (spectrum(sea, grid)[1:] + spectrum(sea, grid)[:-1]))]
+    )
     quantile = (np.arange(n) + rng.random(n)) / n
     omega = np.interp(quantile * cumulative[-1], cumulative, grid)
     amplitude = np.sqrt(2.0 * sea.significant_height**2 / 16.0 / n)

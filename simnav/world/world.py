@@ -102,9 +102,7 @@ class World:
         yaw = np.arctan2(x[motion.C + 3], x[motion.C])
         attitude = np.array([x[motion.ROLL], x[motion.PITCH], yaw])
         velocity = x[motion.V : motion.V + 3]
-        return NavigationStates(
-            np.array([self.time]), position[None].copy(), velocity[None].copy(), attitude[None]
-        )
+        return NavigationStates(np.array([self.time]), position[None].copy(), velocity[None].copy(), attitude[None])
 
     def steer_by(self, north: float, east: float) -> None:
         """Let the guidance see a position that is off by this much [m] from now on (closed loop)."""

@@ -141,12 +141,12 @@ def test_bad_parameters_are_a_sentence(given: dict[str, Any], message: str):
 
 
 def test_an_estimator_without_parameters_says_so():
-    with pytest.raises(EstimatorError, match="has no parameter 'gate'; it takes none"):
+    with pytest.raises(EstimatorError, match=r"has no parameter 'gate'; it takes none"):
         make("inertial", gate="3")
 
 
 def test_unknown_names_suggest_the_nearest():
-    with pytest.raises(EstimatorError, match="unknown estimator 'ship-ekv'; did you mean 'ship-ekf'"):
+    with pytest.raises(EstimatorError, match=r"unknown estimator 'ship-ekv'; did you mean 'ship-ekf'"):
         find("ship-ekv")
 
 
@@ -164,7 +164,7 @@ def test_collisions_are_refused_and_placed():
 
 @pytest.mark.parametrize("bad", ["My_Filter", "myFilter", "-x", "a b", ""])
 def test_names_are_kebab_case(bad: str):
-    with pytest.raises(EstimatorError, match="not kebab-case"):
+    with pytest.raises(EstimatorError, match=r"not kebab-case"):
         register(bad)
 
 

@@ -31,7 +31,9 @@ def assert_same_block(a: Block, b: Block) -> None:
     assert a.aids.keys() == b.aids.keys()
     for name, stream in a.aids.items():
         for field in ("time", "value", "faults", "fault_error", "sigma", "dropped"):
-            np.testing.assert_array_equal(getattr(stream, field), getattr(b.aids[name], field), err_msg=f"{name}.{field}")
+            np.testing.assert_array_equal(
+                getattr(stream, field), getattr(b.aids[name], field), err_msg=f"{name}.{field}"
+            )
     for field in ("time", "position", "velocity", "attitude"):
         np.testing.assert_array_equal(getattr(a.truth, field), getattr(b.truth, field))
 

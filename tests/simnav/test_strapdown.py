@@ -22,12 +22,8 @@ UG = 9.80665e-6
 
 def attitude(t):
     """A ship in a seaway: closed form, with first derivative."""
-    angle = np.stack(
-        [0.15 * np.sin(0.6 * t), 0.05 * np.sin(0.8 * t + 1.0), 0.3 * np.sin(0.1 * t) + 0.05 * t], axis=-1
-    )
-    rate = np.stack(
-        [0.09 * np.cos(0.6 * t), 0.04 * np.cos(0.8 * t + 1.0), 0.03 * np.cos(0.1 * t) + 0.05], axis=-1
-    )
+    angle = np.stack([0.15 * np.sin(0.6 * t), 0.05 * np.sin(0.8 * t + 1.0), 0.3 * np.sin(0.1 * t) + 0.05 * t], axis=-1)
+    rate = np.stack([0.09 * np.cos(0.6 * t), 0.04 * np.cos(0.8 * t + 1.0), 0.03 * np.cos(0.1 * t) + 0.05], axis=-1)
     return angle, rate
 
 
@@ -128,7 +124,8 @@ def test_at_rest_only_gravity_and_the_earth_are_felt():
 def test_schuler_oscillation():
     """A level error of 1e-4 rad swings at the Schuler period: 84.4 minutes (Groves section 5.7.2).
 
-    Height is held by aiding in practice; here a run of half a period shows the swing before the vertical channel diverges.
+    Height is held by aiding in practice; here a run of half a period shows the swing before the vertical channel
+    diverges.
     """
     n = 12_000
     t = np.arange(n + 1) * 0.1
@@ -144,7 +141,12 @@ def test_schuler_oscillation():
 
 def as_pyins(states: NavigationStates, k: int) -> pd.Series:
     return pd.Series(
-        [*np.degrees(states.position[k, :2]), states.position[k, 2], *states.velocity[k], *np.degrees(states.attitude[k])],
+        [
+            *np.degrees(states.position[k, :2]),
+            states.position[k, 2],
+            *states.velocity[k],
+            *np.degrees(states.attitude[k]),
+        ],
         index=["lat", "lon", "alt", "VN", "VE", "VD", "roll", "pitch", "heading"],
     )
 
@@ -179,7 +181,8 @@ def python_ins_minus_ours(dt, duration=600.0):
 def test_python_ins_integrates_our_samples_to_our_trajectory():
     """An independent integrator ends where we do, up to its own truncation.
 
-    Ours returns to rounding; theirs is of second order in the vertical, so that halving the interval quarters the difference.
+    Ours returns to rounding; theirs is of second order in the vertical, so that halving the interval quarters the
+    difference.
     """
     coarse, fine = python_ins_minus_ours(0.02), python_ins_minus_ours(0.01)
     assert np.abs(fine[0][:2]).max() < 0.005

@@ -142,7 +142,7 @@ def test_instruments_simulated_from_the_reference(tiny):
     np.testing.assert_allclose(depth.time, np.arange(0.5, 30.25, 0.5))
     k = np.round(depth.time * RATE).astype(int)
     expected = -truth.position[k, 2] + (dcm_from_rpy(truth.attitude[k]) @ [1.0, 0.0, 0.5])[:, 2]
-    # Between samples a second apart a cubic spline is good to 5/384 of the fourth derivative, somewhat less at the ends.
+    # Between samples a second apart a cubic spline is good to 5/384 of the fourth derivative; less at the ends.
     np.testing.assert_allclose(depth.value[:, 0], expected, atol=2e-3)
     gnss = block.aids["gnss"]
     np.testing.assert_allclose(gnss.time, np.arange(0.1, 30.0, 0.25))

@@ -111,7 +111,7 @@ def test_turn_by_an_angle_ends_on_its_heading_and_keeps_its_rate():
 
 
 def test_turn_on_a_radius_sails_a_circle_of_it():
-    first, _, tap, xy = run(900.0, [Turn(radius=400.0, duration=880.0)])
+    _, _, _, xy = run(900.0, [Turn(radius=400.0, duration=880.0)])
     inner = xy[100:800]
     centre = inner[:419].mean(axis=0)  # one circle: 2 pi 400 / 6 s
     assert np.hypot(*(inner - centre)[:, :2].T) == pytest.approx(400.0, rel=0.02)
