@@ -399,3 +399,11 @@ def test_labels_say_what_was_asked_for() -> None:
 def test_the_time_limit_grows_with_the_run() -> None:
     assert campaign.time_limit(scenario()) == 60.0
     assert campaign.time_limit(scenario(duration_s="6000.0")) == 1200.0
+
+
+def test_a_dask_cluster_gives_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
+    request = estimator(tmp_path)
+    run_campaign([scenario()], [request], range(3), tmp_path / "dask", workers=2, backend="dask")
+    run_campaign([scenario()], [request], range(3), tmp_path / "here", workers=1)
+    assert rows(tmp_path / "dask") == rows(tmp_path / "here")
