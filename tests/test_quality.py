@@ -7,9 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
+PACKAGES = ("simnav", "estimators", "scenarios", "leaderboard")
 
 
 @pytest.mark.parametrize(
@@ -34,3 +37,16 @@ def test_files_stay_short():
     ]
     long = {str(p.relative_to(ROOT)): n for p in files if (n := len(p.read_text().splitlines())) > 650}
     assert not long
+
+
+def test_no_import_cycle_between_files():
+    import grimp
+
+    graph = grimp.build_graph(*PACKAGES, cache_dir=None, exclude_type_checking_imports=True)
+    index = {name: i for i, name in enumerate(sorted(graph.modules))}
+    edges = [(index[a], index[b]) for a in index for b in graph.find_modules_directly_imported_by(a)]
+    rows, columns = zip(*edges, strict=True)
+    matrix = coo_array(([1] * len(edges), (rows, columns)), shape=(len(index), len(index)))
+    count, label = connected_components(matrix, directed=True, connection="strong")
+    cycles = [[n for n, i in index.items() if label[i] == k] for k in range(count) if (label == k).sum() > 1]
+    assert not cycles
