@@ -108,14 +108,19 @@ def scenario(name: str) -> Scenario:
         return load(name)
 
 
-def scenarios(given: Iterable[str] | None, out: Output) -> list[Scenario]:
-    """The scenarios that were asked for; where none was, all of the catalogue but logs whose files are not here."""
+def scenarios(given: Iterable[str] | None, out: Output, *, quick: bool = False) -> list[Scenario]:
+    """The scenarios that were asked for; where none was, all of the catalogue but logs whose files are not here.
+
+    ``quick`` leaves out those of the catalogue that are tagged ``long``.
+    """
     from simnav.scenario import names
 
     asked = split_names(given)
     found = []
     for name in dict.fromkeys(asked or names()):
         chosen = scenario(name)
+        if quick and not asked and "long" in chosen.tags:
+            continue
         if chosen.log is not None:
             from simnav.source import open_source
 

@@ -27,7 +27,7 @@ _AXES = (
     ("Down error [m]", 2, 1.0),
     ("Heading error [deg]", 8, np.degrees(1.0)),
 )
-_MOST_DIAGNOSTICS = 3
+_MOST_DIAGNOSTICS = 2
 
 
 def _origin(recording: Recording) -> Array:
@@ -69,7 +69,7 @@ def outage_spans(recording: Recording, most: int = 12) -> list[tuple[float, floa
     return [(a, b, f"no {', '.join(dict.fromkeys(names))}") for (a, b), names in sorted(spans.items()) if a < b]
 
 
-def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]]) -> Figure:
+def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], references: Sequence[str] = ()) -> Figure:
     """The figure of ``simnav run --plot``.
 
     Parameters
@@ -77,10 +77,12 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]]) -> Fig
     recording : Recording
     trials : sequence of (label, Trial)
         Those without any epoch are left out.
+    references : sequence of str
+        Labels of those that are told the truth.
     """
     origin = _origin(recording)
     shown = [(label, trial, errors(trial, recording)) for label, trial in trials if len(trial)]
-    style = Style(label for label, _, _ in shown)
+    style = Style((label for label, _, _ in shown), references)
     panels: dict[str, list[Curve]] = {}
     for title, column, factor in _AXES:
         curves = []
@@ -122,5 +124,7 @@ def _diagnostics(shown: Sequence[tuple[str, Trial, Array]]) -> dict[str, list[Cu
             if v.shape[1] and np.isfinite(v).any():
                 count = np.isfinite(v).sum(axis=1)
                 mean = np.where(count > 0, np.nansum(v, axis=1) / np.maximum(count, 1), np.nan)
+                if np.nanmax(mean) == np.nanmin(mean):
+                    continue  # it says nothing over time
                 found.setdefault(name.replace("_", " "), []).append(Curve(label, trial.time, mean))
     return dict(sorted(found.items(), key=lambda item: -len(item[1]))[:_MOST_DIAGNOSTICS])

@@ -198,7 +198,7 @@ def campaign(
     runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 10]")] = None,
     seed: FirstSeed = 0,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("results"),
-    quick: Annotated[bool, typer.Option("--quick", help="A preset that ends within minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Ends within minutes: 10 seeds, no long scenarios.")] = False,
     set_: Set = None,
     workers: Workers = 2,
     time_limit: TimeLimit = None,
@@ -212,7 +212,7 @@ def campaign(
 
         seeds = range(seed, seed + (runs or (10 if quick else 50)))
         out.code = monte_carlo.campaign(
-            out, arguments.scenarios(scenario, out), arguments.requests(estimator, set_), seeds,
+            out, arguments.scenarios(scenario, out, quick=quick), arguments.requests(estimator, set_), seeds,
             monte_carlo.Limits(workers, time_limit, memory_limit), output,
         )  # fmt: skip
 
@@ -221,6 +221,7 @@ def campaign(
 def leaderboard_(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the site.")] = Path("site"),
+    workers: Workers = 2,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -228,7 +229,7 @@ def leaderboard_(
     with session(json, debug) as out:
         from leaderboard import monte_carlo
 
-        out.code = monte_carlo.leaderboard(out, results, output)
+        out.code = monte_carlo.leaderboard(out, results, output, workers)
 
 
 @app.command()

@@ -244,7 +244,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
 
     try:
         if not debug:
-            warnings.showwarning = warn  # type: ignore[assignment]
+            warnings.showwarning = warn
         with _quiet_stdout(json):
             yield out
     except (typer.Exit, typer.Abort):

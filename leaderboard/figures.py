@@ -99,29 +99,39 @@ class Style:
     ----------
     labels : iterable of str
         All estimators, in the order in which they are shown.
+    references : iterable of str
+        Those that are told the truth: grey.
     """
 
-    def __init__(self, labels: Iterable[str]):
-        self._index = {label: i for i, label in enumerate(dict.fromkeys(labels))}
+    def __init__(self, labels: Iterable[str], references: Iterable[str] = ()):
+        self._references = list(dict.fromkeys(references))
+        shown = [label for label in dict.fromkeys(labels) if label not in self._references]
+        self._index = {label: i for i, label in enumerate(shown)}
 
     def _of(self, label: str) -> int:
         return self._index.setdefault(label, len(self._index))
 
     def colour(self, label: str, dark: bool = False) -> str:
         """Hex colour on a light (or dark) ground."""
+        if label in self._references:
+            return _DARK[GREY] if dark else GREY
         return PALETTE[self._of(label) % len(PALETTE)][dark]
 
     def line(self, label: str) -> Any:
         """Matplotlib line style: changes once the colours are used up."""
+        if label in self._references:
+            return _LINES[1 + self._references.index(label) % (len(_LINES) - 1)]
         return _LINES[self._of(label) // len(PALETTE) % len(_LINES)]
 
     def marker(self, label: str) -> str:
         """Matplotlib marker."""
+        if label in self._references:
+            return "d"
         return _MARKERS[self._of(label) % len(_MARKERS)]
 
     def order(self, label: str) -> int:
-        """Place in the order in which estimators are shown."""
-        return self._of(label)
+        """Place in the order in which estimators are shown, references last."""
+        return 10**6 if label in self._references else self._of(label)
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,9 +403,9 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
             ax.axhline(level, color=GREY, lw=0.7, ls=(0, (2, 2)), zorder=0.5)
             ax.annotate(
                 f"{level} %",
-                (1.0, level),
+                (0.01, level),
                 xycoords=("axes fraction", "data"),
-                ha="right",
+                ha="left",
                 va="bottom",
                 fontsize=7.5,
                 color=GREY,
@@ -473,10 +483,11 @@ def run_chart(
     """
     right = {**errors, **(diagnostics or {})}
     with _styled():
-        fig = figure(13.0, max(5.0, 1.9 * len(right)))
+        fig = figure(13.0, max(5.0, 1.0 + 1.45 * len(right)))
         grid = fig.add_gridspec(max(len(right), 1), 2, width_ratios=(1.0, 1.15))
         _chart(fig.add_subplot(grid[:, 0]), truth, tracks, style, fixes or {}, title)
         chart = fig.axes[0]
+        chart.set_anchor("N")
         chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, borderaxespad=0.0)
         longest = max((float(c.time[-1]) for cs in right.values() for c in cs if len(c.time)), default=1.0)
         unit, factor = _time_unit(longest)

@@ -105,8 +105,17 @@ def campaign(
     summary = _run(out, scenarios, requests, seeds, limits, folder)
     results = _load(folder, series=False)
     ranking = _rank(results)
-    out.document({"results": str(folder), "seconds": summary.seconds, "asked": summary.total,
-                  "computed": summary.computed, "runs": len(results), "failed": _failures(results), "ranking": ranking.to_dict()})  # fmt: skip
+    out.document(
+        {
+            "results": str(folder),
+            "seconds": summary.seconds,
+            "asked": summary.total,
+            "computed": summary.computed,
+            "runs": len(results),
+            "failed": _failures(results),
+            "ranking": ranking.to_dict(),
+        }
+    )
     out.print(ranking_table(ranking, results))
     _print_failures(out, results)
     out.print(f"results: {folder} ({summary.computed} computed, {summary.skipped} were there, "
@@ -115,14 +124,14 @@ def campaign(
     return 0 if any(r.status == "ok" for r in results) else FAILED
 
 
-def leaderboard(out: Output, folder: Path, output: Path) -> int:
+def leaderboard(out: Output, folder: Path, output: Path, workers: int) -> int:
     """Show the ranking and write the site; returns the exit code."""
     from leaderboard.site import build
 
     results = _load(absolute(folder), series=True)
     ranking = _rank(results)
     with out.progress("site") as progress:
-        index = build(results, ranking, output, progress=progress)
+        index = build(results, ranking, output, progress=progress, workers=workers)
     out.document({"site": str(index), "runs": len(results), "failed": _failures(results), "ranking": ranking.to_dict()})
     out.print(ranking_table(ranking, results))
     _print_failures(out, results)
@@ -177,7 +186,7 @@ def _rank(results: Sequence[Result]) -> Ranking:
 
 def ranking_table(ranking: Ranking, results: Sequence[Result], mine: str | None = None) -> Table:
     """The overall ranking."""
-    from leaderboard.site import SCORE_CAPTION, SCORE_TITLE, ranking_rows
+    from leaderboard.ranking_table import SCORE_CAPTION, SCORE_TITLE, ranking_rows
 
     rows = ranking_rows(ranking.to_dict(), results)
     columns = ["rank", "tier", "estimator", SCORE_TITLE, "95 % interval", "consistency", "95 % coverage", "failed",
@@ -232,9 +241,9 @@ def standing_table(stand: dict[str, Any]) -> Table:
                      tables.interval(r["horizontal_rmse"], r["low"], r["high"]), ratio, better, p])  # fmt: skip
     mine = stand["estimator"]
     columns = ["estimator", "failed", "horizontal RMSE [m]", f"{mine} / it", f"{mine} better in", "p"]
-    place = f": {mine} is {stand['place']} of {stand['of']}" if stand["place"] else ""
+    place = f"is {stand['place']} of {stand['of']}" if stand["place"] else "does not suit it"
     return tables.table(
-        f"{stand['scenario']}{place}",
+        f"{stand['scenario']}: {mine} {place}",
         columns,
         rows,
         numeric=columns[1:],

@@ -58,12 +58,14 @@ def run(out: Output, scenario: Scenario, requests: list[EstimatorRequest], seed:
                     "scores": score(trial, recording) if len(trial) else {},
                 }
             )
+        progress(len(requests))
     drawn = None
     if plot is not None and any(len(t) for _, t in trials):
         from leaderboard.charts import run_figure
         from leaderboard.figures import save
 
-        drawn = save(run_figure(recording, trials), absolute(plot), formats=(plot.suffix[1:],))[0]
+        references = [str(row["estimator"]) for row in rows if row["reference"]]
+        drawn = save(run_figure(recording, trials, references), absolute(plot), formats=(plot.suffix[1:],))[0]
     out.document(
         {
             "scenario": scenario.id,
@@ -166,9 +168,14 @@ def check(out: Output, request: EstimatorRequest) -> int:
     """Run the contract test; returns the exit code."""
     from simnav.check import check as run_checks
 
-    report = run_checks(request.name, **request.parameters)
-    out.document(report)
-    out.print(str(report))
+    with mistakes(ValueError):
+        report = run_checks(request.name, **request.parameters)
+    findings = [{"name": f.name, "ok": f.ok, "sentence": f.sentence} for f in report.findings]
+    out.document({"estimator": report.estimator, "passed": report.passed, "findings": findings})
+    out.print(tables.table(f"{report.estimator} and the contract", ["", "test", "finding"],
+                           [["ok" if f.ok else "FAIL", f.name, f.sentence] for f in report.findings],
+                           strong=[i for i, f in enumerate(report.findings) if not f.ok]),
+              f"{report.estimator} {'passes' if report.passed else 'fails'}")  # fmt: skip
     return 0 if report.passed else FAILED
 
 

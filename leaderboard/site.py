@@ -13,7 +13,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,24 +22,33 @@ import numpy as np
 
 from leaderboard import export, tables
 from leaderboard.console import UserError
-from leaderboard.figures import Dot, Style, dots, error_cdf, error_over_time, save, trajectory
-from leaderboard.summary import NO_TRIAL, Interval, Runs, group, tracks
+from leaderboard.figures import Dot, Style, dots
+from leaderboard.ranking_table import (
+    SCORE_AXIS,
+    SCORE_CAPTION,
+    SCORE_LEAD,
+    SCORE_TITLE,
+    add_bars,
+    between,
+    ranking_rows,
+    ratio,
+    sortable,
+)
+from leaderboard.site_figures import catalogued, scenario_figures, write_figure
+from leaderboard.summary import NO_TRIAL, Interval, Runs, group
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from leaderboard.figures import Track
     from leaderboard.ranking import Ranking
     from leaderboard.store import Result
 
 __all__ = ["build"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
+_WORTH_PROCESSES = 3  # scenarios
 _STATIC = ("style.css", "tables.js", "results.schema.json")
 _DEGREES = math.degrees(1.0)
-_PIXELS = 96  # of an inch, in CSS
 
-#: Columns of score tables: score, heading, factor, "%" or "time" for how it is written, whether small is best.
+#: Columns of score tables: score, heading, factor, how it is written ("": with interval), whether small is best.
 _COLUMNS: tuple[tuple[str, str, float, str, bool], ...] = (
     ("horizontal_rmse", "Horizontal RMSE [m]", 1.0, "", True),
     ("r95", "R95 [m]", 1.0, "", True),
@@ -48,19 +57,12 @@ _COLUMNS: tuple[tuple[str, str, float, str, bool], ...] = (
     ("heading_rmse", "Heading RMSE [deg]", _DEGREES, "", True),
     ("outage_end_error", "At outage end [m]", 1.0, "", True),
     ("recovery_time", "Recovery [s]", 1.0, "", True),
-    ("drift", "Drift [% of distance]", 1.0, "", True),
-    ("nees_horizontal", "NEES per degree of freedom", 1.0, "", False),
+    ("nees_horizontal", "NEES / dof", 1.0, "-", False),
     ("coverage_95", "95 % coverage", 1.0, "%", False),
     ("detection_rate", "Faults detected", 1.0, "%", False),
     ("false_alarm_rate", "False alarms", 1.0, "%", False),
     ("smoothed_horizontal_rmse", "Smoothed RMSE [m]", 1.0, "", True),
     ("update_median", "Per epoch", 1.0, "time", False),
-)
-_PANELS = (
-    ("horizontal", "Horizontal error [m]", 1.0),
-    ("vertical", "Vertical error [m]", 1.0),
-    ("velocity", "Velocity error [m/s]", 1.0),
-    ("heading", "Heading error [deg]", _DEGREES),
 )
 
 
@@ -71,6 +73,7 @@ def build(
     *,
     command: str | None = None,
     progress: Callable[..., None] | None = None,
+    workers: int = 1,
 ) -> Path:
     """Write the site.
 
@@ -85,6 +88,8 @@ def build(
         That makes the results again; by default it is put together from them.
     progress : callable, optional
         Called with (done, total, note=...).
+    workers : int
+        Processes that draw the figures.
 
     Returns
     -------
@@ -104,7 +109,9 @@ def build(
     draft = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent))
     try:
         draft.chmod(0o755)
-        _Site(results, ranking, draft, command or reproduce(results), progress or (lambda *_, **__: None)).write()
+        _Site(
+            results, ranking, draft, command or reproduce(results), progress or (lambda *_, **__: None), workers
+        ).write()
         _swap(draft, output)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -164,17 +171,24 @@ class _Site:
     """One build: everything that the pages share."""
 
     def __init__(
-        self, results: Sequence[Result], ranking: Ranking, folder: Path, command: str, progress: Callable[..., None]
+        self,
+        results: Sequence[Result],
+        ranking: Ranking,
+        folder: Path,
+        command: str,
+        progress: Callable[..., None],
+        workers: int,
     ):
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking = ranking.to_dict()
-        self.folder, self.command, self.progress = folder, command, progress
+        self.folder, self.command, self.progress, self.workers = folder, command, progress, workers
         self.runs = group(self.results)
         self.rows = ranking_rows(self.ranking, self.results)
         labels = list(
             dict.fromkeys([*(row["label"] for row in self.rows), *sorted({r.estimator for r in self.results})])
         )
-        self.style = Style(labels)
+        references = {r.estimator for r in self.results if r.reference}
+        self.style = Style(labels, references)
         taken = {"index"}
         self.estimators = {label: self._estimator(label, taken) for label in labels}
         self.scenarios = [_describe(s, by, f"{slug(s, taken)}.html") for s, by in self.runs.items()]
@@ -210,11 +224,11 @@ class _Site:
             "command": self.command,
         }
         steps = len(self.scenarios) + 1
-        for k, scenario in enumerate(self.scenarios):
-            self.progress(k, steps, note=scenario["name"])
-            page = {**scenario, **self._scenario(scenario)}
+        self.progress(0, steps)
+        for k, (scenario, figures) in enumerate(zip(self.scenarios, self._draw(), strict=True)):
+            page = {**scenario, **self._scenario(scenario), "figures": figures}
             self._page(pages, "scenario.html", scenario["page"], scenario=page, **shared)
-        self.progress(steps - 1, steps, note="ranking")
+            self.progress(k + 1, steps, note=scenario["name"])
         for label, estimator in self.estimators.items():
             self._page(pages, "estimator.html", estimator["page"], estimator=self._of_estimator(label), **shared)
         self._page(pages, "index.html", "index.html", **self._index(), **shared)
@@ -234,35 +248,43 @@ class _Site:
         export.write_parquet(self.folder / "results.parquet", self.results)
         self.progress(steps, steps)
 
+    def _draw(self) -> Iterator[list[dict[str, Any]]]:
+        """The figures of one scenario after the other; several processes where it is worth their start."""
+        tasks = []
+        for s in self.scenarios:
+            by = self.runs[s["id"]]
+            head = {key: s[key] for key in ("id", "page", "seeds")}
+            tasks.append((self.folder, head, [by[e] for e in self.estimators if e in by and by[e].tried], self.style))
+        if self.workers < 2 or len(tasks) < _WORTH_PROCESSES:
+            yield from (scenario_figures(*task) for task in tasks)
+            return
+        from joblib import Parallel, delayed
+
+        before = os.environ.get("PYTHONSAFEPATH")
+        os.environ["PYTHONSAFEPATH"] = "1"  # a folder of ours where the user stands must not be imported
+        try:
+            parallel = Parallel(n_jobs=min(self.workers, len(tasks)), return_as="generator", pre_dispatch="2*n_jobs")
+            yield from parallel(delayed(scenario_figures)(*task) for task in tasks)
+        finally:
+            os.environ.pop("PYTHONSAFEPATH") if before is None else os.environ.update(PYTHONSAFEPATH=before)
+
     def _page(self, pages: Any, template: str, name: str, **values: Any) -> None:
         text = pages.get_template(template).render(page="index" if name == "index.html" else name, **values)
         (self.folder / name).write_text(text, encoding="utf-8")
-
-    def _figure(self, fig: Figure, name: str, caption: str, alt: str) -> dict[str, Any]:
-        save(fig, self.folder / "figures" / f"{name}.svg")
-        width, height = fig.get_size_inches() * _PIXELS
-        return {
-            "file": f"figures/{name}",
-            "caption": caption,
-            "alt": alt,
-            "width": round(width),
-            "height": round(height),
-        }
 
     # -- index -----------------------------------------------------------------------------------
 
     def _index(self) -> dict[str, Any]:
         tried = [r for r in self.results if r.status not in NO_TRIAL]
-        failed = sum(r.status != "ok" for r in tried)
         facts = [
             ("Scenarios", len(self.scenarios)),
             ("Estimators", len(self.estimators)),
             ("Seeds a scenario", max(len(s["seeds"]) for s in self.scenarios)),
             ("Runs", len(tried)),
-            ("Failed", failed),
+            ("Failed", sum(row["failed"] for row in self.rows)),
         ]
         rows = [{**row, **self.estimators[row["label"]]} for row in self.rows]
-        _add_bars(rows)
+        add_bars(rows)
         figure = None
         if any(row["value"] is not None for row in rows):
             points = [
@@ -270,7 +292,8 @@ class _Site:
                     note=f"({r['failed']} failed)" if r["failed"] else "")
                 for r in rows if r["value"] is not None
             ]  # fmt: skip
-            figure = self._figure(
+            figure = write_figure(
+                self.folder,
                 dots(points, self.style, label=SCORE_AXIS, title="Overall, 95 % interval"),
                 "ranking",
                 "The ranking with its intervals; hollow: reference.",
@@ -299,7 +322,7 @@ class _Site:
                 ranked = [v for (e, i), v in medians.items() if i == s["id"] and not self.estimators[e]["reference"]]
                 best = min((v for v in ranked if not math.isnan(v)), default=math.nan)
                 text = "" if math.isnan(value) else tables.number(value)
-                row.append({"text": text, "sort": _sortable(value), "page": s["page"],
+                row.append({"text": text, "sort": sortable(value), "page": s["page"],
                             "best": value == best and not estimator["reference"]})  # fmt: skip
             rows.append({**estimator, "row": row})
         return rows
@@ -312,11 +335,19 @@ class _Site:
         ranked = ranking["rows"]
         suited = [by[row["estimator"]] for row in ranked]
         columns, cells = _score_cells([(r, r.reference) for r in suited])
+        before = [None, *(row["tier"] for row in ranked)]
         rows = [
-            {**row, **self.estimators[row["estimator"]], "cells": c, "ratio": ratio(row["score"]),
-             "sort": _sortable(row["score"]), "interval": _between(row["low"], row["high"], ratio)}
-            for row, c in zip(ranked, cells, strict=True)
-        ]  # fmt: skip
+            {
+                **row,
+                **self.estimators[row["estimator"]],
+                "cells": c,
+                "ratio": ratio(row["score"]),
+                "sort": sortable(row["score"]),
+                "interval": between(row["low"], row["high"], ratio),
+                "starts_tier": k > 0 and row["tier"] != before[k],
+            }
+            for k, (row, c) in enumerate(zip(ranked, cells, strict=True))
+        ]
         return {
             "columns": columns,
             "rows": rows,
@@ -327,64 +358,9 @@ class _Site:
                  "reason": _reason(by[row["estimator"]], status)}
                 for row in ranked for status, count in row["statuses"].items() if status != "ok"
             ],
-            "figures": self._figures(scenario, [by[e] for e in self.estimators if e in by and by[e].tried]),
             "seeds": len(scenario["seeds"]),
             "first_seed": scenario["seeds"][0],
         }  # fmt: skip
-
-    def _figures(self, scenario: Mapping[str, Any], runs: list[Runs]) -> list[dict[str, Any]]:
-        name, style, made = Path(scenario["page"]).stem, self.style, []
-        count = len(scenario["seeds"])
-        seed = _seed_to_show(runs, scenario["seeds"])
-        fixes, outages = _of_recording(scenario["id"], seed)
-        truth, estimates = tracks(runs, seed)
-        if truth is not None:
-            note = next((r.note for run in runs if (r := run.at(seed)) is not None), "")
-            made.append(
-                self._figure(
-                    trajectory(truth, estimates, style, fixes=fixes, title=f"Trajectory, seed {seed}"),
-                    f"{name}-trajectory",
-                    f"Truth, fixes and estimates of seed {seed}{', ' + note if note else ''}. An estimate that leaves "
-                    "the frame has drifted off.",
-                    f"Chart of seed {seed}: the true track and the estimated tracks",
-                )
-            )
-        quantiles = [b for r in runs if (b := r.quantiles()) is not None]
-        if quantiles:
-            made.append(
-                self._figure(
-                    error_cdf(quantiles, style, label="Horizontal error [m]", title="Distribution of the error"),
-                    f"{name}-cdf",
-                    "Share of the epochs of all seeds whose horizontal error is below a value.",
-                    "Cumulative distribution of the horizontal error of every estimator",
-                )
-            )
-        points = [_dot(r) for r in runs]
-        if any(math.isfinite(p.value) for p in points):
-            made.append(
-                self._figure(
-                    dots(points, style, label="Horizontal RMSE [m]", title="Horizontal RMSE: median, 95 % interval"),
-                    f"{name}-rmse",
-                    "Faint points: seeds. Hollow: reference.",
-                    "Horizontal RMSE of every estimator, with its interval",
-                )
-            )
-        panels = {}
-        for key, label, factor in _PANELS:
-            bands = [b for r in runs if (b := r.band(key, factor)) is not None]
-            if bands:
-                panels[label] = bands
-        if panels:
-            shaded = " Shaded: outages." if outages else ""
-            made.append(
-                self._figure(
-                    error_over_time(panels, style, outages=outages, title=f"Error over time, {count} seeds"),
-                    f"{name}-error",
-                    f"Median over the seeds, and the band from the 5th to the 95th percentile.{shaded}",
-                    "Error of every estimator over time, with its spread over the seeds",
-                )
-            )
-        return made
 
     # -- estimator -------------------------------------------------------------------------------
 
@@ -430,7 +406,7 @@ def _describe(identity: str, by: Mapping[str, Runs], page: str) -> dict[str, Any
     found = {"id": identity, "name": name or identity, "page": page, "seeds": seeds, "title": "", "description": "",
              "source": ""}  # fmt: skip
     facts = [("Version", version or "–"), ("Seeds", len(seeds))]
-    scenario = _catalogued(identity)
+    scenario = catalogued(identity)
     if scenario is not None:
         found |= {"title": scenario.title, "description": scenario.description, "source": scenario.source}
         facts += [("Duration", tables.duration(scenario.duration)), ("Step", tables.duration(scenario.step))]
@@ -439,32 +415,6 @@ def _describe(identity: str, by: Mapping[str, Runs], page: str) -> dict[str, Any
         if scenario.faults:
             facts.append(("Faults", len(scenario.faults)))
     return {**found, "facts": [{"name": n, "value": v} for n, v in facts]}
-
-
-def _catalogued(identity: str) -> Any:
-    """The scenario of the catalogue with this id, or None: results may come from a file that is elsewhere."""
-    from simnav.scenario import load
-
-    try:
-        scenario = load(identity)
-    except (ValueError, LookupError, OSError):
-        return None
-    return scenario if scenario.id == identity else None
-
-
-def _of_recording(identity: str, seed: int) -> tuple[dict[str, Track], list[tuple[float, float, str]]]:
-    """Fixes and outages of one run, made again; nothing where that is not possible any more."""
-    from leaderboard.charts import fixes, outage_spans
-    from simnav.source import record
-
-    scenario = _catalogued(identity)
-    if scenario is None:
-        return {}, []
-    try:
-        recording = record(scenario, seed)
-    except (ValueError, OSError):
-        return {}, []
-    return fixes(recording), outage_spans(recording)
 
 
 def _summary(label: str) -> str:
@@ -477,21 +427,10 @@ def _summary(label: str) -> str:
         return ""
 
 
-def _seed_to_show(runs: Sequence[Runs], seeds: Sequence[int]) -> int:
-    """The first seed of those that most estimators got through."""
-    return max(seeds, key=lambda s: (sum(r.at(s) is not None for r in runs), -s))
-
-
 def _badge(runs: Runs) -> str:
     from simnav.scoring import badge
 
     return str(badge(np.array(runs.scores("nees_horizontal"))))
-
-
-def _dot(runs: Runs) -> Dot:
-    score = runs.score("horizontal_rmse")
-    note = f"({runs.failed} failed)" if runs.failed else ""
-    return Dot(runs.estimator, score.value, score.low, score.high, runs.scores("horizontal_rmse"), runs.reference, note)
 
 
 def _reason(runs: Runs, status: str) -> str:
@@ -521,120 +460,9 @@ def _cell(f: Interval, factor: float, form: str) -> dict[str, Any]:
     if math.isnan(f.value):
         return {"text": "–", "sort": "", "interval": ""}
     write = {"%": tables.percent, "time": tables.duration}.get(form, tables.number)
-    interval = "" if form == "time" else _between(f.low * factor, f.high * factor, write)
-    return {"text": write(f.value * factor), "sort": _sortable(f.value), "interval": interval}
-
-
-def _between(low: float | None, high: float | None, write: Callable[[Any], str] = tables.number) -> str:
-    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
-        return ""
-    return f"{write(low)} – {write(high)}"
-
-
-def _sortable(value: float | None) -> str:
-    return "" if value is None or math.isnan(value) else repr(float(value))
+    interval = "" if form else between(f.low * factor, f.high * factor)
+    return {"text": write(f.value * factor), "sort": sortable(f.value), "interval": interval}
 
 
 def _number(value: float | None) -> float:
     return math.nan if value is None else float(value)
-
-
-# -- the ranking, as the pages show it ----------------------------------------------------------------
-
-_WIDEST = 50.0  # largest ratio on the scale of the bars
-SCORE_TITLE = "× oracle"
-SCORE_AXIS = "Horizontal RMSE, as a multiple of the oracle's"
-SCORE_CAPTION = (
-    "× oracle: ratio of the horizontal RMSE to the oracle's on the same run; interquartile mean over the runs, "
-    "each scenario counting the same."
-)
-SCORE_LEAD = (
-    "Ranked is the horizontal error as a multiple of that of an oracle, which knows the true noise and every fault."
-)
-
-
-def ranking_rows(ranking: Mapping[str, Any], results: Sequence[Result]) -> list[dict[str, Any]]:
-    """The overall ranking as tables show it: a row an estimator, references last.
-
-    Parameters
-    ----------
-    ranking : mapping
-        From ``Ranking.to_dict``.
-    results : sequence of Result
-    """
-    coverages: dict[str, list[float]] = {}
-    for r in results:
-        coverages.setdefault(r.estimator, []).append(r.scores.get("coverage_95", math.nan))
-    rows: list[dict[str, Any]] = []
-    tier = None
-    for row in ranking["rows"]:
-        coverage = _median(coverages.get(row["estimator"], []))
-        rows.append(
-            {
-                "label": row["estimator"],
-                "reference": row["reference"],
-                "rank": row["rank"],
-                "tier": row["tier"],
-                "starts_tier": bool(rows) and row["tier"] != tier,
-                "value": row["score"],
-                "low": row["low"],
-                "high": row["high"],
-                "score": ratio(row["score"]),
-                "interval": _between(row["low"], row["high"], ratio),
-                "sort": _sortable(row["score"]),
-                "covered": row["covered"],
-                "scenarios": row["scenarios"],
-                "badge": row["badge"],
-                "coverage": tables.percent(coverage),
-                "coverage_sort": _sortable(coverage),
-                "failed": row["failed"],
-                "runs": row["runs"],
-                "cost": tables.duration(row["update_median"]),
-                "cost_sort": _sortable(row["update_median"]),
-                "memory": tables.size(row["peak_memory"] or None),
-                "memory_sort": row["peak_memory"] or "",
-            }
-        )
-        tier = row["tier"]
-    return rows
-
-
-def ratio(value: float | None) -> str:
-    """A ratio to the baseline's error; at the cap it stands for failure."""
-    from leaderboard.ranking import WORST
-
-    return "failed" if value is not None and value >= 0.999 * WORST else tables.number(value)
-
-
-def _median(values: Sequence[float]) -> float:
-    found = sorted(v for v in values if not math.isnan(v))
-    return found[len(found) // 2] if found else math.nan
-
-
-def _add_bars(rows: list[dict[str, Any]]) -> None:
-    """Place of every value and interval on one logarithmic scale, in percent; it ends at `_WIDEST` times the least."""
-    ends = [
-        v for r in rows for v in (r["value"], r["low"], r["high"]) if v is not None and v > 0.0 and math.isfinite(v)
-    ]
-    low = math.log(min(ends, default=1.0))
-    high = min(math.log(max(ends, default=math.e)), low + math.log(_WIDEST))
-    span = max(high - low, 1e-9)
-
-    def place(value: float) -> float:
-        return round(min(2.0 + 96.0 * (math.log(value) - low) / span, 100.0), 2)
-
-    for row in rows:
-        value, a, b = row["value"], row["low"], row["high"]
-        row["bar"] = None
-        if value is None or not value > 0.0 or not math.isfinite(value):
-            continue
-        known = a is not None and b is not None and a > 0.0 and math.isfinite(b)
-        row["bar"] = {
-            "point": place(value),
-            "beyond": math.log(value) > high,
-            "left": place(a) if known else 0.0,
-            "width": round(place(b) - place(a), 2) if known else None,
-            "title": tables.interval(value, a, b),
-            "colour": row["colour"],
-            "dark": row["dark"],
-        }

@@ -101,6 +101,19 @@ def parameters(values: Mapping[str, Any]) -> str:
     return ", ".join(f"{k}={v}" for k, v in values.items())
 
 
+def _fold(heading: str) -> str:
+    """A long heading on two lines.
+
+    >>> _fold("horizontal RMSE [m]").split(chr(10))
+    ['horizontal', 'RMSE [m]']
+    """
+    spaces = [i for i, c in enumerate(heading) if c == " "]
+    if len(heading) < 10 or not spaces:
+        return heading
+    middle = min(spaces, key=lambda i: (abs(i - len(heading) / 2), i))
+    return heading[:middle] + "\n" + heading[middle + 1 :]
+
+
 def table(
     title: str,
     columns: Sequence[str],
@@ -137,8 +150,11 @@ def table(
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
-    for name in columns:
-        result.add_column(Text(name), justify="right" if name in right else "left", no_wrap=name in right)
+    for index, name in enumerate(columns):
+        # Figures and names stay whole; headings are folded instead.
+        result.add_column(
+            Text(_fold(name)), justify="right" if name in right else "left", no_wrap=name in right or index == 0
+        )
     for index, row in enumerate(rows):
         style = "bold" if index in bold else "dim" if index in faint else ""
         result.add_row(*(Text(MISSING if c is None else str(c)) for c in row), style=style)
