@@ -5,6 +5,7 @@ A `Table` has float columns and knows the line of each row in the file, so that 
 
 from __future__ import annotations
 
+import io
 import os
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -148,7 +149,7 @@ def _read_csv(path: Path, _mtime: int, _size: int) -> Table:
 
     first = ""
     blank = 0
-    with open(path, encoding="utf-8", errors="replace") as lines:
+    with open(path, encoding="utf-8-sig", errors="replace") as lines:
         for first in lines:
             if first.strip():
                 break
@@ -157,14 +158,19 @@ def _read_csv(path: Path, _mtime: int, _size: int) -> Table:
     if not first.strip():
         raise LogError(f"{path}: the file is empty")
     delimiter = next((d for d in _DELIMITERS if d in first), ",")
-    cells = [c.strip().strip('"') for c in first.split(delimiter)]
+    blanks = delimiter == " "
+    cells = [c.strip().strip('"') for c in (first.split() if blanks else first.split(delimiter))]
     header = not any(_is_number(c) for c in cells)
     names = cells if header else [str(i) for i in range(1, len(cells) + 1)]
     if len(set(names)) != len(names):
         raise LogError(f"{path}, line {blank + 1}: two columns share a name: {', '.join(names)}")
+    # Columns may be lined up with any number of blanks.
+    text = (
+        io.BytesIO(b"\n".join(b" ".join(line.split()) for line in path.read_bytes().split(b"\n"))) if blanks else path
+    )
     try:
         data = csv.read_csv(
-            path,
+            text,
             read_options=csv.ReadOptions(column_names=names, skip_rows=blank + int(header), use_threads=False),
             parse_options=csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
             convert_options=csv.ConvertOptions(null_values=_MISSING, strings_can_be_null=True),
@@ -197,7 +203,7 @@ def _ragged(path: Path, delimiter: str, width: int) -> str:
     """The sentence for the first row whose number of cells is not that of the first."""
     with open(path, encoding="utf-8", errors="replace") as lines:
         for number, line in enumerate(lines, 1):
-            count = line.rstrip("\r\n").count(delimiter) + 1
+            count = len(line.split()) if delimiter == " " else line.rstrip("\r\n").count(delimiter) + 1
             if line.strip() and count != width:
                 return f"{path}, line {number}: {count} cells where the first line has {width}"
     return ""

@@ -77,6 +77,14 @@ def test_recordings_are_sorted_by_number(tiny):
     assert list_recordings(log(tiny)) == ("1", "10")
 
 
+def test_a_folder_for_each_recording(tiny):
+    for name in ("a", "b"):
+        (tiny.folder / name).mkdir()
+        (tiny.folder / name / "imu.csv").write_text("")
+    tiny.replace("imu{recording}.csv", "{recording}/imu.csv")
+    assert list_recordings(log(tiny)) == ("a", "b")
+
+
 def test_thinning_and_holding_out_share_no_row(tiny):
     spec = log(tiny)
     taken = read_channel(spec, ChannelSpec(file="dvl", columns=(2, 3, 4), every=10), "dvl", "1")

@@ -33,6 +33,19 @@ def test_a_minus_flips_the_sign_unless_it_is_part_of_the_name(tmp_path):
     np.testing.assert_array_equal(table.column("=2.5")[1], [2.5])
 
 
+def test_columns_lined_up_with_blanks(tmp_path):
+    table = read_csv(write(tmp_path / "a.txt", "  time    x\n  0.5   1.0\n 10.5  -2.0  \n"))
+    assert table.names == ("time", "x")
+    np.testing.assert_array_equal(table.column("x")[1], [1.0, -2.0])
+
+
+def test_a_byte_order_mark_and_quotes(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes('\ufeff"time","x"\r\n"1","2"\r\n'.encode())
+    assert read_csv(path).names == ("time", "x")
+    np.testing.assert_array_equal(read_csv(path).column("x")[1], [2.0])
+
+
 def test_missing_cells_are_not_numbers(tmp_path):
     table = read_csv(write(tmp_path / "a.csv", "t,x\n0,\n1,nan\n2,5\n"))
     np.testing.assert_array_equal(table.column("x")[1], [np.nan, np.nan, 5.0])
