@@ -10,8 +10,8 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -53,12 +53,15 @@ class FaultLabel:
         Names of the instruments that it touches.
     start, end : float
         When it is active [s].
+    parameters : mapping
+        What the scenario says of it (sizes, probability, correlation time), as fields of its specification, SI units.
     """
 
     kind: str
     instruments: tuple[str, ...]
     start: float
     end: float
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,7 +354,10 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         Instruments(sheets, imu_sheet, meta["step"]),
         NavigationStates(*get("initial_truth", _STATE_ARRAYS)),
         InitialState(meta["start_time"], *get("start", ("position", "velocity", "attitude", "covariance"))),
-        tuple(FaultLabel(f["kind"], tuple(f["instruments"]), f["start"], f["end"]) for f in meta["faults"]),
+        tuple(
+            FaultLabel(f["kind"], tuple(f["instruments"]), f["start"], f["end"], f.get("parameters", {}))
+            for f in meta["faults"]
+        ),
         data,
         meta["note"],
     )

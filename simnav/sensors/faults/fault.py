@@ -214,7 +214,9 @@ class FaultSpec(Spec):
         """
         names = self.touched(instruments)
         intervals = self.intervals or ((self.start, self.end),)
-        return [FaultLabel(self.kind, names, min(a, duration), min(b, duration)) for a, b in intervals]
+        when = {"kind", "instruments", "start", "end", "intervals", "mean_active", "mean_gap", "name"}
+        parameters = self.model_dump(exclude=when, exclude_none=True)
+        return [FaultLabel(self.kind, names, min(a, duration), min(b, duration), parameters) for a, b in intervals]
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """The fault of one run.
