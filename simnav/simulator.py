@@ -8,18 +8,19 @@ the same numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from simnav.recording import Block, ImuLabels, Recording
 from simnav.scenario import Scenario
 from simnav.sensors.faults import build_layers, labels
-from simnav.spec import SpecError
+from simnav.spec import Spec, SpecError
 from simnav.start import draw_start
-from simnav.types import Array, NavigationStates
+from simnav.types import Array, InitialState, NavigationStates
 from simnav.world import Vessel, World, WorldBlock
 
-__all__ = ["TIME_TOLERANCE", "Simulator", "sample_times", "simulate", "simulate_many"]
+__all__ = ["TIME_TOLERANCE", "Simulator", "ideal", "sample_times", "simulate", "simulate_many"]
 
 #: Times closer than this are one and the same [s].
 TIME_TOLERANCE = 0.5e-6
@@ -214,3 +215,52 @@ def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recordin
             assert first._world is not None
             truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))
         yield _recording(Simulator(scenario, seed, truth=truth))
+
+
+#: What is wrong with an instrument: its specification's fields of these names, and of these with ``fixed_`` before.
+_ERRORS = ("sigma", "bias", "bias_instability", "scale", "misalignment", "deviation", "speed_noise", "random_walk",
+           "rate_random_walk", "quantization")  # fmt: skip
+
+
+def _perfect(spec: Spec) -> Spec:
+    """A copy of an instrument's specification without its errors."""
+    changes: dict[str, object] = {"range": np.inf} if "range" in type(spec).model_fields else {}
+    for name in type(spec).model_fields:
+        value = getattr(spec, name)
+        if isinstance(value, Spec):
+            changes[name] = _perfect(value)
+        elif name.removeprefix("fixed_") in _ERRORS:
+            changes[name] = (0.0,) * len(value) if isinstance(value, tuple) else 0.0
+    return spec.model_copy(update=changes)
+
+
+def ideal(scenario: Scenario, seed: int) -> Recording:
+    """A run as perfect instruments would see it: what bounds and Jacobians at the truth are taken from.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A simulated one.
+    seed : int
+
+    Returns
+    -------
+    Recording
+        Of `simulate(scenario, seed)` the truth, the datasheets, and which measurement was delivered, with its ``sigma``
+        and ``faults``; every value is without error, ``fault_error`` is zero, and the start is the truth, with the
+        covariance of the scenario.
+    """
+    first = Simulator(scenario, seed)
+    assert first._world is not None
+    truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))
+    real = _recording(Simulator(scenario, seed, truth=truth))
+    instruments = {name: _perfect(spec) for name, spec in scenario.instruments.items()}
+    perfect = scenario.model_copy(update={"instruments": instruments, "faults": ()})
+    clean = _recording(Simulator(perfect, seed, truth=truth)).data
+    aids = {}
+    for name, stream in real.data.aids.items():
+        value = clean.aids[name].value[np.searchsorted(clean.aids[name].time, stream.time)]
+        aids[name] = replace(stream, value=value, fault_error=np.zeros_like(stream.fault_error))
+    state, start = real.initial_truth, real.start
+    start = InitialState(start.time, state.position[0], state.velocity[0], state.attitude[0], start.covariance)
+    return replace(real, start=start, data=replace(real.data, imu=clean.imu, imu_labels=None, aids=aids))

@@ -8,10 +8,13 @@ import sys
 import numpy as np
 import pytest
 
+from simnav.earth import displace
 from simnav.recording import Block, Recording
+from simnav.rotation import dcm_from_rpy
 from simnav.scenario import Scenario, load, names
-from simnav.simulator import Simulator, sample_times, simulate, simulate_many
+from simnav.simulator import Simulator, ideal, sample_times, simulate, simulate_many
 from simnav.spec import SpecError
+from simnav.strapdown import integrate
 
 SIMULATED = [n for n in names() if not load(n).recorded]
 
@@ -142,3 +145,28 @@ def test_step_that_does_not_fit_the_imu_is_named():
 def test_bad_seeds_are_named(seed):
     with pytest.raises(ValueError, match="non-negative integer"):
         Simulator(shortened("open-sea", 1.0), seed)
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_ideal_run_is_the_run_without_its_errors(name):
+    scenario = shortened(name, min(load(name).duration, 300.0))
+    real, perfect = simulate(scenario, 3), ideal(scenario, 3)
+    np.testing.assert_array_equal(real.data.truth.position, perfect.data.truth.position)
+    np.testing.assert_array_equal(perfect.start.position, perfect.initial_truth.position[0])
+    np.testing.assert_array_equal(perfect.start.covariance, real.start.covariance)
+    for key, stream in perfect.data.aids.items():
+        delivered = real.data.aids[key]
+        for field in ("time", "faults", "sigma", "dropped"):
+            np.testing.assert_array_equal(getattr(stream, field), getattr(delivered, field))
+        assert not stream.fault_error.any()
+        if stream.kind == "gnss_position":  # the antenna, from the truth at the ends of the steps
+            sheet, truth = perfect.instruments[key], perfect.data.truth
+            at = np.searchsorted(truth.time, stream.time - 1e-6)
+            same = np.abs(truth.time[at] - stream.time) < 1e-6
+            lever = dcm_from_rpy(truth.attitude[at]) @ sheet.lever_arm
+            antenna = displace(truth.position[at], lever)
+            np.testing.assert_allclose(stream.value[same], antenna[same], rtol=0, atol=1e-9)
+    if perfect.data.imu is not None:  # perfect samples integrate to the truth
+        imu, begin, truth = perfect.data.imu, perfect.initial_truth, perfect.data.truth
+        states = integrate(begin.position[0], begin.velocity[0], begin.attitude[0], imu)
+        np.testing.assert_allclose(states.velocity[-1], truth.velocity[-1], atol=1e-6)
