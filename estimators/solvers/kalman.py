@@ -24,8 +24,10 @@ from simnav.compiled import kernel
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
-__all__ = ["KalmanEstimator", "joseph_update"]
+__all__ = ["KalmanEstimator", "Observation", "joseph_update"]
 
+#: Of m components and n states: innovation (m,), P H' (n, m), H P H' (m, m) and noise (m, m).
+Observation = tuple[Array, Array, Array, Array]
 #: A measurement this much older than the state [s] still counts as of its time.
 LATE = 1e-4
 
@@ -141,7 +143,7 @@ class KalmanEstimator(Estimator):
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
-        model, covariance = self.model, self.covariance
+        model = self.model
         model.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
@@ -159,25 +161,40 @@ class KalmanEstimator(Estimator):
             ):
                 self._skipped += 1
                 continue
-            model.propagate(covariance, min(m.time, measurements.time))
+            self._propagate(min(m.time, measurements.time))
             self._used[m.instrument] = m.time
             self._take(m, diagnostics, flagged)
-        model.propagate(covariance, measurements.time)
+        self._propagate(measurements.time)
         diagnostics["skipped"] = float(self._skipped)
         diagnostics.update(self.adaptation.diagnostics())
-        estimate = model.estimate(covariance)
+        estimate = self._estimate()
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Correct the state by one measurement."""
+    def _propagate(self, until: float) -> None:
+        """Advance the state and the covariance; a hook."""
+        self.model.propagate(self.covariance, until)
+
+    def _estimate(self) -> Estimate:
+        """The estimate at the end of a step; a hook."""
+        return self.model.estimate(self.covariance)
+
+    def _observe(self, m: Measurement) -> Observation | None:
+        """What a measurement says of the state; None where nothing usable; a hook."""
         linearised = self.model.measure(m)
         if linearised is None:
-            self._skipped += 1
-            return
+            return None
         residual, jacobian, noise = linearised
         cross = np.dot(self.covariance, jacobian.T)
-        predicted = np.dot(jacobian, cross)
+        return residual, cross, np.dot(jacobian, cross), noise
+
+    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
+        """Correct the state by one measurement."""
+        observation = self._observe(m)
+        if observation is None:
+            self._skipped += 1
+            return
+        residual, cross, predicted, noise = observation
         chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise))
         if chosen is None:
             flagged.append((m.instrument, m.time))
