@@ -21,12 +21,18 @@ class Innovation(NamedTuple):
         H P H', the covariance of the prediction.
     noise : (m, m) array
         R, of the measurement.
+    covariance : (n, n) array or None
+        P, of the model's error before the measurement; to be read, not changed.
+    cross : (n, m) array or None
+        P H'.
     """
 
     measurement: Measurement
     residual: Array
     predicted: Array
     noise: Array
+    covariance: Array | None = None
+    cross: Array | None = None
 
 
 class Adaptation:
@@ -39,7 +45,15 @@ class Adaptation:
                 s = innovation.predicted + innovation.noise
                 nis = innovation.residual @ np.linalg.solve(s, innovation.residual)
                 return innovation.noise if nis < 16.0 else None
+
+    Attributes
+    ----------
+    inflation : float
+        What the solver multiplies P by before it uses the measurement that `adapt` has just seen; for those who
+        doubt the prediction rather than the measurement.
     """
+
+    inflation: float = 1.0
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

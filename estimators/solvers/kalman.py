@@ -18,7 +18,7 @@ from math import sqrt
 import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
-from estimators.models.base import ErrorModel
+from estimators.models.base import ErrorModel, Linearised
 from estimators.models.measurements import plausible
 from simnav.compiled import kernel
 from simnav.estimator import Estimator
@@ -181,12 +181,20 @@ class KalmanEstimator(Estimator):
 
     def _observe(self, m: Measurement) -> Observation | None:
         """What a measurement says of the state; None where nothing usable; a hook."""
-        linearised = self.model.measure(m)
+        linearised = self._linearise(m)
         if linearised is None:
             return None
         residual, jacobian, noise = linearised
         cross = np.dot(self.covariance, jacobian.T)
         return residual, cross, np.dot(jacobian, cross), noise
+
+    def _linearise(self, m: Measurement) -> Linearised | None:
+        """The measurement at the present estimate; a hook."""
+        return self.model.measure(m)
+
+    def _correct(self, dx: Array) -> None:
+        """Correct the state, the covariance being updated already; a hook."""
+        self.model.correct(dx)
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         """Correct the state by one measurement."""
@@ -195,15 +203,19 @@ class KalmanEstimator(Estimator):
             self._skipped += 1
             return
         residual, cross, predicted, noise = observation
-        chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise))
+        chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, self.covariance, cross))
         if chosen is None:
             flagged.append((m.instrument, m.time))
             return
+        inflation = self.adaptation.inflation
+        if inflation != 1.0:
+            for matrix in (self.covariance, cross, predicted):
+                matrix *= inflation
         nis = joseph_update(self.covariance, cross, predicted + chosen, residual, self._correction)
         if nis < 0.0:
             self._skipped += 1
             return
-        self.model.correct(self._correction)
+        self._correct(self._correction)
         diagnostics[f"innovation.{m.instrument}"] = sqrt(float(residual @ residual))
         diagnostics[f"nis.{m.instrument}"] = nis
 
