@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,8 @@ class ErrorModel(ABC):
 
     size: int
     time: float
+    #: Names of the arrays that `correct` changes.
+    state: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
@@ -68,6 +70,19 @@ class ErrorModel(ABC):
     @abstractmethod
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
+
+    def snapshot(self) -> list[Array]:
+        """Copies of what `correct` changes, for `restore`."""
+        return [getattr(self, name).copy() for name in self.state]
+
+    def restore(self, snapshot: list[Array]) -> None:
+        """Take corrections back."""
+        for name, value in zip(self.state, snapshot, strict=True):
+            getattr(self, name)[...] = value
+
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an (n,) error through the last propagation, of ``elapsed`` seconds, in place."""
+        raise NotImplementedError(f"{type(self).__name__} has no transition matrix to carry an error with")
 
     @abstractmethod
     def estimate(self, covariance: Array) -> Estimate:

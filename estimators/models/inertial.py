@@ -33,7 +33,7 @@ import numpy as np
 from estimators.models import measurements
 from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov, triad_bias
 from simnav.compiled import kernel
-from simnav.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
+from simnav.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
 from simnav.estimator import UnsuitableScenario
 from simnav.rotation import cross, dcm_from_rpy, rotation_coefficients
 from simnav.strapdown import mechanize_step
@@ -60,6 +60,8 @@ HELD_VELOCITY, HELD_ATTITUDE = 0.3, 0.03
 LARGEST_RATE, LARGEST_FORCE = 50.0, 500.0
 #: Sigma and correlation time of the current along the keel, for a speed log [m/s], [s].
 CURRENT, CURRENT_TIME = 0.5, 1800.0
+#: Relative growth of gravity from the equator to the poles [-].
+GRAVITY_FLATTENING = 0.0053024
 
 _NAV = 15
 
@@ -98,7 +100,7 @@ def _dynamics(F, position, velocity, c, f0, f1, f2, gyro_decay, accelerometer_de
     # -2 dw_ie x v, with dw_ie = (e2, 0, -e0) a dr_N
     F[3, 0] = -2.0 * e0 * a * v1
     F[4, 0] = 2.0 * (e0 * v0 + e2 * v2) * a
-    F[5, 0] = -2.0 * e2 * a * v1
+    F[5, 0] = -2.0 * e2 * a * v1 + 2.0 * GRAVITY_FLATTENING * EQUATORIAL_GRAVITY * s * cl * a
     F[5, 2] = 2.0 * gravity_scalar(s, position[2]) / SEMI_MAJOR_AXIS
     # -[f x] phi
     F[3, 7], F[3, 8] = f2, -f1
@@ -421,6 +423,8 @@ class InertialModel(ErrorModel):
         Of the last propagation.
     """
 
+    state = ("position", "velocity", "dcm", "bias", "calibration")
+
     def __init__(self, calibrate: bool = True):
         self.calibrate = calibrate
 
@@ -497,10 +501,15 @@ class InertialModel(ErrorModel):
                 extra = sheet.misalignment if sheet.kind == "dvl" else ()
                 self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
             self.noise[sheet.name] = measurements.white_noise(sheet, white, self._rate_variance)
+        self._states += self._more_states()
         self.size = _NAV + len(self._states)
         self.calibration = np.zeros(len(self._states))
         self._decay = np.array([d for _, d, _ in self._states])
         self._density = np.array([q for _, _, q in self._states])
+
+    def _more_states(self) -> list[tuple[float, float, float]]:
+        """A hook: initial variance, decay and noise density of further calibration states."""
+        return []
 
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument."""
@@ -531,6 +540,12 @@ class InertialModel(ErrorModel):
         propagate_covariance(
             covariance, self.transition, self.process_noise, self.calibration, self._decay, self._density, elapsed
         )
+
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an error through the last propagation, in place."""
+        m = len(self.transition)
+        error[:m] = self.transition @ error[:m]
+        error[m:] *= np.exp(-self._decay * elapsed)
 
     @property
     def held(self) -> float:
