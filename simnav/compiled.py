@@ -96,28 +96,32 @@ class Kernel:
     def __reduce__(self) -> str:
         return self.__qualname__  # pickled by name, like a function
 
+    def tree(self) -> list[Kernel]:
+        """This kernel and all that it calls, directly or not."""
+        found: list[Kernel] = []
+        todo: list[Kernel] = [self]
+        while todo:
+            k = todo.pop()
+            if k not in found:
+                found.append(k)
+                todo += [value for _, value in _uses(k.function) if isinstance(value, Kernel)]
+        return found
+
     def fingerprint(self) -> str:
         """Hash of all that decides what this kernel computes (see the module)."""
         import numba
         import numpy as np
 
         text = [str(sys.implementation.cache_tag), numba.__version__, np.__version__]
-        seen: set[int] = set()
-        todo: list[Kernel] = [self]
-        while todo:
-            k = todo.pop()
-            if id(k) in seen:
-                continue
-            seen.add(id(k))
+        text += _code_text(Kernel._jit.__code__)  # how kernels are compiled
+        for k in self.tree():
             fastmath = sorted(k.fastmath) if isinstance(k.fastmath, set) else k.fastmath
             text += [k.__module__, k.__qualname__, f"{k.signature!r} {fastmath!r}"]
             # The code in memory is hashed, not the file: a file may be edited after it was imported.
             text += _code_text(k.function.__code__)
             text.append(repr(k.function.__defaults__))
             for name, value in _uses(k.function):
-                if isinstance(value, Kernel):
-                    todo.append(value)
-                else:
+                if not isinstance(value, Kernel):
                     text += [name, *_value_text(value)]
         return hashlib.blake2b("\0".join(text).encode(errors="replace"), digest_size=8).hexdigest()
 

@@ -90,7 +90,7 @@ def _compile_beside(missing: list[Kernel], processes: int) -> Iterator[str]:
     if processes < 2 or "fork" not in multiprocessing.get_all_start_methods():
         return
     context = multiprocessing.get_context("fork")
-    _todo[:] = missing
+    _todo[:] = sorted(missing, key=_size, reverse=True)  # the longest first, lest it be alone at the end
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads
@@ -104,6 +104,11 @@ def _compile_beside(missing: list[Kernel], processes: int) -> Iterator[str]:
 
 
 _todo: list[Kernel] = []
+
+
+def _size(kernel: Kernel) -> int:
+    """About how long it takes to compile: the code of a kernel and of all that it calls."""
+    return sum(len(k.function.__code__.co_code) for k in kernel.tree())
 
 
 def _compile(index: int) -> str:
