@@ -17,6 +17,7 @@ import re
 import signal
 import sys
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -453,9 +454,13 @@ def _prepare_worker(parent: int) -> None:
     if os.getpid() != parent:
         with contextlib.suppress(ValueError):  # not in the main thread of a Dask worker
             signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from simnav.estimator import names
     from simnav.warmup import warmup
 
-    warmup(load=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a broken plug-in the parent has warned
+        warmup(load=True)
+        names()
 
 
 def _run_unit(index: int, unit: _Unit) -> tuple[int, Counter[str]]:
