@@ -1,0 +1,395 @@
+"""Kernels of the inertial model: strapdown propagation, transition matrix, process noise and covariance.
+
+`advance_inertial` carries the state from one measurement to the next at IMU rate and sums it up in blocks of at most
+`BLOCK` seconds; `accumulate_error` makes the transition matrix and the process noise of these blocks, so that the
+covariance is touched once a measurement (`propagate_covariance`). The equations are those of
+`estimators.models.inertial`.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, sin
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
+from simnav.rotation import cross, rotation_coefficients
+from simnav.strapdown import mechanize_step
+
+__all__ = [
+    "BLOCK",
+    "BLOCK_COLUMNS",
+    "HELD_ATTITUDE",
+    "HELD_VELOCITY",
+    "TURN_TIME",
+    "accumulate_error",
+    "advance_inertial",
+    "correct_inertial",
+    "propagate_covariance",
+]
+
+#: Longest block over which attitude and specific force count as constant in the transition matrix [s].
+BLOCK = 0.2
+#: Time over which the turn rate is averaged, and for which a scale-factor error is taken to last in a turn [s].
+TURN_TIME = 60.0
+#: What a step without IMU data adds: velocity [m/s/sqrt(s)] and attitude [rad/sqrt(s)] random walk.
+HELD_VELOCITY, HELD_ATTITUDE = 0.3, 0.03
+#: Samples beyond these are no measurements of a marine vehicle [rad/s], [m/s^2].
+LARGEST_RATE, LARGEST_FORCE = 50.0, 500.0
+#: Relative growth of gravity from the equator to the poles [-].
+GRAVITY_FLATTENING = 0.0053024
+
+#: Columns of a block: duration, time held; latitude, height; velocity; mean DCM; mean specific force, north-east-down;
+#: averaged body rate.
+BLOCK_COLUMNS = 22
+
+
+@kernel()
+def _usable(w0, w1, w2, f0, f1, f2):  # type: ignore[no-untyped-def]
+    rate = abs(w0) + abs(w1) + abs(w2)
+    force = abs(f0) + abs(f1) + abs(f2)
+    return rate < LARGEST_RATE and force < LARGEST_FORCE  # false for NaN
+
+
+@kernel()
+def _dynamics(F, block, gyro_decay, accelerometer_decay):  # type: ignore[no-untyped-def]
+    """The matrix F of the error over one block."""
+    height = block[3]
+    s, cl = sin(block[2]), cos(block[2])
+    meridian, prime = radii_scalar(s)
+    a, b = 1.0 / (meridian + height), 1.0 / (prime + height)
+    t = s / cl
+    v0, v1, v2 = block[4], block[5], block[6]
+    f0, f1, f2 = block[16], block[17], block[18]
+    e0, e2 = ROTATION_RATE * cl, -ROTATION_RATE * s
+    k0, k1, k2 = v1 * b, -v0 * a, -v1 * b * t
+    F[0, 0], F[0, 2], F[0, 3] = -v2 * a, v0 * a, 1.0
+    F[1, 0], F[1, 1], F[1, 2], F[1, 4] = v1 * t * a, -v2 * b - v0 * t * a, v1 * b, 1.0
+    F[2, 5] = 1.0
+    # -(2 w_ie + w_en) x dv
+    x0, x1, x2 = 2.0 * e0 + k0, k1, 2.0 * e2 + k2
+    F[3, 3], F[3, 4], F[3, 5] = 0.0, x2, -x1
+    F[4, 3], F[4, 4], F[4, 5] = -x2, 0.0, x0
+    F[5, 3], F[5, 4], F[5, 5] = x1, -x0, 0.0
+    # -dw_en x v, with dw_en = (dv_E b, -dv_N a, -dv_E b t): w x v = (w1 v2 - w2 v1, w2 v0 - w0 v2, w0 v1 - w1 v0)
+    F[3, 3] += a * v2
+    F[3, 4] += -b * t * v1
+    F[4, 4] += b * t * v0 + b * v2
+    F[5, 3] += -a * v0
+    F[5, 4] += -b * v1
+    # -2 dw_ie x v, with dw_ie = (e2, 0, -e0) a dr_N
+    F[3, 0] = -2.0 * e0 * a * v1
+    F[4, 0] = 2.0 * (e0 * v0 + e2 * v2) * a
+    F[5, 0] = -2.0 * e2 * a * v1 + 2.0 * GRAVITY_FLATTENING * EQUATORIAL_GRAVITY * s * cl * a
+    F[5, 2] = 2.0 * gravity_scalar(s, height) / SEMI_MAJOR_AXIS
+    # -[f x] phi
+    F[3, 7], F[3, 8] = f2, -f1
+    F[4, 6], F[4, 8] = -f2, f0
+    F[5, 6], F[5, 7] = f1, -f0
+    # -w_in x phi - dw_ie - dw_en
+    w0, w1, w2 = e0 + k0, k1, e2 + k2
+    F[6, 7], F[6, 8] = w2, -w1
+    F[7, 6], F[7, 8] = -w2, w0
+    F[8, 6], F[8, 7] = w1, -w0
+    F[6, 0], F[8, 0] = -e2 * a, e0 * a
+    F[6, 4], F[7, 3], F[8, 4] = -b, a, b * t
+    for i in range(3):
+        for j in range(3):
+            F[3 + i, 12 + j] = -block[7 + 3 * i + j]
+            F[6 + i, 9 + j] = -block[7 + 3 * i + j]
+        F[9 + i, 9 + i] = -gyro_decay
+        F[12 + i, 12 + i] = -accelerometer_decay
+
+
+@kernel()
+def _advance_rows(F, dt, M, first, A, B):  # type: ignore[no-untyped-def]
+    """``M = (I + F dt + F F dt^2 / 2) M`` from a column on, with work space A, B; F is sparse."""
+    n = M.shape[1]
+    for i in range(15):
+        for j in range(first, n):
+            A[i, j] = 0.0
+        for k in range(15):
+            x = F[i, k] * dt
+            if x != 0.0:
+                for j in range(first, n):
+                    A[i, j] += x * M[k, j]
+    for i in range(15):
+        for j in range(first, n):
+            B[i, j] = A[i, j]
+        for k in range(15):
+            x = 0.5 * F[i, k] * dt
+            if x != 0.0:
+                for j in range(first, n):
+                    B[i, j] += x * A[k, j]
+    for i in range(15):
+        for j in range(first, n):
+            M[i, j] += B[i, j]
+
+
+@kernel()
+def _add_noise(M, block, noise):  # type: ignore[no-untyped-def]
+    """Add half the noise of a block, to the columns from 15 on: white, biases, turns, a time without data."""
+    dt, held = 0.5 * block[0], 0.5 * block[1]
+    scale, misalignment = noise[6], noise[7]
+    t0, t1, t2 = block[19] * block[19], block[20] * block[20], block[21] * block[21]
+    g0 = (noise[0] + scale * t0 + misalignment * (t1 + t2)) * dt
+    g1 = (noise[0] + scale * t1 + misalignment * (t0 + t2)) * dt
+    g2 = (noise[0] + scale * t2 + misalignment * (t0 + t1)) * dt
+    for i in range(3):
+        c0, c1, c2 = block[7 + 3 * i] * g0, block[8 + 3 * i] * g1, block[9 + 3 * i] * g2
+        for j in range(3):
+            M[6 + i, 21 + j] += c0 * block[7 + 3 * j] + c1 * block[8 + 3 * j] + c2 * block[9 + 3 * j]
+        M[3 + i, 18 + i] += noise[1] * dt + HELD_VELOCITY * HELD_VELOCITY * held
+        M[6 + i, 21 + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
+        M[9 + i, 24 + i] += noise[3] * dt
+        M[12 + i, 27 + i] += noise[5] * dt
+
+
+@kernel("void(f8[:, ::1], i8, f8[::1], f8[:, ::1], f8[:, ::1])")
+def accumulate_error(blocks, count, noise, transition, process_noise):  # type: ignore[no-untyped-def]
+    """Transition matrix and process noise of the error over successive blocks.
+
+    Parameters
+    ----------
+    blocks : (k, 22) array
+        As `advance_inertial` fills them.
+    count : int
+        How many of them.
+    noise : (9,) array
+        Gyroscope and accelerometer white noise density; decay and noise density of the gyroscopes' bias, of the
+        accelerometers'; ``scale^2 TURN_TIME`` and ``misalignment^2 TURN_TIME`` of the gyroscopes; nominal interval.
+        (Order: 0, 1 white; 2, 3 gyroscope bias; 4, 5 accelerometer bias; 6, 7; 8.)
+    transition, process_noise : (15, 15) arrays
+        Overwritten: the error at the end is ``transition`` times the error at the start, plus noise.
+    """
+    F, M, A, B = np.zeros((15, 15)), np.zeros((15, 30)), np.empty((15, 30)), np.empty((15, 30))
+    for i in range(15):
+        M[i, i] = 1.0
+    for k in range(count):
+        block = blocks[k]
+        _dynamics(F, block, noise[2], noise[4])
+        # Half the noise enters before the block and half after: second order in its length.
+        _add_noise(M, block, noise)
+        for half in range(2):
+            if half == 1:  # (Phi Q)' to the left of which Phi makes Phi Q Phi'
+                for i in range(15):
+                    for j in range(i):
+                        M[i, 15 + j], M[j, 15 + i] = M[j, 15 + i], M[i, 15 + j]
+            _advance_rows(F, block[0], M, 15 * half, A, B)
+        for i in range(15):
+            for j in range(i):
+                M[j, 15 + i] = M[i, 15 + j]
+        _add_noise(M, block, noise)
+    for i in range(15):
+        for j in range(15):
+            transition[i, j] = M[i, j]
+            process_noise[i, j] = M[i, 15 + j]
+
+
+@kernel(
+    "UniTuple(i8, 2)(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], "
+    "f8[:, ::1], i8, f8, f8[::1], f8[:, ::1])"
+)
+def advance_inertial(  # type: ignore[no-untyped-def]
+    position, velocity, dcm, memory, bias, turn, clock,
+    time, interval, rate, force, first, until, noise, blocks,
+):  # fmt: skip
+    """Advance an inertial state to a time that need not be a sample's, in place.
+
+    A sample that spans ``until`` is used in part, the rest by the next call. Where samples are missing or absurd the
+    state is held at its velocity and attitude.
+
+    Parameters
+    ----------
+    position, velocity : (3,) arrays
+    dcm : (3, 3) array
+    memory : (6,) array
+        Increments of the last whole sample.
+    bias : (6,) array
+        Gyroscope and accelerometer bias; it decays.
+    turn : (3,) array
+        Averaged body rate [rad/s].
+    clock : (9,) array
+        Time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force.
+    time, interval : (k,) arrays
+    rate, force : (k, 3) arrays
+        The samples at hand.
+    first : int
+        Index of the first that is not used up.
+    until : float
+    noise : (9,) array
+        As in `accumulate_error`.
+    blocks : (m, 22) array
+        Filled; m must suffice.
+
+    Returns
+    -------
+    int, int
+        Index of the first sample that is not used up, and number of blocks.
+    """
+    eps = 1e-7
+    before = np.empty(9)
+    keep = np.empty(6)
+    t, i, n, count = clock[0], first, time.size, 0
+    nominal = noise[8]
+    while t < until - eps:
+        block = blocks[count]
+        count += 1
+        begin, end = t, min(until, t + BLOCK)
+        v0, v1, v2 = velocity[0], velocity[1], velocity[2]
+        for r in range(9):
+            before[r] = dcm[r // 3, r % 3]
+            block[7 + r] = 0.0
+        held, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
+        while t < end - eps:
+            while i < n and (
+                time[i] <= t + eps
+                or not _usable(rate[i, 0], rate[i, 1], rate[i, 2], force[i, 0], force[i, 1], force[i, 2])
+            ):
+                i += 1
+            hold, whole, stop = False, 0.0, end
+            if i < n and time[i] - interval[i] <= t + 0.5 * nominal:
+                stop = min(time[i], end)
+                for r in range(3):
+                    clock[3 + r], clock[6 + r] = rate[i, r], force[i, r]
+                clock[1] = stop
+                if stop >= time[i] - eps:
+                    whole = interval[i]
+            elif i < n:
+                stop, hold = min(time[i] - interval[i], end), True
+            elif t < clock[1] + 1.5 * nominal:
+                stop = min(clock[1] + 2.0 * nominal, end)  # the step ends between samples: carry the last one on
+            else:
+                hold = True
+            dt = stop - t
+            if hold:
+                meridian, prime = radii_scalar(sin(position[0]))
+                position[0] += dt * velocity[0] / (meridian + position[2])
+                position[1] += dt * velocity[1] / ((prime + position[2]) * cos(position[0]))
+                position[2] -= dt * velocity[2]
+                memory[:] = 0.0
+                held += dt
+            else:
+                w0, w1, w2 = clock[3] - bias[0], clock[4] - bias[1], clock[5] - bias[2]
+                f0, f1, f2 = clock[6] - bias[3], clock[7] - bias[4], clock[8] - bias[5]
+                keep[:] = memory
+                mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt)
+                if whole > 0.0:
+                    memory[0], memory[1], memory[2] = w0 * whole, w1 * whole, w2 * whole
+                    memory[3], memory[4], memory[5] = f0 * whole, f1 * whole, f2 * whole
+                else:
+                    memory[:] = keep
+                s0, s1, s2 = s0 + w0 * dt, s1 + w1 * dt, s2 + w2 * dt
+            for r in range(9):
+                block[7 + r] += dcm[r // 3, r % 3] * dt
+            t = stop
+        length = end - begin
+        # The sum took the attitude at the ends of the samples; their middles are half a sample earlier.
+        shift = 0.5 * min(nominal, length)
+        for r in range(9):
+            block[7 + r] = (block[7 + r] - shift * (dcm[r // 3, r % 3] - before[r])) / length
+        # Mean specific force from the change of velocity: f = v' + (2 w_ie + w_en) x v - g
+        sl, cl = sin(position[0]), cos(position[0])
+        meridian, prime = radii_scalar(sl)
+        m0, m1, m2 = 0.5 * (v0 + velocity[0]), 0.5 * (v1 + velocity[1]), 0.5 * (v2 + velocity[2])
+        east = m1 / (prime + position[2])
+        x0, x1 = 2.0 * ROTATION_RATE * cl + east, -m0 / (meridian + position[2])
+        x2 = -2.0 * ROTATION_RATE * sl - east * sl / cl
+        block[16] = (velocity[0] - v0) / length + x1 * m2 - x2 * m1
+        block[17] = (velocity[1] - v1) / length + x2 * m0 - x0 * m2
+        block[18] = (velocity[2] - v2) / length + x0 * m1 - x1 * m0 - gravity_scalar(sl, position[2])
+        weight = min(1.0, length / TURN_TIME)
+        turn[0] += weight * (s0 / length - turn[0])
+        turn[1] += weight * (s1 / length - turn[1])
+        turn[2] += weight * (s2 / length - turn[2])
+        block[0], block[1], block[2], block[3] = length, held, position[0], position[2]
+        block[4], block[5], block[6] = m0, m1, m2
+        block[19], block[20], block[21] = turn[0], turn[1], turn[2]
+        clock[2] += held
+        decay_g, decay_a = exp(-noise[2] * length), exp(-noise[4] * length)
+        for r in range(3):
+            bias[r] *= decay_g
+            bias[3 + r] *= decay_a
+    clock[0] = until
+    return i, count
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
+def propagate_covariance(covariance, transition, process_noise, calibration, rate, density, elapsed):  # type:
+    """``P = Phi P Phi' + Q`` in place, where the states from the m-th on are Gauss-Markov biases of their own.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+    transition, process_noise : (m, m) arrays
+        Of the first m states.
+    calibration : (n - m,) array
+        Values of the others; they decay.
+    rate, density : (n - m,) arrays
+        Inverse of their correlation times [1/s], and their noise densities.
+    elapsed : float
+        [s]. The discretisation is exact, so that a stationary state stays stationary in a step of any length.
+    """
+    n, m = covariance.shape[0], transition.shape[0]
+    X = np.zeros((m, n))
+    decay, noise = np.empty(n - m), np.empty(n - m)
+    for i in range(n - m):
+        decay[i] = exp(-rate[i] * elapsed)
+        calibration[i] *= decay[i]
+        noise[i] = density[i] * elapsed
+        if rate[i] > 0.0:
+            noise[i] = density[i] * (1.0 - decay[i] * decay[i]) / (2.0 * rate[i])
+    for i in range(m):
+        for k in range(m):
+            x = transition[i, k]
+            if x != 0.0:
+                for j in range(n):
+                    X[i, j] += x * covariance[k, j]
+    T = np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            T[i, j] = transition[j, i]
+    Y = np.zeros((m, m))
+    for i in range(m):
+        for k in range(m):
+            x = X[i, k]
+            for j in range(m):
+                Y[i, j] += x * T[k, j]
+    for i in range(m):
+        for j in range(i + 1):
+            x = 0.5 * (Y[i, j] + Y[j, i]) + process_noise[i, j]
+            covariance[i, j] = x
+            covariance[j, i] = x
+        for j in range(m, n):
+            x = X[i, j] * decay[j - m]
+            covariance[i, j] = x
+            covariance[j, i] = x
+    for i in range(m, n):
+        for j in range(m, n):
+            covariance[i, j] *= decay[i - m] * decay[j - m]
+        covariance[i, i] += noise[i - m]
+
+
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def correct_inertial(position, velocity, dcm, bias, calibration, dx):  # type: ignore[no-untyped-def]
+    """Add the correction ``dx`` to a state, in place; the attitude is turned by ``exp(dx[6:9] x)`` from the left."""
+    meridian, prime = radii_scalar(sin(position[0]))
+    position[1] += dx[1] / ((prime + position[2]) * cos(position[0]))
+    position[0] += dx[0] / (meridian + position[2])
+    position[2] -= dx[2]
+    r0, r1, r2 = dx[6], dx[7], dx[8]
+    a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
+    for j in range(3):
+        c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
+        x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
+        y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
+        dcm[0, j] = c0 + a * x0 + b * y0
+        dcm[1, j] = c1 + a * x1 + b * y1
+        dcm[2, j] = c2 + a * x2 + b * y2
+    for j in range(3):
+        velocity[j] += dx[3 + j]
+    for j in range(6):
+        bias[j] += dx[9 + j]
+    for j in range(calibration.size):
+        calibration[j] += dx[15 + j]
