@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
 from estimators.adaptations.truth import TrueNoise, imu_faults
+from estimators.models.fault_states import FaultStateModel
 from estimators.models.inertial import InertialModel
 from estimators.models.ship import ShipModel
 from estimators.solvers.kalman import KalmanEstimator
@@ -21,22 +23,25 @@ __all__ = ["Oracle"]
 class Oracle(KalmanEstimator):
     """EKF that knows each measurement's true noise and faults; what any real-time estimator is measured against.
 
-    The inertial model where there is an IMU, the ship model where there is none. Measurements that a fault spoilt are
-    left out (`estimators.adaptations.truth`); a disturbance of the IMU is taken off its samples. On a run without
-    faults it is ``ekf`` or ``ship-ekf``. It is not ranked.
+    The inertial model where there is an IMU, the ship model where there is none. Of the faults it knows the flags and
+    the statistics, not what they added (`estimators.adaptations.truth`): gross errors are left out, errors that last,
+    like multipath, are states (`estimators.models.fault_states`); but a disturbance of the IMU is taken off its
+    samples. On a run without faults it is ``ekf`` or ``ship-ekf``. It is not ranked. (Oracle O1.)
     """
 
     reference = True
+    #: What it is told of the noise.
+    knowledge: ClassVar[type[TrueNoise]] = TrueNoise
 
     def __init__(self) -> None:
-        self._truth = TrueNoise()
+        self.truth = self.knowledge()
         self._imu_faults: tuple[Array, Array] | None = None
         self._revealed = False
-        super().__init__(InertialModel(), self._truth)
+        super().__init__(InertialModel(), self.truth)
 
     def reveal(self, recording: Recording) -> None:
         """Take the labels."""
-        self._truth.reveal(recording)
+        self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
         self._revealed = True
 
@@ -46,7 +51,7 @@ class Oracle(KalmanEstimator):
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
-        self.model = InertialModel() if instruments.imu is not None else ShipModel()
+        self.model = FaultStateModel(self.truth.states()) if instruments.imu is not None else ShipModel()
         super().reset(start, instruments)
 
     def update(self, measurements: Measurements) -> Estimate:

@@ -1,55 +1,288 @@
-"""The oracle's adaptation: the noise and the faults that a measurement really had."""
+"""The oracles' adaptations: what each of them is told of the noise and the faults of a measurement.
+
+A fault is known by its statistics, not by the value that it took. Of those that act on a measurement
+
+- a noise step changes the sigma, which is known;
+- multipath, a bias step and a ramp last: they are states (`estimators.models.fault_states`), since taking an error that
+  is correlated in time for noise makes a filter believe it more with every epoch; a model without states for them
+  counts multipath as white noise of the same density at low frequency, and leaves the others out;
+- a gross error is noise of the second moment of its distribution, and left out where that is more than `LIMIT` sigma;
+- a frozen or false value says nothing, and is left out.
+
+Where a recording does not say how large its faults are, what was really added stands for it.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+from math import exp
+from typing import Any
 
 import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
-from simnav.recording import AidStream, Recording
-from simnav.types import Array, Instruments
+from estimators.models.fault_states import FaultState
+from simnav.recording import AidStream, FaultLabel, Recording
+from simnav.sensors.faults import quantity_of
+from simnav.sensors.values import add_error
+from simnav.types import Array, Instruments, Measurement
 
-__all__ = ["TrueNoise", "imu_faults"]
+__all__ = ["FisherNoise", "MixtureNoise", "NominalNoise", "TrueNoise", "fisher_information", "imu_faults"]
 
-#: A fault that added more than this many sigma to a component is worth no weight at all.
+#: A fault of more than this many sigma makes a component worth no weight at all.
 LIMIT = 3.0
+#: A gross error is one, to those that have to guess, above this probability.
+CERTAIN = 0.95
+#: Size of each kind of fault that lasts: the stem of its parameter.
+LASTING = {"multipath": "sigma", "bias_step": "offset", "ramp": "slope"}
 
 
 class TrueNoise(Adaptation):
-    """Takes the true sigma of each measurement, and leaves out or de-weights what a fault touched.
-
-    A measurement is left out where a fault added more than `LIMIT` true sigmas to a component; otherwise the square of
-    what it added is added to its noise. (Oracle O1: knows noise and flags, not the realised white noise.)
-    """
+    """The true sigma of each measurement, and the faults that touch it: the oracle O1."""
 
     def __init__(self) -> None:
+        self.faults: tuple[FaultLabel, ...] = ()
         self._streams: dict[str, tuple[AidStream, Array]] = {}
-        self._quiet: set[int] = set()
+        self._states: dict[str, int] = {}
 
     def reveal(self, recording: Recording) -> None:
         """Take the labels of a recording."""
         self._streams = {n: (s, np.asarray(s.time)) for n, s in recording.data.aids.items()}
-        # A noise step changes the sigma, which is known: it is no fault to be left out.
-        self._quiet = {j for j, f in enumerate(recording.faults) if f.kind == "noise_step"}
+        self.faults = recording.faults
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         self._sheets = instruments
+        self._variances: dict[tuple[int, str], Array | None] = {}
+
+    def states(self) -> list[FaultState]:
+        """The faults that last as states, for the model; they then count no longer as noise."""
+        self._states = dict.fromkeys(self._streams, 0)
+        found: dict[tuple[Any, ...], tuple[FaultState, int]] = {}
+        for j, fault in enumerate(self.faults):
+            for name in fault.instruments:
+                if fault.kind not in LASTING or name not in self._streams:
+                    continue
+                size = _size(fault, LASTING[fault.kind], self._streams[name][0])
+                if size is None or (fault.kind == "ramp" and "mean_active" in fault.parameters):
+                    continue
+                # The intervals of one fault are one process; a ramp begins anew in each.
+                key = (name, fault.kind, repr(fault.parameters), fault.start if fault.kind == "ramp" else 0.0)
+                mask = 1 << j | (found[key][1] if key in found else 0)
+                factor: Callable[[float], float] = partial(
+                    self._factor, name, mask, fault.start if fault.kind == "ramp" else None
+                )
+                time = float(fault.parameters.get("correlation_time", np.inf))
+                found[key] = FaultState(name, np.abs(size), time, factor), mask
+                self._states[name] |= mask
+        return [state for state, _ in found.values()]
+
+    def _factor(self, instrument: str, mask: int, start: float | None, time: float) -> float:
+        stream, k = self._label(instrument, time)
+        if not int(stream.faults[k]) & mask:
+            return 0.0
+        return 1.0 if start is None else max(time - start, 0.0)
+
+    def _label(self, instrument: str, time: float) -> tuple[AidStream, int]:
+        """The stream of an instrument, and the index of its measurement of a time."""
+        stream, times = self._streams[instrument]
+        return stream, min(int(np.searchsorted(times, time - 1e-9)), len(times) - 1)
+
+    def _white(self, innovation: Innovation) -> tuple[Array, list[int], AidStream, int]:
+        """Noise with the true sigma; the faults that are neither noise steps nor states; the label."""
+        m = innovation.measurement
+        stream, k = self._label(m.instrument, m.time)
+        d = len(innovation.residual)
+        noise = innovation.noise + np.diag(stream.sigma[k, :d] ** 2 - self._sheets[m.instrument].sigma[:d] ** 2)
+        bits = int(stream.faults[k]) & ~self._states.get(m.instrument, 0)
+        faults = [j for j, f in enumerate(self.faults) if bits >> j & 1 and f.kind != "noise_step"] if bits else []
+        return noise, faults, stream, k
+
+    def _variance(self, j: int, stream: AidStream, k: int, d: int) -> Array | None:
+        """What fault j adds to the noise of a measurement; None where it makes it worthless."""
+        fault, key = self.faults[j], (j, stream.name)
+        if key not in self._variances:
+            variance = None
+            if fault.kind == "gross_error" and fault.parameters:
+                variance = _second_moment(fault, stream)
+            elif fault.kind == "multipath" and fault.parameters:
+                a = exp(-1.0 / (self._sheets[stream.name].rate * fault.parameters["correlation_time"]))
+                size = _size(fault, "sigma", stream)
+                variance = None if size is None else size**2 * (1.0 + a) / (1.0 - a)
+            self._variances[key] = variance
+        if not fault.parameters and fault.kind not in ("frozen", "false_zero"):
+            return np.asarray(stream.fault_error[k, :d] ** 2)
+        variance = self._variances[key]
+        return None if variance is None else variance[:d]
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """The true noise, or None."""
-        m = innovation.measurement
-        stream, times = self._streams[m.instrument]
-        k = min(int(np.searchsorted(times, m.time - 1e-9)), len(times) - 1)
-        d = len(innovation.residual)
-        sigma = stream.sigma[k, :d]
-        noise = innovation.noise + np.diag(sigma**2 - self._sheets[m.instrument].sigma[:d] ** 2)
-        bits = int(stream.faults[k])
-        if bits & ~sum(1 << j for j in self._quiet):
-            added = stream.fault_error[k, :d]
-            if np.any(np.abs(added) > LIMIT * np.maximum(sigma, 1e-12)):
+        noise, faults, stream, k = self._white(innovation)
+        d = len(noise)
+        for j in faults:
+            variance = self._variance(j, stream, k, d)
+            if variance is None or np.all(variance > LIMIT**2 * np.maximum(np.diag(noise), 1e-24)):
                 return None
-            noise = noise + np.diag(added**2)
+            noise = noise + np.diag(variance)
         return noise
+
+
+class NominalNoise(TrueNoise):
+    """The sigma that each measurement would have had without faults: the oracle O0, from whose data they are taken."""
+
+    def states(self) -> list[FaultState]:
+        """None: nothing is left of the faults."""
+        return []
+
+    def restore(self, measurement: Measurement) -> Measurement:
+        """A measurement without what the faults added to it."""
+        stream, k = self._label(measurement.instrument, measurement.time)
+        if not stream.faults[k]:
+            return measurement
+        value = add_error(stream.kind, measurement.value[None], -stream.fault_error[k : k + 1])[0]
+        return measurement._replace(value=value)
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """The noise without faults."""
+        m = innovation.measurement
+        stream, k = self._label(m.instrument, m.time)
+        steps = sum(1 << j for j, f in enumerate(self.faults) if f.kind == "noise_step")
+        return innovation.noise if int(stream.faults[k]) & steps else self._white(innovation)[0]
+
+
+class MixtureNoise(TrueNoise):
+    """Knows how often gross errors come and how large they are, not which measurements they hit: the oracle O3.
+
+    Each measurement may have been hit by any of the gross errors that are about at its time. Weighed by Bayes' rule,
+    with the innovation, the hypotheses give the noise ``R^-1 = sum w_j R_j^-1``, the information that is expected.
+    What is decided by the schedule of a scenario (noise steps, multipath, frozen values, ...) it knows like O1.
+
+    Source: C. J. Masreliez, "Approximate non-Gaussian filtering with linear state and observation relations", IEEE
+    Trans. Automatic Control 20(1), 1975, for the weights; the collapse into one noise is ours.
+    """
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """The expected noise; None where a gross error is almost certain and leaves nothing."""
+        mixture = self.mixture(innovation)
+        if mixture is None or len(mixture) == 1:
+            return None if mixture is None else mixture[0][1]
+        logs, r = [], innovation.residual
+        for probability, noise in mixture:
+            s = innovation.predicted + noise
+            logs.append(np.log(probability) - 0.5 * (np.linalg.slogdet(s)[1] + r @ np.linalg.solve(s, r)))
+        weights = np.exp(np.array(logs) - max(logs))
+        weights /= weights.sum()
+        if weights[0] < 1.0 - CERTAIN and np.all(
+            np.diag(mixture[1][1] - mixture[0][1]) > LIMIT**2 * np.diag(mixture[0][1])
+        ):
+            return None
+        information = sum(w * np.linalg.inv(noise) for w, (_, noise) in zip(weights, mixture, strict=True))
+        return np.asarray(np.linalg.inv(information))
+
+    def mixture(self, innovation: Innovation) -> list[tuple[float, Array]] | None:
+        """Probability and noise of each hypothesis, "no gross error" first; None where the measurement is worthless."""
+        noise, faults, stream, k = self._white(innovation)
+        d = len(noise)
+        for j in faults:
+            if self.faults[j].kind != "gross_error" or not self.faults[j].parameters:
+                variance = self._variance(j, stream, k, d)
+                if variance is None:
+                    return None
+                noise = noise + np.diag(variance)
+        t = innovation.measurement.time
+        about = [
+            (float(f.parameters["probability"]), self._variance(j, stream, k, d))
+            for j, f in enumerate(self.faults)
+            if f.kind == "gross_error" and f.parameters and stream.name in f.instruments
+            if f.start - 1e-6 <= t < f.end - 1e-6
+        ]
+        about = [(p, v) for p, v in about if p > 0.0 and v is not None]
+        hypotheses = []
+        for hits in product((False, True), repeat=len(about)):
+            probability, spread = 1.0, noise
+            for hit, (p, v) in zip(hits, about, strict=True):
+                probability *= p if hit else 1.0 - p
+                if hit:
+                    spread = spread + np.diag(v)  # type: ignore[arg-type]
+            if probability > 0.0:
+                hypotheses.append((probability, spread))
+        return hypotheses
+
+
+class FisherNoise(MixtureNoise):
+    """Noise of the Fisher information of each measurement's density: the bound of those who do not know the hits."""
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._known: dict[bytes, Array] = {}
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """The inverse of the information; None where there is none."""
+        mixture = self.mixture(innovation)
+        if mixture is None or len(mixture) == 1:
+            return None if mixture is None else mixture[0][1]
+        variances = np.array([np.diag(noise) for _, noise in mixture])
+        key = np.round(variances, 12).tobytes()
+        if key not in self._known:
+            self._known[key] = fisher_information(np.array([p for p, _ in mixture]), variances)
+        gain = 1.0 / np.sqrt(self._known[key] * variances[0])  # sigma of the noise over that without gross errors
+        return np.asarray(mixture[0][1] * np.outer(gain, gain))
+
+
+def fisher_information(probability: Array, variance: Array, nodes: int = 24) -> Array:
+    """Diagonal of the Fisher information of location of a mixture of zero-mean normal densities.
+
+    ``J_ii = integral of (d p / d x_i)^2 / p``; the rest is zero by symmetry. Components of one hypothesis are
+    independent, but share the hit.
+
+    Parameters
+    ----------
+    probability : (c,) array
+    variance : (c, d) array
+        Of each component under each hypothesis.
+    nodes : int
+        Of the Gauss-Hermite quadrature, in each component.
+
+    Returns
+    -------
+    (d,) array
+
+    Examples
+    --------
+    >>> fisher_information(np.array([1.0]), np.array([[4.0]])).round(6)
+    array([0.25])
+    """
+    x, w = np.polynomial.hermite_e.hermegauss(nodes)
+    d = variance.shape[1]
+    grid = np.array(list(product(x, repeat=d)))
+    weight = np.prod(np.array(list(product(w / w.sum(), repeat=d))), axis=1)
+    information = np.zeros(d)
+    for p, v in zip(probability, variance, strict=True):
+        at = grid * np.sqrt(v)
+        logs = np.log(probability) - 0.5 * (np.log(variance).sum(axis=1) + at**2 @ (1.0 / variance).T)
+        share = np.exp(logs - logs.max(axis=1, keepdims=True))
+        share /= share.sum(axis=1, keepdims=True)
+        score = at * (share @ (1.0 / variance))
+        information += p * (weight @ score**2)
+    return information
+
+
+def _size(fault: FaultLabel, stem: str, stream: AidStream) -> Array | None:
+    """A fault's size for an instrument, by component; None where the label does not say."""
+    size = fault.parameters.get(f"{stem}_{quantity_of(stream.kind)}")
+    return None if size is None else np.broadcast_to(np.asarray(size, dtype=np.float64), stream.sigma.shape[1:])
+
+
+def _second_moment(fault: FaultLabel, stream: AidStream) -> Array | None:
+    """Variance of a gross error, by component."""
+    if fault.parameters["distribution"] == "uniform":
+        low, high = fault.parameters[f"size_{quantity_of(stream.kind)}"]
+        return np.full(stream.sigma.shape[1], (low * low + low * high + high * high) / 3.0)
+    size = _size(fault, "size", stream)
+    return None if size is None else size**2
 
 
 def imu_faults(recording: Recording) -> tuple[Array, Array] | None:
