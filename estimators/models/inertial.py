@@ -25,21 +25,13 @@ step: it counts for nothing.
 
 from __future__ import annotations
 
-from math import atan2, ceil, hypot
+from math import atan2, hypot
 
 import numpy as np
 
 from estimators.models import measurements
 from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov, triad_bias
-from estimators.models.propagation import (
-    BLOCK,
-    BLOCK_COLUMNS,
-    TURN_TIME,
-    accumulate_error,
-    advance_inertial,
-    correct_inertial,
-    propagate_covariance,
-)
+from estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
 from simnav.estimator import UnsuitableScenario
 from simnav.rotation import dcm_from_rpy
 from simnav.types import (
@@ -107,7 +99,6 @@ class InertialModel(ErrorModel):
         self._clock = np.zeros(9)
         self._clock[0], self._clock[1] = start.time, -1e9
         self.raw_rate, self.raw_force = self._clock[3:6], self._clock[6:9]
-        self._blocks = np.empty((8, BLOCK_COLUMNS))
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.load(None)
         gyro, level, vertical = self._sensors(imu)
@@ -198,13 +189,10 @@ class InertialModel(ErrorModel):
         elapsed = until - self.time
         if elapsed <= 0.0:
             return
-        if elapsed > BLOCK * (len(self._blocks) - 1):
-            self._blocks = np.empty((ceil(elapsed / BLOCK) + 2, BLOCK_COLUMNS))
-        self._first, count = advance_inertial(
+        self._first = propagate_inertial(
             self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock,
-            *self._samples, self._first, until, self._noise, self._blocks,
+            *self._samples, self._first, until, self._noise, self.transition, self.process_noise,
         )  # fmt: skip
-        accumulate_error(self._blocks, count, self._noise, self.transition, self.process_noise)
         self.time = until
         propagate_covariance(
             covariance, self.transition, self.process_noise, self.calibration, self._decay, self._density, elapsed

@@ -16,6 +16,7 @@ from simnav.compiled import kernel
 from simnav.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
 from simnav.rotation import cross, rotation_coefficients
 from simnav.strapdown import mechanize_step
+from simnav.types import Array
 
 __all__ = [
     "BLOCK",
@@ -27,6 +28,7 @@ __all__ = [
     "advance_inertial",
     "correct_inertial",
     "propagate_covariance",
+    "propagate_inertial",
 ]
 
 #: Longest block over which attitude and specific force count as constant in the transition matrix [s].
@@ -313,6 +315,20 @@ def advance_inertial(  # type: ignore[no-untyped-def]
             bias[3 + r] *= decay_a
     clock[0] = until
     return i, count
+
+
+def propagate_inertial(
+    position: Array, velocity: Array, dcm: Array, memory: Array, bias: Array, turn: Array, clock: Array,
+    time: Array, interval: Array, rate: Array, force: Array, first: int, until: float, noise: Array,
+    transition: Array, process_noise: Array,
+) -> int:  # fmt: skip
+    """`advance_inertial` and `accumulate_error` in one; returns the index of the first sample not used up."""
+    blocks = np.empty((int((until - clock[0]) / BLOCK) + 2, BLOCK_COLUMNS))
+    first, count = advance_inertial(
+        position, velocity, dcm, memory, bias, turn, clock, time, interval, rate, force, first, until, noise, blocks
+    )
+    accumulate_error(blocks, count, noise, transition, process_noise)
+    return first
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
