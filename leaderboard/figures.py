@@ -47,7 +47,7 @@ PALETTE: tuple[tuple[str, str], ...] = (
     ("#56b4e9", "#8fd0f5"),
     ("#e69f00", "#f5bd45"),
     ("#882255", "#c9679b"),
-    ("#999933", "#c4c45c"),
+    ("#999933", "#dddd92"),
 )
 _LINES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
@@ -81,6 +81,7 @@ _RC: dict[Any, Any] = {
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
     "text.color": INK,
+    "text.parse_math": False,  # names of estimators are not TeX
     "legend.fontsize": 8.0,
     "legend.frameon": False,
     "lines.linewidth": 1.5,
@@ -576,7 +577,7 @@ def _plain_log_ticks(axis: Any) -> None:
 
     def text(value: float, _: int) -> str:
         if value >= 1e6 or value < 1e-4:
-            return f"$10^{{{round(math.log10(value))}}}$" if value > 0 else ""
+            return f"1e{round(math.log10(value))}" if value > 0 else ""
         return f"{value / 1e3:g}k" if value >= 1e4 else f"{value:g}"
 
     subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0, 3.0) if decades < 3.2 else (1.0,)

@@ -36,14 +36,15 @@ def run(out: Output, scenario: Scenario, requests: list[EstimatorRequest], seed:
     from simnav.scoring import SCORES, score
     from simnav.trial import run_trial
 
+    with mistakes(ValueError):
+        estimators = [make(request.name, **request.parameters) for request in requests]
     begun = time.perf_counter()
     recording = record(scenario, seed)
     simulated = time.perf_counter() - begun
     trials, rows = [], []
     with out.progress(f"{scenario.id}, seed {seed}", len(requests)) as progress:
-        for k, request in enumerate(requests):
+        for k, (request, estimator) in enumerate(zip(requests, estimators, strict=True)):
             progress(k, note=request.label)
-            estimator = make(request.name, **request.parameters)
             begun = time.perf_counter()
             trial = run_trial(estimator, recording)
             trials.append((request.label, trial))
