@@ -81,7 +81,7 @@ class ErrorModel(ABC):
             getattr(self, name)[...] = value
 
     def carry(self, error: Array, elapsed: float) -> None:
-        """Take an (n,) error through the last propagation, of ``elapsed`` seconds, in place."""
+        """Take an (n,) error, or (n, k) errors, through the last propagation, of ``elapsed`` seconds, in place."""
         raise NotImplementedError(f"{type(self).__name__} has no transition matrix to carry an error with")
 
     @abstractmethod

@@ -199,10 +199,10 @@ class InertialModel(ErrorModel):
         )
 
     def carry(self, error: Array, elapsed: float) -> None:
-        """Take an error through the last propagation, in place."""
+        """Take an error, or several in columns, through the last propagation, in place."""
         m = len(self.transition)
         error[:m] = self.transition @ error[:m]
-        error[m:] *= np.exp(-self._decay * elapsed)
+        error.T[..., m:] *= np.exp(-self._decay * elapsed)
 
     @property
     def held(self) -> float:

@@ -53,6 +53,8 @@ class ShipModel(ErrorModel):
         Sigma of the sideways velocity through the water [m/s].
     """
 
+    state = ("position", "x")
+
     def __init__(
         self,
         acceleration: float = 0.05,
@@ -132,6 +134,7 @@ class ShipModel(ErrorModel):
         if elapsed <= 0.0:
             return
         steps = ceil(elapsed / STEP - 1e-9)
+        self._transition = np.eye(self.size)
         for _ in range(steps):
             self._step(covariance, elapsed / steps)
         self.time = until
@@ -159,6 +162,11 @@ class ShipModel(ErrorModel):
         P += half
         P[:] = F @ P @ F.T
         P += half
+        self._transition = F @ self._transition
+
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an error, or several in columns, through the last propagation, in place."""
+        error[...] = self._transition @ error
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement."""
