@@ -7,11 +7,22 @@ from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import UnsuitableScenario, register
 from simnav.types import InitialState, Instruments
 
-__all__ = ["Ekf"]
+__all__ = ["AidedInertial", "Ekf"]
+
+
+class AidedInertial(KalmanEstimator):
+    """What rows over the inertial model share: they need an IMU and something to aid it."""
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; needs an IMU and at least one aiding instrument."""
+        if instruments.imu is None or not instruments:
+            lacks = "an IMU" if instruments.imu is None else "an instrument beside the IMU"
+            raise UnsuitableScenario(f"it needs an IMU and at least one other instrument; there is not {lacks}")
+        super().reset(start, instruments)
 
 
 @register("ekf", aliases=("eskf",))
-class Ekf(KalmanEstimator):
+class Ekf(AidedInertial):
     """15-state error-state EKF over an IMU and whatever aids there are.
 
     Position, velocity, attitude and IMU biases, plus calibration states where the datasheets of the aids ask for them
@@ -25,10 +36,3 @@ class Ekf(KalmanEstimator):
 
     def __init__(self, calibrate: bool = True):
         super().__init__(InertialModel(calibrate))
-
-    def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run; needs an IMU and at least one aiding instrument."""
-        if instruments.imu is None or not instruments:
-            lacks = "an IMU" if instruments.imu is None else "an instrument beside the IMU"
-            raise UnsuitableScenario(f"the EKF needs an IMU and at least one other instrument; there is not {lacks}")
-        super().reset(start, instruments)

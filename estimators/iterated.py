@@ -1,0 +1,28 @@
+"""The row ``iekf``: the iterated EKF over the inertial model."""
+
+from __future__ import annotations
+
+from estimators.ekf import AidedInertial
+from estimators.models.inertial import InertialModel
+from estimators.solvers.iterated import IteratedKalmanEstimator
+from simnav.estimator import register
+
+__all__ = ["IteratedEkf"]
+
+
+@register("iekf", aliases=("iterated-ekf",))
+class IteratedEkf(IteratedKalmanEstimator, AidedInertial):
+    """Iterated 15-state EKF: each measurement is linearised again until the correction stands still.
+
+    Parameters
+    ----------
+    limit : int
+        Most linearisations of one measurement; 1 is the EKF.
+    threshold : float
+        Change of the correction at which it has converged, in sigmas.
+    calibrate : bool
+        As of ``ekf``.
+    """
+
+    def __init__(self, limit: int = 10, threshold: float = 1e-3, calibrate: bool = True):
+        super().__init__(InertialModel(calibrate), limit=limit, threshold=threshold)

@@ -1,0 +1,44 @@
+"""The rows ``kf`` and ``kf-23``: the linear Kalman filter, which corrects the output and not the navigator."""
+
+from __future__ import annotations
+
+from estimators.ekf import AidedInertial
+from estimators.models.dvl_calibration import DvlCalibrationModel
+from estimators.models.inertial import InertialModel
+from estimators.solvers.linear import LinearKalmanEstimator
+from simnav.estimator import register
+
+__all__ = ["Kf", "Kf23"]
+
+
+@register("kf", aliases=("linear-kf",))
+class Kf(LinearKalmanEstimator, AidedInertial):
+    """Linear 15-state error-state KF, open loop: free inertial navigation, corrected by its estimated error.
+
+    The states of ``ekf``. It leaves its linear range where free inertial navigation does
+    (`estimators.solvers.linear`).
+
+    Parameters
+    ----------
+    calibrate : bool
+        False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
+    """
+
+    def __init__(self, calibrate: bool = True):
+        super().__init__(InertialModel(calibrate))
+
+
+@register("kf-23", aliases=("kf-paper-003",))
+class Kf23(LinearKalmanEstimator, AidedInertial):
+    """Linear 23-state error-state KF, open loop: the KF of paper 003 with the DVL's errors as states.
+
+    Parameters
+    ----------
+    lever_arm : float
+        Sigma of each component of the DVL's lever-arm error [m].
+    delay : float
+        Sigma of the DVL's time error [s].
+    """
+
+    def __init__(self, lever_arm: float = 0.02, delay: float = 0.005):
+        super().__init__(DvlCalibrationModel(lever_arm, delay))

@@ -1,0 +1,108 @@
+"""The 23-state model of paper 003: the 15 inertial states, and eight errors of the DVL.
+
+The eight are constants, after the DVL's datasheet: misalignment eta (3) [rad], lever-arm error dl (3) [m], scale-factor
+error k [-] and delay tau [s]. A DVL measurement that is stamped t reads ::
+
+    z = (1 + k) (I - [eta x]) u,    u = C' v + w x (l + dl) - u' tau,    u' = f + C' g - w x C' v
+
+with w the body rate relative to the Earth, f the specific force and g gravity; u' is the acceleration of the body as
+its own axes see it. So, with M = (1 + k) (I - [eta x]) and errors that are estimate minus truth, the Jacobian is
+
+- velocity ``M C'``; attitude ``M C' [v x]``; gyroscope bias ``M [l x]``
+- eta ``(1 + k) [u x]``; dl ``M [w x]``; k ``(I - [eta x]) u``; tau ``-M u'``
+
+All other instruments have no states: their biases and in-run errors count as white noise.
+
+Source: Zhan et al. 2026 (paper 003), eqs. 1-2 and 13-21. Where it is unclear, this holds here:
+
+- Eq. 19 has ``v - v x eta``, but eq. 17 with the DCM C_b^d of a small turn eta is ``v - eta x v = v + v x eta``. Here
+  eta is the rotation vector by which the instrument's axes are turned from the body's, hence the latter;
+  `simnav.sensors.dvl` is the same, without the small-angle form.
+- One lever arm and one time error are shared by GNSS and DVL in eqs. 16 and 21. Here the GNSS antenna's lever arm is
+  known and its time is right; both errors are the DVL's.
+- H1 of eq. 16 has 20 columns for 23 states and H2 of eq. 21 none for the time error; here the columns are as above.
+- F of eq. 13 is continuous; here it is integrated (`estimators.models.inertial`), and G has 23 rows.
+- The paper's state begins with attitude, ours with position; the eight follow in its order: eta, dl, k, tau.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from estimators.models.base import Linearised
+from estimators.models.inertial import InertialModel
+from estimators.models.measurements import velocity_of_arm
+from simnav.earth import earth_rate, gravity
+from simnav.estimator import UnsuitableScenario
+from simnav.rotation import skew
+from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
+
+__all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
+
+#: Places of the DVL's errors in the state.
+MISALIGNMENT, LEVER_ARM, SCALE, DELAY = slice(15, 18), slice(18, 21), 21, 22
+_IDENTITY = np.eye(3)
+
+
+class DvlCalibrationModel(InertialModel):
+    """The model of the module; 23 states.
+
+    Datasheets give the size of a DVL's scale factor and misalignment, but not how well a lever arm was measured nor how
+    well clocks agree: those two are parameters. A second DVL counts as an instrument without states.
+
+    Parameters
+    ----------
+    lever_arm : float
+        Sigma of each component of the lever-arm error [m].
+    delay : float
+        Sigma of the DVL's time error [s].
+    """
+
+    states: ClassVar[int] = 23
+
+    def __init__(self, lever_arm: float = 0.02, delay: float = 0.005):
+        super().__init__(calibrate=False)
+        self.lever_arm, self.delay = lever_arm, delay
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; UnsuitableScenario without an IMU or a DVL."""
+        dvls = instruments.of_kind("dvl")
+        if not dvls:
+            raise UnsuitableScenario("the 23-state model needs a DVL; there is none")
+        self._dvl = dvls[0]
+        self._gravity = np.array([0.0, 0.0, float(gravity(start.position[0], start.position[2]))])
+        self._raw = np.zeros((3, 12))
+        return super().begin(start, instruments)
+
+    def _more_states(self) -> list[tuple[float, float, float]]:
+        sigmas = [*self._dvl.misalignment, *[self.lever_arm] * 3, self._dvl.scale, self.delay]
+        return [(float(s) ** 2, 0.0, 0.0) for s in sigmas]
+
+    def measure(self, measurement: Measurement) -> Linearised | None:
+        """Linearise one measurement: the DVL as in the module, the others as in `estimators.models.measurements`."""
+        if measurement.instrument == self._dvl.name:
+            return self._measure_dvl(self._dvl, measurement.value)
+        return super().measure(measurement)
+
+    def _measure_dvl(self, sheet: Datasheet, value: Array) -> Linearised:
+        eta, dl = self.calibration[0:3], self.calibration[3:6]
+        k, tau = float(self.calibration[6]), float(self.calibration[7])
+        u, raw, to_body = np.empty(3), self._raw, self.dcm.T
+        velocity_of_arm(
+            True, self.position[0], self.dcm, self.velocity, self.raw_rate, self.bias, sheet.lever_arm + dl, raw, u
+        )  # fmt: skip
+        rate = self.raw_rate - self.bias[:3] - to_body @ earth_rate(self.position[0])
+        turn = skew(rate)
+        acceleration = self.raw_force - self.bias[3:] + to_body @ self._gravity - turn @ (to_body @ self.velocity)
+        u -= acceleration * tau
+        turned = _IDENTITY - skew(eta)
+        matrix = (1.0 + k) * turned
+        jacobian = np.zeros((3, self.size))
+        jacobian[:, 3:12] = matrix @ raw[:, 3:]
+        jacobian[:, MISALIGNMENT] = (1.0 + k) * skew(u)
+        jacobian[:, LEVER_ARM] = matrix @ turn
+        jacobian[:, SCALE] = turned @ u
+        jacobian[:, DELAY] = -(matrix @ acceleration)
+        return Linearised(value - matrix @ u, jacobian, self.noise[sheet.name])

@@ -1,0 +1,99 @@
+"""The 9-state model of paper 000: position, velocity and attitude, with fixed sigmas and no biases.
+
+The paper's motion constraint between epochs (eq. 3) is the strapdown integration, and is done as such
+(`simnav.strapdown`), at IMU rate and on the rotating Earth. Printed, it lost brackets and a square; meant is
+``dp = p' - p - v dt - (C f + g) dt^2 / 2``, ``dv = v' - v - (C f + g) dt``, and the attitude on SO(3). Its noise is as
+in eq. 25: fixed sigmas of position, velocity and attitude for a second of motion, whatever the IMU. (Eq. 4 takes the
+residual as its own sigma.) Likewise those of GNSS and DVL (below eq. 5); other instruments count as their datasheets
+say. ``C v`` of eq. 5 is ``C' v``, as in eq. 6.
+
+Source: paper 000, eqs. 1-6 and 25. It prints no sigmas of the motion; ours cover the biases of a tactical-grade IMU for
+a second.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimators.models import measurements
+from estimators.models.base import Linearised
+from estimators.models.inertial import InertialModel
+from simnav.types import Array, InitialState, Instruments, Measurement
+
+__all__ = ["NineStateModel"]
+
+
+class NineStateModel(InertialModel):
+    """The model of the module.
+
+    Parameters
+    ----------
+    sigma_position, sigma_velocity, sigma_attitude_deg : float
+        Of one second of motion [m], [m/s], [deg]; variances grow in proportion to time.
+    sigma_gnss_horizontal, sigma_gnss_vertical : float
+        Of a GNSS position [m]; 0 for the datasheet's.
+    sigma_dvl : float
+        Of a DVL velocity [m/s]; 0 for the datasheet's.
+    """
+
+    def __init__(
+        self,
+        sigma_position: float = 0.01,
+        sigma_velocity: float = 0.02,
+        sigma_attitude_deg: float = 0.01,
+        sigma_gnss_horizontal: float = 2.5,
+        sigma_gnss_vertical: float = 5.0,
+        sigma_dvl: float = 0.1,
+    ):
+        super().__init__(calibrate=False)
+        motion = np.repeat([sigma_position, sigma_velocity, np.radians(sigma_attitude_deg)], 3)
+        self._motion = np.diag(motion**2)
+        self._gnss = np.array([sigma_gnss_horizontal, sigma_gnss_horizontal, sigma_gnss_vertical])
+        self._dvl = sigma_dvl
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; UnsuitableScenario without an IMU."""
+        self._unused = super().begin(start, instruments)
+        self.size = 9
+        self._full = np.zeros(15)
+        self._wide: dict[str, Array] = {}
+        self._noise[:8] = 0.0
+        for sheet in instruments.values():
+            if sheet.kind == "gnss_position" and np.all(self._gnss > 0.0):
+                self.noise[sheet.name] = np.diag(self._gnss**2)
+            elif sheet.kind == "dvl" and self._dvl > 0.0:
+                self.noise[sheet.name] = self._dvl**2 * np.eye(3)
+        return np.array(start.covariance, dtype=np.float64)
+
+    def propagate(self, covariance: Array, until: float) -> None:
+        """Advance the state and its covariance through the samples loaded."""
+        elapsed = until - self.time
+        if elapsed <= 0.0:
+            return
+        self._unused[:] = 0.0
+        super().propagate(self._unused, until)
+        F = self.transition[:9, :9]
+        # Of the inertial model's noise there is left that of a time without IMU data.
+        covariance[:] = F @ covariance @ F.T + self.process_noise[:9, :9] + elapsed * self._motion
+        covariance += covariance.T.copy()
+        covariance *= 0.5
+
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an error through the last propagation, in place."""
+        error[:] = self.transition[:9, :9] @ error
+
+    def measure(self, measurement: Measurement) -> Linearised | None:
+        """Linearise one measurement (`estimators.models.measurements`)."""
+        sheet = self.instruments[measurement.instrument]
+        wide = self._wide.get(sheet.name)
+        if wide is None:
+            wide = self._wide[sheet.name] = np.zeros((len(sheet.sigma), 15))
+        linearised = measurements.MODELS[sheet.kind](self, sheet, measurement.value, wide)
+        if linearised is None:
+            return None
+        return Linearised(linearised.innovation, np.ascontiguousarray(wide[:, :9]), linearised.noise)
+
+    def correct(self, dx: Array) -> None:
+        """Add a correction to the state."""
+        self._full[:9] = dx
+        super().correct(self._full)

@@ -1,0 +1,88 @@
+"""The invariant extended Kalman filter on SE_2(3) with biases, on the rotating Earth.
+
+Attitude C, velocity v and position p are one element X of the group SE_2(3) of double direct isometries; its error is
+not a difference. With X the truth, Y the estimate and xi = (phi, nu, rho) the 9 components of the error:
+
+- left-invariant ``X^-1 Y = exp(xi)``: the differences of v and p as the body sees them. GNSS position and velocity,
+  terrain fix and depth (``y = X d``) are invariant measurements: their Jacobian in body axes is constant.
+- right-invariant ``Y X^-1 = exp(xi)``: the differences after the attitude error is taken back. DVL (``y = X^-1 d``) is
+  an invariant measurement, and so is a heading or another known direction seen from the body.
+
+Biases and calibration states have plain differences (Barrau's "imperfect" filter).
+
+**How it is computed.** The covariance P stays that of the public error (differences in north-east-down and rotation
+vector), so that nothing is to be converted. To first order xi is ``T(Y)`` times the public error, with an invertible
+T. The linearised propagation and the gain are the same in any coordinates. Two things are not:
+
+- the correction is the group's exponential: with (dp, dv, dphi) of the public error and the left Jacobian J of SO(3)
+  ``C+ = exp(dphi x) C``, ``v+ = v + J dv``, ``p+ = p + J dp``, the same for both errors;
+- the filter holds the covariance of xi, not of the public error, through the correction: ``P+ = N P N'`` with
+  ``N = T(Y+)^-1 T(Y)``. Left: T turns into the body, so N turns position, velocity and attitude by ``exp(dphi x)``.
+  Right: ``xi = (phi, dv + v x phi, dp + p x phi)``, so ``N = I`` but ``dv <- dv - (v+ - v) x phi``, likewise dp.
+  Only the change of p enters: the origin does not matter.
+
+Thus a wrong heading is corrected without the covariance being wrong afterwards, which is what the filter is for: it
+converges from initial headings that the EKF does not.
+
+**How far the theory goes.** Log-linear error propagation needs group-affine dynamics: exact for a flat Earth that does
+not turn and known biases. Coriolis, transport rate, gravity's change with place, and the biases break it; they are in
+the linearised propagation to first order, as in the EKF. Guaranteed is what is guaranteed for any EKF.
+
+Source: A. Barrau and S. Bonnabel, *The invariant extended Kalman filter as a stable observer*, IEEE TAC 62(4), 2017,
+sections II-IV; biases: A. Barrau, thesis, 2015, chapter 4; rotating Earth: M. Brossard, A. Barrau, P. Chauchat, S.
+Bonnabel, *Associating uncertainty to extended poses for on Lie group IMU preintegration with rotating Earth*, IEEE T-RO
+38(2), 2022.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from estimators.adaptations.base import Adaptation
+from estimators.models.inertial import InertialModel
+from estimators.solvers.iterated import left_jacobian
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.rotation import dcm_from_rotation_vector, skew
+from simnav.types import Array
+
+__all__ = ["InvariantKalmanEstimator"]
+
+
+class InvariantKalmanEstimator(KalmanEstimator):
+    """The solver of the module.
+
+    Parameters
+    ----------
+    model : InertialModel
+        Or another with position, velocity and attitude as the first nine components of its error.
+    adaptation : Adaptation, optional
+    error : "left" or "right"
+        Which error is invariant.
+    """
+
+    def __init__(
+        self, model: InertialModel, adaptation: Adaptation | None = None, error: Literal["left", "right"] = "left"
+    ):
+        super().__init__(model, adaptation)
+        if error not in ("left", "right"):
+            raise ValueError(f'error is {error!r}; it must be "left" or "right"')
+        self.error = error
+
+    def _correct(self, dx: Array) -> None:
+        """Correct on the group, and take the covariance of the invariant error along."""
+        turn, P = dx[6:9], self.covariance
+        J = left_jacobian(turn)
+        dx[0:3], dx[3:6] = J @ dx[0:3], J @ dx[3:6]
+        self.model.correct(dx)
+        if self.error == "left":
+            N = dcm_from_rotation_vector(turn)
+            for at in (slice(0, 3), slice(3, 6), slice(6, 9)):
+                P[at] = N @ P[at]
+            for at in (slice(0, 3), slice(3, 6), slice(6, 9)):
+                P[:, at] = P[:, at] @ N.T
+        else:
+            shift = np.concatenate([skew(dx[0:3]), skew(dx[3:6])])
+            P[0:6] -= shift @ P[6:9]
+            P[:, 0:6] -= P[:, 6:9] @ shift.T

@@ -1,0 +1,72 @@
+"""The linear error-state Kalman filter, feed-forward (open loop): the error is estimated, and never fed back.
+
+The nominal trajectory is free inertial navigation from the initial state. The filter estimates its error with F and H
+taken along the nominal trajectory, and the estimate is nominal minus error. It is linear: with the nominal trajectory
+given, the estimate is a linear function of the measurements. With x the correction (what is to be added to the nominal
+state, minus the error), r the measurement minus what the nominal state predicts:
+
+- ``x- = Phi x+``; ``x+ = x- + K (r - H x-)``; P as in the EKF
+
+It holds as long as the nominal error stays in the linear range. Free inertial navigation leaves it sooner or later:
+level errors oscillate with Schuler's period (84 min), and height runs away by a factor of e in 9.5 minutes
+(``sqrt(R / 2 g)``). What is lost then is of second order in the error: ``|phi|^2 v`` in the velocity, ``d^2 / 2R`` in
+the height for a position off by d, and the specific force times ``|phi|^2 / 2``; the covariance does not know. With a
+navigation-grade IMU an hour is harmless; a MEMS unit (1 deg/h and worse) is beyond it after a few minutes. The
+nominal's error is the diagnostic ``nominal_error`` [m].
+
+Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, section 6.3 (feed-forward and
+feedback configurations); P. D. Groves 2013, section 14.1.1 (open loop).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimators.models.base import Linearised
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
+
+__all__ = ["LinearKalmanEstimator"]
+
+
+class LinearKalmanEstimator(KalmanEstimator):
+    """The solver of the module, over any model that can carry an error along.
+
+    Attributes
+    ----------
+    x : (n,) array
+        The correction: minus the estimated error of the model's state.
+    """
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        super().reset(start, instruments)
+        self.x = np.zeros(self.model.size)
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step's measurements, each at its own time."""
+        estimate = super().update(measurements)
+        estimate.diagnostics = {**estimate.diagnostics, "nominal_error": float(np.linalg.norm(self.x[:3]))}
+        return estimate
+
+    def _propagate(self, until: float) -> None:
+        elapsed = until - self.model.time
+        if elapsed > 0.0:
+            self.model.propagate(self.covariance, until)
+            self.model.carry(self.x, elapsed)
+
+    def _linearise(self, m: Measurement) -> Linearised | None:
+        linearised = self.model.measure(m)
+        if linearised is None:
+            return None
+        return linearised._replace(innovation=linearised.innovation - linearised.jacobian @ self.x)
+
+    def _correct(self, dx: Array) -> None:
+        self.x += dx
+
+    def _estimate(self) -> Estimate:
+        nominal = self.model.snapshot()
+        self.model.correct(self.x)
+        estimate = self.model.estimate(self.covariance)
+        self.model.restore(nominal)
+        return estimate
