@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -64,16 +65,25 @@ def test_seeds_fix_a_run_and_differ(name):
         assert not np.array_equal(stream.value, other.data.aids[name].value)
 
 
-def test_another_process_gives_the_same_bits():
-    code = (
-        "import hashlib, numpy as np; from simnav.scenario import load; from simnav.simulator import simulate;"
-        "r = simulate(load('open-sea').model_copy(update={'duration': 60.0}), 3);"
-        "print(hashlib.sha256(r.data.imu.specific_force.tobytes() + r.data.aids['dvl'].value.tobytes()).hexdigest())"
-    )
-    there = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    namespace: dict = {}
-    exec(code.replace("print(", "digest = ("), namespace)
-    assert there.strip() == namespace["digest"]
+DIGEST = """
+import hashlib
+from simnav.scenario import load
+from simnav.simulator import simulate
+data = simulate(load("open-sea").model_copy(update={"duration": 60.0}), 3).data
+arrays = [data.imu.angular_rate, data.imu.specific_force, data.truth.position, *(s.value for s in data.aids.values())]
+print(hashlib.sha256(b"".join(a.tobytes() for a in arrays)).hexdigest())
+"""
+
+
+def test_other_processes_give_the_same_bits_compiled_or_cached(tmp_path):
+    def digest(**environment):
+        done = subprocess.run(
+            [sys.executable, "-c", DIGEST], capture_output=True, text=True, check=True, env=os.environ | environment
+        )
+        return done.stdout
+
+    fresh = {"SIMNAV_CACHE_DIR": str(tmp_path)}
+    assert digest(**fresh) == digest(**fresh) == digest()
 
 
 def test_switching_an_instrument_or_a_fault_off_changes_no_bit_of_the_others():
