@@ -111,6 +111,8 @@ def run(
 
         if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
             raise UserError(f"--plot {plot}: the file should end in .png, .svg or .pdf")
+        if plot is not None and not plot.expanduser().resolve().parent.is_dir():
+            raise UserError(f"--plot {plot}: there is no folder {plot.parent}")
         chosen = arguments.scenario(scenario)
         requests = arguments.requests(estimator, set_)
         out.code = single.run(out, chosen, requests, seed, plot)

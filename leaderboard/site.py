@@ -13,6 +13,7 @@ import os
 import re
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -45,6 +46,8 @@ __all__ = ["build"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _WORTH_PROCESSES = 3  # scenarios
+_STALE = 3600.0  # a build of this age runs no more [s]
+_NAME_OF_LABEL = re.compile(r"[(\[ ]")  # a label is a name, and its parameters in brackets
 _STATIC = ("style.css", "tables.js", "results.schema.json")
 _DEGREES = math.degrees(1.0)
 
@@ -106,6 +109,7 @@ def build(
     output = Path(output).expanduser().resolve()
     _refuse_strangers(output)
     output.parent.mkdir(parents=True, exist_ok=True)
+    _sweep(output)
     draft = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent))
     try:
         draft.chmod(0o755)
@@ -125,6 +129,13 @@ def _refuse_strangers(output: Path) -> None:
         raise UserError(f"{output} holds other files and no site of simnav; name an empty or a new folder")
 
 
+def _sweep(output: Path) -> None:
+    """Delete what builds that were killed left, a while ago, beside the site."""
+    for folder in [*output.parent.glob(f".{output.name}.*.part"), *output.parent.glob(f".{output.name}.*.old")]:
+        if time.time() - folder.stat().st_mtime > _STALE and (output.exists() or folder.suffix == ".part"):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
 def _swap(draft: Path, output: Path) -> None:
     """Put the new folder in the place of the old one."""
     if not output.exists():
@@ -142,7 +153,7 @@ def _swap(draft: Path, output: Path) -> None:
 
 def reproduce(results: Sequence[Result]) -> str:
     """The command that makes results like these."""
-    scenarios = list(dict.fromkeys(r.scenario for r in results))
+    scenarios = [_argument(s) for s in dict.fromkeys(r.scenario for r in results)]
     estimators = list(dict.fromkeys(_request(r) for r in results))
     seeds = [r.seed for r in results]
     first, runs = min(seeds), max(seeds) - min(seeds) + 1
@@ -150,11 +161,20 @@ def reproduce(results: Sequence[Result]) -> str:
     return command + (f" --seed {first}" if first else "")
 
 
+def _argument(identity: str) -> str:
+    """A scenario as it is asked for: one that is not in the catalogue came from a file."""
+    return identity if catalogued(identity) is not None else f"{identity.rpartition('-v')[0]}.toml"
+
+
 def _request(result: Result) -> str:
-    """An estimator as it is asked for on the command line."""
+    """An estimator as it is asked for; one that is not registered came from a file."""
+    from simnav.estimator import names
+
+    name, _, class_name = _NAME_OF_LABEL.split(result.estimator, maxsplit=1)[0].partition(":")
+    if name not in names():
+        name += f".py:{class_name}" if class_name else ".py"
     if not result.parameters:
-        return result.estimator
-    name = re.split(r"[:(\[ ]", result.estimator, maxsplit=1)[0]
+        return name
     return name + ":" + ",".join(f"{k}={v}" for k, v in result.parameters.items())
 
 
@@ -403,8 +423,8 @@ def _describe(identity: str, by: Mapping[str, Runs], page: str) -> dict[str, Any
     """What is known of a scenario, from the catalogue where it is in there."""
     name, _, version = identity.rpartition("-v")
     seeds = sorted({r.seed for runs in by.values() for r in runs.results})
-    found = {"id": identity, "name": name or identity, "page": page, "seeds": seeds, "title": "", "description": "",
-             "source": ""}  # fmt: skip
+    found: dict[str, Any] = {"id": identity, "name": name or identity, "page": page, "seeds": seeds}
+    found |= {"title": "", "description": "", "source": "", "argument": _argument(identity)}
     facts = [("Version", version or "–"), ("Seeds", len(seeds))]
     scenario = catalogued(identity)
     if scenario is not None:
@@ -422,7 +442,7 @@ def _summary(label: str) -> str:
     from simnav.estimator import describe
 
     try:
-        return describe(re.split(r"[:(\[ ]", label, maxsplit=1)[0]).summary
+        return describe(_NAME_OF_LABEL.split(label, maxsplit=1)[0]).summary
     except (ValueError, ImportError):
         return ""
 

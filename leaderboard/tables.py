@@ -153,7 +153,9 @@ def table(
     for index, name in enumerate(columns):
         # Figures and names stay whole; headings are folded instead.
         result.add_column(
-            Text(_fold(name)), justify="right" if name in right else "left", no_wrap=name in right or index == 0
+            Text(_fold(name) if name in right else name),
+            justify="right" if name in right else "left",
+            no_wrap=name in right or index == 0,
         )
     for index, row in enumerate(rows):
         style = "bold" if index in bold else "dim" if index in faint else ""

@@ -167,7 +167,7 @@ def test_the_ranking_is_on_the_first_page(folder):
     assert text.index(">ekf<") < text.index("&lt;script&gt;") < text.index(">inertial<") < text.index(">oracle<")
     shown = Page(folder / "index.html").text
     assert "2 of 12" in shown  # failures of the hostile one
-    assert "simnav campaign --scenario made-up-one-v1,made-up-two-v3" in shown
+    assert "simnav campaign --scenario made-up-one.toml,made-up-two.toml" in shown
     assert "ekf:gain=0.5" in shown
     assert "consistent" in shown
 
