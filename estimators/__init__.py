@@ -6,25 +6,40 @@ Importing the package registers the rows; compiled code and large libraries load
 from estimators.dead_reckoning import DeadReckoning
 from estimators.ekf import Ekf
 from estimators.ekf_presets import Ekf9, Ekf23
+from estimators.federated import Federated, FederatedNoReset
 from estimators.gnss_only import GnssOnly
 from estimators.inertial import PureInertial
 from estimators.invariant import InvariantEkf
 from estimators.iterated import IteratedEkf
 from estimators.kf import Kf, Kf23
 from estimators.oracle import Oracle
+from estimators.references import OracleClairvoyant, OracleMixture, OracleRts
 from estimators.ship_ekf import ShipEkf
+from estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
+from estimators.smoothers import EkfRts, ShipEkfRts
 
 __all__ = [
+    "Ckf",
     "DeadReckoning",
     "Ekf",
-    "Ekf9",
     "Ekf23",
+    "Ekf9",
+    "EkfRts",
+    "Federated",
+    "FederatedNoReset",
     "GnssOnly",
     "InvariantEkf",
     "IteratedEkf",
     "Kf",
     "Kf23",
     "Oracle",
+    "OracleClairvoyant",
+    "OracleMixture",
+    "OracleRts",
     "PureInertial",
+    "ShipCkf",
     "ShipEkf",
+    "ShipEkfRts",
+    "ShipUkf",
+    "Ukf",
 ]
