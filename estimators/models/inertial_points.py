@@ -1,0 +1,218 @@
+"""The inertial model for sigma-point solvers: points through the mechanization and the true measurement functions.
+
+A point is retracted from the model's state as a correction is: metres north-east-down over the radii, velocity and
+biases added, the attitude turned by ``exp(phi x)`` from the left. Calibration states are linear, and only decay.
+
+The points are not taken through every IMU sample. The model's own state is (`InertialModel.propagate`), and over pieces
+of at most `PIECE` seconds its motion is turned back, by the exact inverse of the mechanization, into one equivalent
+sample: the mean rate and specific force that lead from its velocity and attitude at the start to those at the end
+(preintegration, with coning, sculling and the present bias in it). Every point is mechanized through that sample, less
+the difference of its biases. Against taking each point through all samples, an error of 1 mrad or 10 cm/s differs by
+under 1e-4 of itself after a second at sea (a test); the cost is a fiftieth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import atan2, ceil, cos, sin, sqrt
+
+import numpy as np
+
+from estimators.models.inertial import InertialModel
+from estimators.models.points import PointModel
+from simnav.compiled import kernel
+from simnav.earth import ROTATION_RATE, radii_scalar
+from simnav.rotation import cross, dcm_from_rotation_vector, rotation_coefficients, skew
+from simnav.strapdown import mechanize_step, sample_from_motion
+from simnav.types import Array, Datasheet, Measurement
+
+__all__ = ["PIECE", "InertialPoints", "propagate_points"]
+
+#: Longest piece of the motion that one equivalent sample stands for [s].
+PIECE = 0.5
+
+
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8[:, ::1])")
+def propagate_points(  # type: ignore[no-untyped-def]
+    position, velocity, dcm, next_velocity, next_dcm, interval, gyro_decay, accelerometer_decay, errors
+):
+    """Take points through one piece of a state's motion, in place.
+
+    Parameters
+    ----------
+    position, velocity : (3,) arrays
+    dcm : (3, 3) array
+        The state at the start of the piece.
+    next_velocity : (3,) array
+    next_dcm : (3, 3) array
+        At its end.
+    interval : float
+        Length [s].
+    gyro_decay, accelerometer_decay : float
+        Inverse of the biases' correlation times [1/s].
+    errors : (k, n) array
+        Of the points with respect to the state at the start; afterwards at the end.
+    """
+    c, d = dcm, next_dcm
+    memory = np.zeros(6)
+    sample = sample_from_motion(
+        position[0],
+        position[2],
+        (velocity[0], velocity[1], velocity[2]),
+        (next_velocity[0], next_velocity[1], next_velocity[2]),
+        (c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2]),
+        (d[0, 0], d[0, 1], d[0, 2], d[1, 0], d[1, 1], d[1, 2], d[2, 0], d[2, 1], d[2, 2]),
+        memory,
+        interval,
+    )
+    end_latitude = position[0] + sample[6]
+    end_longitude = position[1] + sample[7]
+    end_height = position[2] + sample[8]
+    meridian, prime = radii_scalar(sin(position[0]))
+    north, east = meridian + position[2], (prime + position[2]) * cos(position[0])
+    meridian, prime = radii_scalar(sin(end_latitude))
+    next_north, next_east = meridian + end_height, (prime + end_height) * cos(end_latitude)
+    keep_g, keep_a = np.exp(-gyro_decay * interval), np.exp(-accelerometer_decay * interval)
+    p, v, m = np.empty(3), np.empty(3), np.empty((3, 3))
+    for k in range(errors.shape[0]):
+        still = True
+        for j in range(15):
+            still = still and errors[k, j] == 0.0
+        if still:
+            continue
+        p[0] = position[0] + errors[k, 0] / north
+        p[1] = position[1] + errors[k, 1] / east
+        p[2] = position[2] - errors[k, 2]
+        r0, r1, r2 = errors[k, 6], errors[k, 7], errors[k, 8]
+        a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
+        for j in range(3):
+            v[j] = velocity[j] + errors[k, 3 + j]
+            c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
+            x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
+            y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
+            m[0, j], m[1, j], m[2, j] = c0 + a * x0 + b * y0, c1 + a * x1 + b * y1, c2 + a * x2 + b * y2
+        memory[:] = 0.0
+        mechanize_step(
+            p, v, m, memory,
+            sample[0] - errors[k, 9], sample[1] - errors[k, 10], sample[2] - errors[k, 11],
+            sample[3] - errors[k, 12], sample[4] - errors[k, 13], sample[5] - errors[k, 14],
+            interval,
+        )  # fmt: skip
+        errors[k, 0] = (p[0] - end_latitude) * next_north
+        errors[k, 1] = (p[1] - end_longitude) * next_east
+        errors[k, 2] = end_height - p[2]
+        # Rotation vector of C_k C': its skew part holds the sine, its trace the cosine (good below half a turn).
+        x0, x1, x2, trace = 0.0, 0.0, 0.0, 0.0
+        for j in range(3):
+            errors[k, 3 + j] = v[j] - next_velocity[j]
+            trace += m[0, j] * d[0, j] + m[1, j] * d[1, j] + m[2, j] * d[2, j]
+            x0 += 0.5 * (m[2, j] * d[1, j] - m[1, j] * d[2, j])
+            x1 += 0.5 * (m[0, j] * d[2, j] - m[2, j] * d[0, j])
+            x2 += 0.5 * (m[1, j] * d[0, j] - m[0, j] * d[1, j])
+        sine = sqrt(x0 * x0 + x1 * x1 + x2 * x2)
+        ratio = 1.0 if sine < 1e-12 else atan2(sine, 0.5 * (trace - 1.0)) / sine
+        errors[k, 6], errors[k, 7], errors[k, 8] = ratio * x0, ratio * x1, ratio * x2
+        for j in range(3):
+            errors[k, 9 + j] *= keep_g
+            errors[k, 12 + j] *= keep_a
+
+
+class InertialPoints(InertialModel, PointModel):
+    """`InertialModel` with points.
+
+    Parameters
+    ----------
+    calibrate : bool
+        As there.
+    """
+
+    def propagate_points(self, errors: Array, until: float) -> Array:
+        """Advance the state and the points; return the process noise."""
+        noise = np.zeros((self.size, self.size))
+        begin, elapsed = self.time, until - self.time
+        pieces = ceil(elapsed / PIECE - 1e-9)
+        for k in range(1, pieces + 1):
+            position, velocity, dcm, time = self.position.copy(), self.velocity.copy(), self.dcm.copy(), self.time
+            self.propagate(noise, until if k == pieces else begin + elapsed * k / pieces)
+            propagate_points(
+                position, velocity, dcm, self.velocity, self.dcm, self.time - time, self._noise[2], self._noise[4],
+                errors,
+            )  # fmt: skip
+        errors[:, 15:] *= np.exp(-self._decay * elapsed)
+        return noise
+
+    def observe_points(self, measurement: Measurement, errors: Array) -> Array:
+        """What the instrument should read at the points, minus what it should read at the state."""
+        sheet = self.instruments[measurement.instrument]
+        with_state = np.zeros((len(errors) + 1, self.size))
+        with_state[1:] = errors
+        dcm = dcm_from_rotation_vector(with_state[:, 6:9]) @ self.dcm
+        predicted = _FUNCTIONS[sheet.kind](self, sheet, with_state, dcm)
+        at = self.bias_at.get(sheet.name)
+        if at is not None:
+            predicted = predicted + with_state[:, at : at + predicted.shape[1]]
+        difference = predicted[1:] - predicted[0]
+        if sheet.kind in ("magnetic_compass", "gyrocompass"):
+            difference = np.arctan2(np.sin(difference), np.cos(difference))
+        return np.asarray(difference)
+
+    def arm_velocity(self, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+        """(k, 3) velocity of an instrument due to its lever arm, body axes: w x l, w relative to the Earth."""
+        latitude = float(self.position[0])
+        earth = np.array([ROTATION_RATE * cos(latitude), 0.0, -ROTATION_RATE * sin(latitude)])
+        rate = self.raw_rate - self.bias[:3] - errors[:, 9:12] - earth @ dcm
+        return np.asarray(rate @ skew(sheet.lever_arm))
+
+    def body_velocity(self, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+        """(k, 3) velocity over the ground of an instrument, body axes: C' v + w x l."""
+        velocity = (self.velocity + errors[:, 3:6])[:, None, :] @ dcm
+        return np.asarray(velocity[:, 0] + self.arm_velocity(sheet, errors, dcm))
+
+
+def _position(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+    return np.asarray((errors[:, :3] + dcm @ sheet.lever_arm)[:, : len(sheet.sigma)])
+
+
+def _velocity(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+    turned = dcm @ model.arm_velocity(sheet, errors, dcm)[:, :, None]
+    return np.asarray(errors[:, 3:6] + turned[:, :, 0])
+
+
+def _dvl(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+    u = model.body_velocity(sheet, errors, dcm)
+    at = model.scale_at.get(sheet.name)
+    if at is None:
+        return u
+    calibration = model.calibration[at - 15 : at - 11] + errors[:, at : at + 4]
+    s, (a0, a1, a2), (u0, u1, u2) = calibration[:, :1], calibration[:, 1:].T, u.T
+    turned = np.stack([u1 * a2 - u2 * a1, u2 * a0 - u0 * a2, u0 * a1 - u1 * a0], axis=1)
+    return np.asarray((1.0 + s) * u + turned)
+
+
+def _speed_log(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+    u = model.body_velocity(sheet, errors, dcm)[:, :1]
+    at = model.scale_at.get(sheet.name)
+    if at is not None:
+        u = u * (1.0 + model.calibration[at - 15] + errors[:, at : at + 1])
+    return u
+
+
+def _heading(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+    return np.arctan2(dcm[:, 1, 0], dcm[:, 0, 0])[:, None]
+
+
+def _depth(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
+    return np.asarray(errors[:, 2:3] + dcm[:, 2:] @ sheet.lever_arm)
+
+
+#: Readings at the points, up to what is the same for all (equations in `estimators.models.measurements`).
+_FUNCTIONS: Mapping[str, Callable[[InertialPoints, Datasheet, Array, Array], Array]] = {
+    "gnss_position": _position,
+    "terrain_fix": _position,
+    "gnss_velocity": _velocity,
+    "dvl": _dvl,
+    "magnetic_compass": _heading,
+    "gyrocompass": _heading,
+    "depth": _depth,
+    "speed_log": _speed_log,
+}

@@ -1,0 +1,232 @@
+"""Carlson's federated Kalman filter: a local filter for each aiding sensor, fused by a master.
+
+All local filters share one inertial reference, the state of the model; each holds its own correction x_i to it and the
+covariance P_i of what is left, and sees one sensor. Information is shared out so that no local filter counts what
+another counts too: with shares beta_i that sum to 1, local filter i starts with P_0 / beta_i and has the process noise
+Q / beta_i. At a fusion epoch the master adds up
+
+    P_f^-1 = sum P_i^-1,    P_f^-1 x_f = sum P_i^-1 x_i
+
+over the states that all have in common, and feeds x_f back to the shared reference. Then
+
+- *with reset*, every local filter takes P_f / beta_i and x_f (Carlson's fusion-reset mode). Where all fuse after every
+  measurement this is the centralized filter exactly, as long as no sensor has states of its own.
+- *without reset*, every local filter goes on with what it knows (no-reset mode): it is never told what the others saw,
+  so that a fault of one stays in one, at the price of a worse estimate. The sum is then an upper bound of the error.
+
+Calibration states belong to the local filter of their sensor. They are not fused; given the common states they are
+independent of the other filters' (which holds exactly at one time only, and is the price of the architecture). A reset
+keeps what a local filter knows of them given the common states: with ``G = P_bc P_cc^-1`` it changes P_cc, takes b
+along by G, and leaves the conditional covariance of b as it is.
+
+Between two fusions the estimate is the reference, propagated: measurements wait for the master. That wait is the
+federated filter's loss in paper 004, which fuses when the slowest sensor has delivered; so does the default here. A
+sensor that is away needs no reconfiguration: its local filter predicts, and its share is its prediction. All
+measurements are linearised about the shared reference.
+
+Source: N. A. Carlson, *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and
+Electronic Systems 26(3), 1990; paper 004 (the rival that it measures itself against, without equations).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.adaptations.base import Adaptation
+from estimators.models.inertial import InertialModel
+from estimators.models.propagation import propagate_covariance
+from estimators.solvers.kalman import KalmanEstimator, Observation
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
+
+__all__ = ["FederatedEstimator"]
+
+#: Two times are the same within this [s].
+SAME = 1e-6
+
+
+class _Local(NamedTuple):
+    """A local filter, or the master's own share: its part of the information, own states, correction, covariance."""
+
+    share: float
+    own: NDArray[np.intp]
+    error: Array
+    covariance: Array
+
+
+class FederatedEstimator(KalmanEstimator):
+    """Local filters over one `InertialModel`, fused; a subclass registers.
+
+    Parameters
+    ----------
+    model : InertialModel
+    adaptation : Adaptation, optional
+    fusion_period : float, optional
+        Time between fusions [s]; 0 fuses after every measurement; None: the period of the slowest sensor.
+    reset_locals : bool
+        Whether the local filters are told the fused state.
+    master_share : float
+        Information that the master keeps for itself, in [0, 1); it propagates it, and fuses it with the others.
+    shares : tuple of float, optional
+        Of the aiding sensors in the scenario's order, above 0; with the master's they sum to 1. Empty: equal shares.
+    """
+
+    model: InertialModel
+
+    def __init__(
+        self,
+        model: InertialModel,
+        adaptation: Adaptation | None = None,
+        fusion_period: float | None = None,
+        reset_locals: bool = True,
+        master_share: float = 0.0,
+        shares: tuple[float, ...] = (),
+    ):
+        if fusion_period is not None and not 0.0 <= fusion_period < np.inf:
+            raise ValueError(f"fusion_period is a time in seconds, 0 or more, not {fusion_period}")
+        if not 0.0 <= master_share < 1.0:
+            raise ValueError(f"master_share is a part of the information, in [0, 1), not {master_share}")
+        if shares and not (min(shares) > 0.0 and abs(sum(shares) + master_share - 1.0) < 1e-9):
+            raise ValueError(f"shares are above 0 and sum to 1 with the master's {master_share:g}, unlike {shares}")
+        super().__init__(model, adaptation)
+        self.fusion_period, self.reset_locals = fusion_period, reset_locals
+        self.master_share, self.shares = master_share, tuple(shares)
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(start, instruments)
+        names = list(self._used)
+        shares = self.shares or tuple((1.0 - self.master_share) / len(names) for _ in names)
+        if len(shares) != len(names):
+            raise ValueError(f"{len(shares)} shares do not fit {len(names)} aiding sensors: {', '.join(names)}")
+        model = self.model
+        self._common = c = len(model.transition)
+        starts = {name: [at[name] for at in (model.bias_at, model.scale_at) if name in at] for name in names}
+        stops = sorted([*(at for each in starts.values() for at in each), model.size])
+        self._locals: dict[str, _Local] = {}
+        for name, share in zip(names, shares):
+            own = [k for at in starts[name] for k in range(at, stops[stops.index(at) + 1])]
+            self._locals[name] = self._local(share, np.array(own, dtype=np.intp))
+        if self.master_share:
+            self._locals[""] = self._local(self.master_share, np.array([], dtype=np.intp))
+        period = self.fusion_period
+        self._period = max(1.0 / instruments[n].rate for n in names) if period is None else period
+        self._next = start.time + self._period
+        self._still = np.zeros(model.size - c)
+
+    def _local(self, share: float, own: NDArray[np.intp]) -> _Local:
+        c, covariance = self._common, self.covariance.copy()
+        covariance[:c, :c] /= share
+        return _Local(share, own, np.zeros(self.model.size), covariance)
+
+    def _propagate(self, until: float) -> None:
+        """Advance the reference and all filters, and fuse on the way."""
+        while self._period > 0.0 and self._next < until - SAME:
+            self._step(self._next)
+            self._fuse()
+        self._step(until)
+
+    def _step(self, until: float) -> None:
+        model, c = self.model, self._common
+        elapsed = until - model.time
+        if elapsed <= 0.0:
+            return
+        model.propagate(self.covariance, until)
+        transition, decay, density = model.transition, model._decay, model._density
+        kept = np.exp(-decay * elapsed)
+        for local in self._locals.values():
+            noise = model.process_noise / local.share
+            propagate_covariance(local.covariance, transition, noise, self._still, decay, density, elapsed)
+            local.error[:c] = transition @ local.error[:c]
+            local.error[c:] *= kept
+
+    def _estimate(self) -> Estimate:
+        """The master's estimate; fused, if the step ends with a fusion epoch."""
+        if self._period > 0.0 and self._next <= self.model.time + SAME:
+            self._fuse()
+        return super()._estimate()
+
+    def _observe(self, m: Measurement) -> Observation | None:
+        """What a measurement says of its local filter's state."""
+        linearised = self._linearise(m)
+        if linearised is None:
+            return None
+        local = self._locals[m.instrument]
+        residual, jacobian, noise = linearised
+        cross = np.dot(local.covariance, jacobian.T)
+        return residual - jacobian @ local.error, cross, np.dot(jacobian, cross), noise
+
+    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
+        """Correct the measurement's local filter."""
+        master, self._correcting = self.covariance, self._locals[m.instrument]
+        self.covariance = self._correcting.covariance
+        try:
+            super()._take(m, diagnostics, flagged)
+        finally:
+            self.covariance = master
+        if self._period == 0.0:
+            self._fuse()
+
+    def _correct(self, dx: Array) -> None:
+        """Correct the local filter whose turn it is."""
+        self._correcting.error[:] += dx
+
+    def _fuse(self) -> None:
+        """Add up the information of all local filters; correct the reference; share the sum out again."""
+        n, c = self.model.size, self._common
+        self._next += self._period
+        information, weighted = np.zeros((c, c)), np.zeros(c)
+        known = np.diag(self.covariance)[:c] > 0.0  # a state without any variance is the same in all filters
+        gain, conditional = np.zeros((n - c, c)), np.zeros((n - c, n - c))
+        for local in self._locals.values():
+            P = local.covariance
+            inverse = _inverse(P[:c, :c], known)
+            information += inverse
+            weighted += inverse @ local.error[:c]
+            own = local.own
+            if len(own):
+                gain[own - c] = P[own, :c] @ inverse
+                conditional[np.ix_(own - c, own - c)] = P[np.ix_(own, own)] - gain[own - c] @ P[:c, own]
+        fused = _inverse(information, known)
+        dx = np.zeros(n)
+        dx[:c] = fused @ weighted
+        for local in self._locals.values():
+            own = local.own
+            dx[own] = local.error[own] + gain[own - c] @ (dx[:c] - local.error[:c])
+        self.covariance[:] = _joint(fused, gain, conditional)
+        self.model.correct(dx)
+        for local in self._locals.values():
+            own = local.own
+            if self.reset_locals:
+                local.error[:] = 0.0
+                mine = np.zeros_like(gain)
+                mine[own - c] = gain[own - c]
+                local.covariance[:] = _joint(fused / local.share, mine, conditional)
+            else:
+                local.error[:c] -= dx[:c]
+                local.error[own] -= dx[own]
+
+
+def _inverse(matrix: Array, use: NDArray[np.bool_]) -> Array:
+    """Inverse of the rows and columns in use of a covariance or information matrix, scaled by its diagonal; else 0."""
+    inverse = np.zeros_like(matrix)
+    at = np.ix_(use, use)
+    part = matrix[at]
+    scale = 1.0 / np.sqrt(np.diag(part))
+    root = np.linalg.inv(np.linalg.cholesky(part * (scale[:, None] * scale)))
+    inverse[at] = (root.T @ root) * (scale[:, None] * scale)
+    return inverse
+
+
+def _joint(common: Array, gain: Array, conditional: Array) -> Array:
+    """Covariance of common states and those that follow them by a gain, with what is left of them."""
+    c, n = len(common), len(common) + len(gain)
+    joint = np.empty((n, n))
+    joint[:c, :c] = common
+    joint[c:, :c] = gain @ common
+    joint[:c, c:] = joint[c:, :c].T
+    own = conditional + joint[c:, :c] @ gain.T
+    joint[c:, c:] = 0.5 * (own + own.T)
+    return joint

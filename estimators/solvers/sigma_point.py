@@ -1,0 +1,147 @@
+"""Sigma-point Kalman filters on the manifold: unscented and cubature, one solver.
+
+With P = L L' of the n-component error of the model's state X, the points are X retracted by ``e_j = +-s L_j``
+(position in metres, attitude by a rotation vector, ...), ``s^2 = alpha^2 (n + kappa)``, and the weight of each is
+``w = 1/(2 s^2)``. A function f of the state (the motion over the time between two measurements, or what an instrument
+reads) is evaluated at all points, and with ``d_j = f(X_j) - f(X)`` in the chart about f(X),
+
+- mean ``f(X) + d``, with ``d = w sum d_j``
+- covariance ``w sum d_j d_j' + (beta - alpha^2) d d'``, plus the noise
+- cross-covariance with the state ``w sum e_j d_j'``
+
+This is the scaled unscented transform (S. J. Julier and J. K. Uhlmann, *Unscented filtering and nonlinear estimation*,
+Proc. IEEE 92, 2004; E. A. Wan and R. van der Merwe, *The unscented Kalman filter for nonlinear estimation*, 2000),
+rewritten: the centre point's weights, large and of opposite sign where alpha is small, have cancelled, so that nothing
+is lost to rounding, and the covariance is positive semi-definite by its form where ``beta >= alpha^2``. The
+third-degree cubature filter (I. Arasaratnam and S. Haykin, *Cubature Kalman filters*, IEEE Trans. Automatic Control 54,
+2009) has alpha = 1, beta = 0, kappa = 0: there the covariance is a mean of squares about the mean.
+
+Choices (``ALGORITHMS.md`` leaves them open; paper 000 compares with a UKF and gives neither points nor weights):
+
+- The mean is taken about the propagated centre, in one step, not by iteration on the manifold: the form above needs the
+  centre, and the step is exact but for the attitude, where what is left out is of third order in its uncertainty.
+- Points are drawn twice a measurement, before the motion and again before the measurement: points that went through the
+  motion lack the process noise, and the innovation's covariance would lack H Q H'.
+- They are drawn once between measurements, not at every IMU sample: the motion of minutes is nearly linear in its
+  errors, and the RMSE is the same.
+- The update of the covariance is Joseph's (`estimators.solvers.kalman.joseph_update`), and the square root accepts a
+  semi-definite matrix, so that a state known exactly does no harm.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from estimators.adaptations.base import Adaptation
+from estimators.models.points import PointModel
+from estimators.solvers.kalman import KalmanEstimator, Observation
+from simnav.compiled import kernel
+from simnav.types import Array, InitialState, Instruments, Measurement
+
+__all__ = ["SigmaPointEstimator", "draw_points"]
+
+
+@kernel("void(f8[:, ::1], f8, f8[:, ::1])")
+def draw_points(covariance, spread, points):  # type: ignore[no-untyped-def]
+    """Rows ``+spread L_j``, then ``-spread L_j``, of the columns of the Cholesky factor of a covariance.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        Positive semi-definite; a pivot of zero, or below it by rounding, gives a column of zeros.
+    spread : float
+    points : (2 n, n) array
+        Overwritten.
+    """
+    n = covariance.shape[0]
+    for j in range(n):
+        for i in range(j):
+            points[j, i] = 0.0
+        x = covariance[j, j]
+        for k in range(j):
+            x -= points[k, j] * points[k, j]
+        pivot = sqrt(x) if x > 1e-14 * covariance[j, j] else 0.0
+        points[j, j] = pivot
+        for i in range(j + 1, n):
+            x = covariance[i, j]
+            for k in range(j):
+                x -= points[k, i] * points[k, j]
+            points[j, i] = x / pivot if pivot > 0.0 else 0.0
+    for j in range(n):
+        for i in range(n):
+            points[j, i] *= spread
+            points[n + j, i] = -points[j, i]
+
+
+class SigmaPointEstimator(KalmanEstimator):
+    """A `KalmanEstimator` whose moments come from sigma points; a subclass says of which model, and registers.
+
+    Parameters
+    ----------
+    model : PointModel
+    adaptation : Adaptation, optional
+    alpha : float
+        Scale of the points, above 0: they lie ``alpha sqrt(n + kappa)`` sigma out. Small values see the neighbourhood
+        only, as an EKF does.
+    beta : float
+        What is known of the fourth moments; 2 is best for a Gaussian.
+    kappa : float
+        Above -n.
+    """
+
+    model: PointModel
+
+    def __init__(
+        self,
+        model: PointModel,
+        adaptation: Adaptation | None = None,
+        alpha: float = 0.5,
+        beta: float = 2.0,
+        kappa: float = 0.0,
+    ):
+        if not 0.0 < alpha < np.inf:
+            raise ValueError(f"alpha is the scale of the sigma points: a number above 0, not {alpha}")
+        super().__init__(model, adaptation)
+        self.alpha, self.beta, self.kappa = alpha, beta, kappa
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(start, instruments)
+        n = self.model.size
+        if not self.kappa > -n:
+            raise ValueError(f"kappa is above minus the number of states, {n}, not {self.kappa}")
+        self._spread = self.alpha * sqrt(n + self.kappa)
+        self._weight = 0.5 / self._spread**2
+        self._excess = self.beta - self.alpha**2
+        self._points = np.empty((2 * n, n))
+
+    def _moments(self, values: Array) -> tuple[Array, Array]:
+        """Mean and covariance of (2 n, m) differences from the centre."""
+        mean = self._weight * values.sum(axis=0)
+        covariance = self._weight * (values.T @ values)
+        covariance += self._excess * (mean[:, None] * mean)
+        return mean, covariance
+
+    def _propagate(self, until: float) -> None:
+        """Advance the state and the covariance through the points."""
+        if until <= self.model.time:
+            return
+        points = self._points
+        draw_points(self.covariance, self._spread, points)
+        noise = self.model.propagate_points(points, until)
+        mean, self.covariance[:] = self._moments(points)
+        self.covariance += noise
+        self.model.correct(mean)
+
+    def _observe(self, m: Measurement) -> Observation | None:
+        """Innovation, its covariance and its cross-covariance with the state, from points drawn afresh."""
+        linearised = self._linearise(m)
+        if linearised is None:
+            return None
+        points = self._points
+        draw_points(self.covariance, self._spread, points)
+        values = self.model.observe_points(m, points)
+        mean, predicted = self._moments(values)
+        return linearised.innovation - mean, self._weight * (points.T @ values), predicted, linearised.noise
