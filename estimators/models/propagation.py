@@ -332,7 +332,9 @@ def propagate_inertial(
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
-def propagate_covariance(covariance, transition, process_noise, calibration, rate, density, elapsed):  # type:
+def propagate_covariance(  # type: ignore[no-untyped-def]
+    covariance, transition, process_noise, calibration, rate, density, elapsed
+):
     """``P = Phi P Phi' + Q`` in place, where the states from the m-th on are Gauss-Markov biases of their own.
 
     Parameters

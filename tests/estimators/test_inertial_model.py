@@ -1,0 +1,270 @@
+"""The inertial model against finite differences and closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimators.models import measurements
+from estimators.models.base import gauss_markov
+from estimators.models.inertial import InertialModel
+from estimators.models.propagation import HELD_VELOCITY, propagate_covariance
+from simnav import earth, rotation
+from simnav.types import Datasheet, ImuDatasheet, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
+
+DEG = np.pi / 180.0
+
+SHEETS = (
+    Datasheet("gnss", "gnss_position", 1.0, np.ones(3), bias=np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
+    Datasheet("gnss_velocity", "gnss_velocity", 1.0, np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
+    Datasheet(
+        "dvl", "dvl", 1.0, np.ones(3), bias=np.full(3, 0.01), scale=0.01, misalignment=np.full(3, 0.01),
+        lever_arm=np.array([1.0, 0.5, 3.0]),
+    ),
+    Datasheet("magnetic", "magnetic_compass", 1.0, np.ones(1), bias=np.ones(1)),
+    Datasheet("gyrocompass", "gyrocompass", 1.0, np.ones(1)),
+    Datasheet("log", "speed_log", 1.0, np.ones(1), scale=0.01, lever_arm=np.array([1.0, 0.5, 3.0])),
+    Datasheet("depth", "depth", 1.0, np.ones(1), lever_arm=np.array([1.0, 0.5, 3.0])),
+    Datasheet("terrain", "terrain_fix", 1.0, np.ones(2), lever_arm=np.array([1.0, 0.5, 3.0])),
+)  # fmt: skip
+
+
+def perturbed(model: InertialModel, e: np.ndarray) -> InertialModel:
+    """The same model with an error added: estimate = truth + e, by the definitions of the error and nothing else."""
+    other = InertialModel.__new__(InertialModel)
+    other.__dict__.update(model.__dict__)
+    for name in ("_memory", "_turn", "_clock", "transition", "process_noise"):
+        setattr(other, name, getattr(model, name).copy())
+    other.raw_rate = other._clock[3:6]
+    other.position = earth.displace(model.position, e[:3])
+    other.velocity = model.velocity + e[3:6]
+    other.dcm = np.ascontiguousarray(rotation.dcm_from_rotation_vector(e[6:9]) @ model.dcm)
+    other.bias = model.bias + e[9:15]
+    other.calibration = model.calibration + e[15:]
+    other._jacobians = {}
+    return other
+
+
+def difference(a: InertialModel, b: InertialModel) -> np.ndarray:
+    """Error of a with respect to b, by its definition."""
+    return np.concatenate(
+        [
+            earth.relative_position(a.position, b.position),
+            a.velocity - b.velocity,
+            rotation.rotation_vector_from_dcm(a.dcm @ b.dcm.T),
+            a.bias - b.bias,
+            a.calibration - b.calibration,
+        ]
+    )
+
+
+@pytest.fixture
+def model(recording_of) -> InertialModel:
+    """A model in the middle of a voyage, turning and pitching, with biases."""
+    recording = recording_of(3, 20.0, aids=())
+    start = replace(recording.start, attitude=np.array([0.2, -0.15, 2.5]), velocity=np.array([3.0, -5.0, 0.4]))
+    m = InertialModel()
+    P = m.begin(start, Instruments(SHEETS, recording.instruments.imu))
+    m.load(recording.data.imu)
+    m.propagate(P, 7.004)
+    rng = np.random.default_rng(5)
+    m.bias += 1e-4 * rng.standard_normal(6)
+    m.calibration += 0.01 * rng.standard_normal(m.size - 15)
+    return m
+
+
+@pytest.mark.parametrize("sheet", SHEETS, ids=lambda s: s.name)
+def test_jacobians_by_finite_differences(model: InertialModel, sheet: Datasheet):
+    """The innovation falls by H e when the state has the error e."""
+    value = {
+        3: np.array([0.9, 0.1, 5.0]) if sheet.kind == "gnss_position" else np.array([3.0, 1.0, 0.5]),
+        2: np.array([0.9, 0.1]),
+        1: np.array([0.7]),
+    }[len(sheet.sigma)]
+    m = Measurement(7.0, sheet.name, sheet.kind, value)
+    jacobian = model.measure(m).jacobian.copy()
+    steps = np.concatenate([np.full(3, 1.0), np.full(3, 1e-2), np.full(3, 1e-5), np.full(6, 1e-5)])
+    steps = np.concatenate([steps, np.full(model.size - 15, 1e-4)])
+    numeric = np.empty_like(jacobian)
+    for k, h in enumerate(steps):
+        e = np.zeros(model.size)
+        e[k] = h
+        numeric[:, k] = (perturbed(model, -e).measure(m).innovation - perturbed(model, e).measure(m).innovation) / (
+            2 * h
+        )
+    # Products of scale, misalignment and bias with other errors are left out: 1 % of calibration times the rest.
+    tolerance = 0.05 if sheet.name in ("dvl", "log") else 1e-4
+    np.testing.assert_allclose(jacobian, numeric, atol=tolerance * np.abs(numeric).max(axis=1).max(), rtol=0)
+
+
+def test_jacobians_of_an_uncalibrated_dvl_and_log_are_exact(model: InertialModel):
+    model.calibration[:] = 0.0
+    for name in ("dvl", "log"):
+        sheet = model.instruments[name]
+        m = Measurement(7.0, name, sheet.kind, np.ones(len(sheet.sigma)))
+        jacobian = model.measure(m).jacobian.copy()
+        for k in range(model.size):
+            h = 1e-6
+            e = np.zeros(model.size)
+            e[k] = h
+            numeric = (perturbed(model, -e).measure(m).innovation - perturbed(model, e).measure(m).innovation) / (2 * h)
+            # Left out: the Earth's rate over the lever arm, as the attitude turns it.
+            np.testing.assert_allclose(jacobian[:, k], numeric, rtol=1e-5, atol=3e-4)
+
+
+def test_transition_by_finite_differences(model: InertialModel, recording_of):
+    """A second of the transition matrix against a second of the mechanization, each error in turn."""
+    recording = recording_of(3, 20.0, aids=())
+    P = np.eye(model.size)
+    scale = np.concatenate([np.full(3, 100.0), np.full(3, 1.0), np.full(3, 1e-4), np.full(3, 1e-5), np.full(3, 1e-3)])
+    numeric = np.empty((15, 15))
+
+    def after(m: InertialModel) -> InertialModel:
+        m.load(recording.data.imu)
+        m.propagate(P.copy(), 8.377)
+        return m
+
+    base = after(perturbed(model, np.zeros(model.size)))
+    for k in range(15):
+        e = np.zeros(model.size)
+        e[k] = scale[k]
+        plus, minus = after(perturbed(model, e)), after(perturbed(model, -e))
+        numeric[:, k] = 0.5 * (difference(plus, base) - difference(minus, base))[:15]
+    analytic = base.transition * scale
+    # Each error against the largest that it causes in a component of the same kind; below the floor it does not matter.
+    for first, floor in {0: 1e-5, 3: 1e-6, 6: 1e-7, 9: 1e-13, 12: 1e-13}.items():
+        rows = slice(first, first + 3)
+        size = np.maximum(np.abs(numeric[rows]).max(axis=0), floor)
+        worst = np.max(np.abs(analytic[rows] - numeric[rows]) / size, axis=0)
+        # The matrix is of second order in a block; what a gyroscope bias does to the position is of third.
+        limit = np.where(np.arange(15) // 3 == 3, 0.03, 5e-3) if first == 0 else 5e-3
+        assert np.all(worst < limit), (rows, worst)
+
+
+def test_process_noise_of_a_level_vehicle_at_rest():
+    """Closed form: white noise integrates to t, t^2/2, t^3/3; ten blocks come within a percent."""
+    gyro, accelerometer = 1e-5, 1e-3
+    imu = ImuDatasheet(100.0, TriadDatasheet(random_walk=gyro), TriadDatasheet(random_walk=accelerometer))
+    n = 200
+    g = float(earth.gravity(0.0, 0.0))
+    time = 0.01 * np.arange(1, n + 1)
+    model = InertialModel()
+    model.begin(InitialState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), np.eye(9)), Instruments((), imu))
+    rate = np.tile(earth.earth_rate(0.0), (n, 1))
+    model.load(ImuSamples(time, np.full(n, 0.01), rate, np.tile([0.0, 0.0, -g], (n, 1))))
+    model.propagate(np.eye(15), 2.0)
+    q, a, w, t = model.process_noise, accelerometer**2, gyro**2, 2.0
+    assert q[6, 6] == pytest.approx(w * t, rel=1e-6)
+    assert q[5, 5] == pytest.approx(a * t, rel=1e-4)
+    assert q[3, 3] == pytest.approx(a * t + g**2 * w * t**3 / 3, rel=1e-3)
+    assert q[0, 0] == pytest.approx(a * t**3 / 3 + g**2 * w * t**5 / 20, rel=1e-2)
+    assert q[0, 3] == pytest.approx(a * t**2 / 2 + g**2 * w * t**4 / 8, rel=1e-2)
+    assert abs(q[3, 7]) == pytest.approx(g * w * t**2 / 2, rel=1e-3)
+    assert np.array_equal(q, q.T)
+
+
+def test_splitting_the_way_changes_nothing(recording_of):
+    """Propagating in pieces that cut samples apart ends where one piece does."""
+    recording = recording_of(1, 10.0, aids=())
+    ends = {}
+    for name, stops in {"one": [10.0], "many": [0.013, 1.0, 1.007, 2.5, 2.513, 7.77, 10.0]}.items():
+        model = InertialModel()
+        P = model.begin(recording.start, recording.instruments)
+        model.load(recording.data.imu)
+        for stop in stops:
+            model.propagate(P, stop)
+        ends[name] = model, P
+    (a, P), (b, Q) = ends["one"], ends["many"]
+    e = difference(b, a)
+    assert np.abs(e[:3]).max() < 1e-4
+    assert np.abs(e[3:6]).max() < 2e-5
+    assert np.abs(e[6:9]).max() < 1e-6
+    np.testing.assert_allclose(np.diag(P), np.diag(Q), rtol=2e-3)
+
+
+def test_covariance_propagation_is_phi_p_phi_plus_q():
+    rng = np.random.default_rng(0)
+    n, m, dt = 18, 15, 0.7
+    root = rng.standard_normal((n, n))
+    P = root @ root.T
+    phi, q = rng.standard_normal((m, m)), np.diag(rng.random(m))
+    rate, density = np.array([0.1, 0.0, 2.0]), np.array([0.2, 0.3, 0.4])
+    full = np.zeros((n, n))
+    full[:m, :m], full[range(m, n), range(m, n)] = phi, np.exp(-rate * dt)
+    extra = [0.2 * (1 - np.exp(-0.2 * dt)) / 0.2, 0.3 * dt, 0.4 * (1 - np.exp(-4 * dt)) / 4]
+    noise = np.zeros((n, n))
+    noise[:m, :m], noise[range(m, n), range(m, n)] = q, extra
+    expected = full @ P @ full.T + noise
+    calibration = np.ones(3)
+    propagate_covariance(P, phi, q, calibration, rate, density, dt)
+    np.testing.assert_allclose(P, expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(calibration, np.exp(-rate * dt))
+
+
+def test_a_gap_in_the_imu_is_held_over(recording_of):
+    recording = recording_of(0, 300.0, aids=())
+    imu = recording.data.imu
+    keep = (imu.time <= 60.0) | (imu.time > 240.0)
+    model = InertialModel()
+    P = model.begin(recording.start, recording.instruments)
+    model.load(ImuSamples(imu.time[keep], imu.interval[keep], imu.angular_rate[keep], imu.specific_force[keep]))
+    model.propagate(P, 60.0)
+    before, sigma = model.velocity.copy(), P[3, 3]
+    model.propagate(P, 240.0)
+    assert model.held == pytest.approx(180.0, abs=0.05)
+    np.testing.assert_allclose(model.velocity, before, atol=0.05)
+    assert P[3, 3] > sigma + 0.9 * HELD_VELOCITY**2 * 180.0
+    model.propagate(P, 300.0)
+    assert model.held == pytest.approx(180.0, abs=0.05)
+    assert np.isfinite(P).all()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e9])
+def test_absurd_imu_samples_are_held_over(recording_of, bad: float):
+    recording = recording_of(0, 10.0, aids=())
+    imu = recording.data.imu
+    force = imu.specific_force.copy()
+    force[100:150, 1] = bad
+    model = InertialModel()
+    P = model.begin(recording.start, recording.instruments)
+    model.load(replace(imu, specific_force=force))
+    model.propagate(P, 10.0)
+    assert model.held == pytest.approx(1.0, abs=0.05)
+    assert np.isfinite(P).all()
+    assert np.linalg.norm(model.velocity) < 10.0
+
+
+def test_two_biases_in_one_state():
+    """Same value and slope of the autocovariance at lag 0, and never above the sum of the two."""
+    b, s, tau = 0.7, 0.4, 200.0
+    one = gauss_markov(b, s, tau)
+    assert one.variance == pytest.approx(b * b + s * s)
+    assert one.noise == pytest.approx(2.0 * one.variance * one.decay)  # stationary
+    lag = np.array([0.0, 1e-3, 10.0, 100.0, 1000.0])
+    ours, both = one.variance * np.exp(-one.decay * lag), b * b + s * s * np.exp(-lag / tau)
+    assert (ours[0] - ours[1]) == pytest.approx(both[0] - both[1], rel=1e-3)
+    assert np.all(ours[2:] < both[2:])
+    assert gauss_markov(0.0, s, tau) == pytest.approx((s * s, 1 / tau, 2 * s * s / tau, 0.0))
+    assert gauss_markov(b, 0.0, tau) == (b * b, 0.0, 0.0, 0.0)
+    assert gauss_markov(b, s, np.inf) == (b * b, 0.0, s * s, 0.0)
+    assert gauss_markov(b, s, 0.5) == (b * b, 0.0, 0.0, s * s)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "good"),
+    [
+        ("gnss_position", [0.9, 0.1, 5.0], True),
+        ("gnss_position", [50.0, 5.0, 5.0], False),
+        ("gnss_position", [0.9, 0.1, 1e9], False),
+        ("dvl", [1.0, np.nan, 0.0], False),
+        ("dvl", [1.0, 0.0, 0.0], True),
+        ("depth", [np.inf], False),
+        ("gyrocompass", [6.2], True),
+        ("gyrocompass", [300.0], False),
+        ("terrain_fix", [0.9, 0.1], True),
+    ],
+)
+def test_plausible(kind: str, value: list[float], good: bool):
+    assert measurements.plausible(kind, np.array(value)) is good
