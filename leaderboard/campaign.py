@@ -379,15 +379,21 @@ def _outcomes(
 
     left = dict(enumerate(units))
     for _ in range(1 + _RESTARTS):
+        if not left:
+            return
         try:
             for index, outcome in _parallel(left, workers, backend, scheduler):
                 yield left.pop(index), outcome
             return
         except BrokenProcessPool:
-            there = store.keys(units[0].folder)  # some of them finished what they could not tell
-            for index, unit in left.items():
-                missing = tuple((e, key) for e, key in unit.entrants if key not in there)
-                left[index] = replace(unit, entrants=missing)
+            there = store.keys(units[0].folder)  # some of it was finished, and could not be told any more
+            for index, unit in list(left.items()):
+                finished = tuple(entrant for entrant in unit.entrants if entrant[1] in there)
+                if finished:
+                    yield replace(unit, entrants=finished), Counter(there[key] for _, key in finished)
+                    left[index] = replace(unit, entrants=tuple(e for e in unit.entrants if e not in finished))
+                    if not left[index].entrants:
+                        del left[index]
     raise CampaignError(
         f"worker processes died {1 + _RESTARTS} times, as they do when the machine has no memory left; what is done is "
         "on disk, so try again with fewer workers"
@@ -412,6 +418,10 @@ def _parallel(
             stack.enter_context(parallel_config(backend="loky", n_jobs=workers, inner_max_num_threads=1))
             if workers > 1:
                 stack.callback(_stop_workers)
+        # Joblib's advice to whoever stops early, or whose worker was replaced, is not for the user.
+        stack.enter_context(warnings.catch_warnings())
+        for message in (".*tasks which were still being processed.*", "A worker stopped while some jobs.*"):
+            warnings.filterwarnings("ignore", message, UserWarning)
         parallel = Parallel(return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
         outcomes = parallel(delayed(_run_unit)(index, unit) for index, unit in list(units.items()))
         stack.callback(outcomes.close)
@@ -471,8 +481,7 @@ def _run_unit(index: int, unit: _Unit) -> tuple[int, Counter[str]]:
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
     try:
-        if unit.entrants:
-            recording = record(unit.scenario, unit.seed)
+        recording = record(unit.scenario, unit.seed)
     except Exception as error:
         reason = f"no recording: {' '.join(str(error).split()) or type(error).__name__}"
         for entrant, key in unit.entrants:

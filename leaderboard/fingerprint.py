@@ -113,7 +113,7 @@ def estimator_source(cls: type[Estimator]) -> str:
             parts.append(_closure_digest(path))
         else:
             parts.append(_installed_digest(package))
-    return digest(*parts)
+    return digest(*dict.fromkeys(parts))  # a package counts once, however many bases it has
 
 
 def _closure_digest(start: Path) -> str:
