@@ -149,9 +149,11 @@ def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report
     first = factory()
     name = first.name or type(first).__name__
     recording = contract_recording(0)
-    findings = [_output(run_trial(first, recording))]
-    if findings[0].ok:
-        # Before the first, other tests would only repeat what it said.
+    trial = run_trial(first, recording)
+    findings = [_output(trial)]
+    if trial.status == "diverged":
+        findings.append(_guarded(_units, factory, recording))  # they may be why
+    if findings[0].ok:  # otherwise the other tests would only repeat what was said
         tests = (_units, _determinism, _reset, _causality, _input, _aliasing, _silence, _missing)
         findings += [_guarded(test, factory, recording) for test in tests]
     return Report(name, tuple(findings), all(f.ok for f in findings))
