@@ -1,0 +1,205 @@
+"""The posterior Cramer-Rao bound of a scenario: how accurate any real-time estimator can be, by epoch.
+
+For a state that moves with Phi and Q and is measured with H and R, Jacobians at the truth, the information obeys ::
+
+    J+ = (Phi J^-1 Phi' + Q)^-1 + H' R^-1 H
+
+which is what a Kalman filter's covariance does on inputs without noise. So the oracle's own filter runs over
+`simnav.simulator.ideal`, which gives it the truth as measured, and its covariance is read.
+
+Kinds, and the oracle that each belongs to:
+
+- ``clean``: every measurement that is delivered counts with its noise without faults (``oracle-clairvoyant``)
+- ``flags``: each counts with the noise that it really had; one that a gross error hit, a frozen or a missing one does
+  not count (``oracle``)
+- ``mix``: for those who do not know which measurements a gross error hits. Each counts with the Fisher information of
+  the density of its noise, ``J = integral of (p')^2 / p`` (``oracle-mixture``)
+
+Errors that last (multipath, a bias step, a ramp) are states of the model, so that their correlation is in the bound.
+Each run has a trajectory and flags of its own: the information on the nine navigation errors is averaged over the runs,
+then inverted. It bounds the mean square error over runs, whose initial errors and biases are drawn from the initial
+covariance; a single run may be better.
+
+What it is not: a bound beyond the model. Where the model stands for the simulator's errors by something simpler (one
+Gauss-Markov state for a turn-on and an in-run bias, noise for an IMU's scale factor, in `estimators.models.inertial`;
+all of the motion, in `estimators.models.ship`), it is the bound of an estimator with that model. A disturbance of the
+IMU counts as known. Outages of random times count as known too. Smoothed output has a bound of its own.
+
+Source: P. Tichavsky, C. H. Muravchik and A. Nehorai, "Posterior Cramer-Rao bounds for discrete-time nonlinear
+filtering", IEEE Trans. Signal Processing 46(5), 1998.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.adaptations.truth import FisherNoise, NominalNoise, TrueNoise
+from estimators.oracle import Oracle
+from simnav.recording import Recording
+from simnav.scenario import Scenario
+from simnav.simulator import ideal
+from simnav.spec import SpecError
+from simnav.trial import run_trial
+from simnav.types import COMPONENTS, Array
+
+__all__ = ["KINDS", "Bound", "Kind", "bound", "information"]
+
+Kind = Literal["clean", "flags", "mix"]
+KINDS: tuple[Kind, ...] = ("clean", "flags", "mix")
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """The bound of a scenario.
+
+    Attributes
+    ----------
+    scenario : str
+        Its id.
+    kind : str
+    runs : int
+    time : (T,) array
+        Ends of the steps [s].
+    covariance : (T, 9, 9) array
+        Over `simnav.types.COMPONENTS`; NaN for what the model does not estimate.
+    """
+
+    scenario: str
+    kind: Kind
+    runs: int
+    time: Array
+    covariance: Array
+
+    @property
+    def sigma(self) -> Array:
+        """(T, 9) array: the bound on the standard deviation of each component [m, m/s, rad]."""
+        sigma: Array = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+        return sigma
+
+    @property
+    def horizontal(self) -> Array:
+        """(T,) array: the bound on the RMS horizontal position error [m]."""
+        distance: Array = np.hypot(self.sigma[:, 0], self.sigma[:, 1])
+        return distance
+
+    @property
+    def horizontal_rms(self) -> float:
+        """The bound on the horizontal RMSE of whole runs [m]."""
+        return float(np.sqrt(np.mean(self.horizontal**2)))
+
+    def summary(self) -> dict[str, Any]:
+        """A small dict for JSON: the RMS over the run and the last value of each component, SI units."""
+        sigma = self.sigma
+        known = np.isfinite(sigma).all(axis=0).tolist()
+        rms = np.sqrt(np.mean(sigma**2, axis=0))
+        return {
+            "scenario": self.scenario,
+            "kind": self.kind,
+            "runs": self.runs,
+            "duration_s": float(self.time[-1]),
+            "horizontal_rms_m": self.horizontal_rms,
+            "horizontal_last_m": float(self.horizontal[-1]),
+            "rms": {name: float(x) for name, x, k in zip(COMPONENTS, rms, known, strict=True) if k},
+            "last": {name: float(x) for name, x, k in zip(COMPONENTS, sigma[-1], known, strict=True) if k},
+        }
+
+
+class _Clean(Oracle):
+    knowledge: ClassVar[type[TrueNoise]] = NominalNoise
+
+
+class _Mix(Oracle):
+    knowledge: ClassVar[type[TrueNoise]] = FisherNoise
+
+
+_ESTIMATORS: dict[str, type[Oracle]] = {"clean": _Clean, "flags": Oracle, "mix": _Mix}
+
+
+def information(recording: Recording, kind: Kind = "flags") -> tuple[Array, NDArray[np.bool_]]:
+    """Information of one run on its navigation errors.
+
+    Parameters
+    ----------
+    recording : Recording
+        From `simnav.simulator.ideal`.
+    kind : str
+
+    Returns
+    -------
+    information : (T, m, m) array
+        On the m components that the model estimates.
+    estimated : (9,) bool array
+        Which they are.
+
+    Raises
+    ------
+    SpecError
+        If no model fits the instruments.
+    """
+    trial = run_trial(_ESTIMATORS[kind](), recording)
+    if trial.status != "ok" or trial.covariance is None:
+        raise SpecError(f"{recording.scenario}, seed {recording.seed}: there is no bound: {trial.reason}")
+    estimated: NDArray[np.bool_] = np.all(trial.estimated, axis=0)
+    covariance = trial.covariance[:, estimated][:, :, estimated]
+    return _inverse(covariance), estimated
+
+
+def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags") -> Bound:
+    """The posterior Cramer-Rao bound of a scenario, by epoch.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A simulated one.
+    seeds : iterable of int
+        Of the runs over which it is averaged; a dozen will do.
+    kind : str
+        ``clean``, ``flags`` or ``mix``, as the module says.
+
+    Returns
+    -------
+    Bound
+
+    Raises
+    ------
+    SpecError
+        On a recorded scenario, an unknown kind, or instruments that no model fits.
+    ValueError
+        Without seeds.
+
+    Examples
+    --------
+    >>> from simnav.scenario import load
+    >>> voyage = load("open-sea").model_copy(update={"duration": 20.0})
+    >>> bound(voyage, [1]).sigma.shape
+    (20, 9)
+    """
+    if kind not in KINDS:
+        raise SpecError(f"there is no bound of kind {kind!r}; there are: {', '.join(KINDS)}")
+    if scenario.recorded:
+        raise SpecError(f"{scenario.id} is a recorded run; its noise is not known, and so there is no bound")
+    total, runs = np.zeros(0), 0
+    for seed in seeds:
+        recording = ideal(scenario, seed)
+        j, estimated = information(recording, kind)
+        total = j if runs == 0 else total + j
+        runs += 1
+    if runs == 0:
+        raise ValueError("a bound needs at least one seed")
+    covariance = np.full((len(total), 9, 9), np.nan)
+    covariance[:, np.outer(estimated, estimated)] = _inverse(total / runs).reshape(len(total), -1)
+    return Bound(scenario.id, kind, runs, recording.data.truth.time.copy(), covariance)
+
+
+def _inverse(matrices: Array) -> Array:
+    """Inverses of symmetric positive definite matrices, computed in units of their own sigmas."""
+    sigma = np.sqrt(np.diagonal(matrices, axis1=1, axis2=2))
+    scale = sigma[:, :, None] * sigma[:, None, :]
+    inverse = np.linalg.inv(matrices / scale) / scale
+    symmetric: Array = 0.5 * (inverse + inverse.swapaxes(1, 2))
+    return symmetric
