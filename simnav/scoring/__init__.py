@@ -5,8 +5,8 @@
 - `series`: thinned errors and tracks, for plots.
 - `compare`: two estimators on the same seeds.
 
-The rooms: ``navigation_error``, ``accuracy``, ``outages``, ``consistency``, ``detection``, ``cost``, ``scores``,
-``plot_series``, ``comparison``.
+The rooms: ``navigation_error``, ``accuracy``, ``outages``, ``consistency``, ``detection``, ``noise_estimation``,
+``cost``, ``scores``, ``plot_series``, ``comparison``.
 """
 
 from __future__ import annotations

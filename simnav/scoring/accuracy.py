@@ -81,10 +81,13 @@ def accuracy(error: Array, recording: Recording) -> dict[str, float]:
         scores[f"{name}_rmse"] = rms(error[:, column])
         scores[f"{name}_mae"] = _mean_absolute(error[:, column])
         scores[f"{name}_max"] = _largest(error[:, column])
-    scores["velocity_horizontal_rmse"] = rms(np.hypot(error[:, 3], error[:, 4]))
-    scores["velocity_vertical_rmse"] = rms(error[:, 5])
+    speed = np.hypot(error[:, 3], error[:, 4])
+    scores["velocity_horizontal_rmse"], scores["velocity_horizontal_mae"] = rms(speed), _mean_absolute(speed)
+    for name, column in (("velocity_north", 3), ("velocity_east", 4), ("velocity_vertical", 5)):
+        scores[f"{name}_rmse"] = rms(error[:, column])
     scores["level_rmse"] = rms(np.hypot(error[:, 6], error[:, 7]))
-    scores["heading_rmse"] = rms(error[:, 8])
+    scores["tilt_north_rmse"], scores["tilt_east_rmse"] = rms(error[:, 6]), rms(error[:, 7])
+    scores["heading_rmse"], scores["heading_mae"] = rms(error[:, 8]), _mean_absolute(error[:, 8])
     scores["final_error"] = final
     scores["drift"] = 100.0 * final / distance if distance > 0.0 else float("nan")
     known = np.isfinite(recording.data.truth.position[:, :2]).all(axis=1)

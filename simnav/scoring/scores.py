@@ -13,6 +13,7 @@ from simnav.scoring.consistency import consistency
 from simnav.scoring.cost import cost
 from simnav.scoring.detection import detection
 from simnav.scoring.navigation_error import errors, horizontal, smoothed_errors
+from simnav.scoring.noise_estimation import noise_estimation
 from simnav.scoring.outages import outage_scores
 from simnav.trial import Trial
 
@@ -53,9 +54,15 @@ SCORES: Mapping[str, ScoreInfo] = {
     "vertical_mae": ScoreInfo("Vertical mean absolute error", "m", "lower"),
     "vertical_max": ScoreInfo("Vertical largest error", "m", "lower"),
     "velocity_horizontal_rmse": ScoreInfo("Horizontal velocity RMSE", "m/s", "lower"),
+    "velocity_horizontal_mae": ScoreInfo("Mean horizontal velocity error", "m/s", "lower"),
+    "velocity_north_rmse": ScoreInfo("North velocity RMSE", "m/s", "lower"),
+    "velocity_east_rmse": ScoreInfo("East velocity RMSE", "m/s", "lower"),
     "velocity_vertical_rmse": ScoreInfo("Vertical velocity RMSE", "m/s", "lower"),
     "level_rmse": ScoreInfo("Level (roll and pitch) RMSE", "rad", "lower"),
+    "tilt_north_rmse": ScoreInfo("Tilt about north RMSE", "rad", "lower"),
+    "tilt_east_rmse": ScoreInfo("Tilt about east RMSE", "rad", "lower"),
     "heading_rmse": ScoreInfo("Heading RMSE", "rad", "lower"),
+    "heading_mae": ScoreInfo("Mean heading error", "rad", "lower"),
     "final_error": ScoreInfo("Horizontal error at the last epoch", "m", "lower"),
     "drift": ScoreInfo("Horizontal error at the last epoch, of the distance travelled", "%", "lower"),
     "availability": ScoreInfo("Share of all epochs with a horizontal position", "-", "higher"),
@@ -71,7 +78,11 @@ SCORES: Mapping[str, ScoreInfo] = {
     "coverage_95": ScoreInfo("Coverage of the 95 % horizontal ellipse", "-", "nominal"),
     "detection_rate": ScoreInfo("Faulty measurements flagged", "-", "higher"),
     "false_alarm_rate": ScoreInfo("Sound measurements flagged", "-", "lower"),
+    "sigma_north_rmse": ScoreInfo("North sigma of the fixes: estimated minus true, RMSE", "m", "lower"),
+    "sigma_east_rmse": ScoreInfo("East sigma of the fixes: estimated minus true, RMSE", "m", "lower"),
     "smoothed_horizontal_rmse": ScoreInfo("Horizontal RMSE, smoothed", "m", "lower"),
+    "smoothed_north_rmse": ScoreInfo("North RMSE, smoothed", "m", "lower"),
+    "smoothed_east_rmse": ScoreInfo("East RMSE, smoothed", "m", "lower"),
     "smoothed_horizontal_max": ScoreInfo("Largest horizontal error, smoothed", "m", "lower"),
     "smoothed_vertical_rmse": ScoreInfo("Vertical RMSE, smoothed", "m", "lower"),
     "smoothed_heading_rmse": ScoreInfo("Heading RMSE, smoothed", "rad", "lower"),
@@ -106,11 +117,13 @@ def score(trial: Trial, recording: Recording) -> dict[str, float]:
     found |= outage_scores(error, recording)
     found |= consistency(trial, error)
     found |= detection(trial, recording)
+    found |= noise_estimation(trial, recording)
     found |= cost(trial)
     smoothed = smoothed_errors(trial, recording)
     if smoothed is not None:
         h = horizontal(smoothed)
         found["smoothed_horizontal_rmse"] = rms(h)
+        found["smoothed_north_rmse"], found["smoothed_east_rmse"] = rms(smoothed[:, 0]), rms(smoothed[:, 1])
         found["smoothed_horizontal_max"] = float(np.nanmax(h)) if np.isfinite(h).any() else np.nan
         found["smoothed_vertical_rmse"] = rms(smoothed[:, 2])
         found["smoothed_heading_rmse"] = rms(smoothed[:, 8])

@@ -1,0 +1,73 @@
+"""Noise estimation: the measurement noise that an estimator believes in, against the noise that there was.
+
+An adaptive estimator reports the sigma that it uses, epoch by epoch, as the diagnostics ``sigma_north.<instrument>``
+and ``sigma_east.<instrument>`` [m]; a recording knows the white noise that every measurement really had
+(`simnav.recording.AidStream.sigma`). The score is eq. 21 of G. Mao et al., "Robust GNSS/INS Integrated Navigation
+Algorithm Based on Adaptive Factor Graph Optimization", 2025, applied to the standard deviation as in its Table 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.recording import AidStream, Recording
+from simnav.trial import Trial
+from simnav.types import KINDS, Array
+
+__all__ = ["noise_estimation", "sigma_errors"]
+
+_AXES = ("north", "east")
+_TOLERANCE = 1e-6  # s; the end of a step and the time of a measurement are equal up to rounding
+
+
+def noise_estimation(trial: Trial, recording: Recording) -> dict[str, float]:
+    """How well an estimator knows the noise of the position fixes.
+
+    Parameters
+    ----------
+    trial : Trial
+    recording : Recording
+        The one that it was run on.
+
+    Returns
+    -------
+    dict
+        ``sigma_north_rmse``, ``sigma_east_rmse`` [m]: root mean square of estimated minus true sigma over all position
+        measurements (GNSS, terrain fixes) up to the trial's last epoch. NaN for an estimator that does not report an
+        estimate, and where the true sigma is not known.
+    """
+    scores = {}
+    for axis in _AXES:
+        parts = [sigma_errors(trial, stream, axis)[1] for stream in recording.data.aids.values()]
+        found = np.concatenate([p[np.isfinite(p)] for p in parts]) if parts else np.empty(0)
+        scores[f"sigma_{axis}_rmse"] = float(np.sqrt(np.mean(found * found))) if len(found) else float("nan")
+    return scores
+
+
+def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Array]:
+    """Estimated minus true sigma of one component of an instrument, measurement by measurement.
+
+    Parameters
+    ----------
+    trial : Trial
+    stream : AidStream
+    axis : str
+        Name of the component, as in ``KINDS[kind].errors``.
+
+    Returns
+    -------
+    time : (k,) array
+        Of the measurements up to the trial's last epoch [s].
+    error : (k,) array
+        The diagnostic ``sigma_<axis>.<instrument>`` at the end of the step that holds the measurement, minus the true
+        sigma; NaN where either is not known. Both are empty where the instrument has no such component or the
+        estimator no such diagnostic.
+    """
+    estimate = trial.diagnostics.get(f"sigma_{axis}.{stream.name}")
+    names = KINDS[stream.kind].errors
+    if estimate is None or axis not in names or estimate.ndim != 1 or not len(trial):
+        return np.empty(0), np.empty(0)
+    epoch = np.searchsorted(trial.time, stream.time - _TOLERANCE)
+    inside = epoch < len(trial)
+    true = stream.sigma[inside, names.index(axis)]
+    return stream.time[inside], np.asarray(estimate[epoch[inside]] - true)
