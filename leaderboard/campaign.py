@@ -12,10 +12,7 @@ import contextlib
 import importlib
 import importlib.util
 import os
-import random
 import re
-import signal
-import sys
 import time
 import warnings
 from collections import Counter
@@ -26,13 +23,11 @@ from typing import TYPE_CHECKING, Any
 
 from leaderboard import store
 from leaderboard.fingerprint import estimator_source, recording_digest, simulator_version, variant
-from leaderboard.isolation import Outcome, isolate
-from leaderboard.result import Result
+from leaderboard.isolation import isolate
+from leaderboard.worker import Entrant, Unit, run_unit
 
 if TYPE_CHECKING:
-    from simnav.recording import Recording
     from simnav.scenario import Scenario
-    from simnav.trial import Trial
 
 __all__ = ["CampaignError", "EstimatorRequest", "Progress", "Summary", "run_campaign", "time_limit"]
 
@@ -41,8 +36,6 @@ MEMORY = 2 << 30
 
 _IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
 _RESTARTS = 3  # of the workers, where one died
-#: What estimators import late; a worker that has it already starts the next one sooner.
-_LIBRARIES = ("gtsam", "scipy", "filterpy", "numba", "pandas")
 
 
 class CampaignError(RuntimeError):
@@ -136,50 +129,6 @@ class Summary:
         return self.computed - self.statuses.get("ok", 0) - self.statuses.get("unsuitable", 0)
 
 
-@dataclass(frozen=True)
-class _Entrant:
-    """A request, resolved: importable from any folder, and known by its sources."""
-
-    request: EstimatorRequest
-    reference: bool
-    source: str
-
-
-@dataclass(frozen=True, eq=False)
-class _Unit:
-    """One run and those who have not done it yet: what a worker is sent."""
-
-    scenario: Scenario
-    seed: int
-    entrants: tuple[tuple[_Entrant, str], ...]  # with their keys
-    recording: str
-    simulator: str
-    folder: Path
-    timeout: float
-    memory: int
-    parent: int
-
-    @property
-    def weight(self) -> float:
-        return self.scenario.duration * len(self.entrants)
-
-    def result(self, entrant: _Entrant, key: str, status: str, reason: str) -> Result:
-        request = entrant.request
-        return Result(
-            scenario=self.scenario.id,
-            seed=self.seed,
-            estimator=request.label,
-            parameters=dict(request.parameters),
-            reference=entrant.reference,
-            status=status,
-            reason=reason,
-            scores={},
-            key=key,
-            recording=self.recording,
-            simnav=self.simulator,
-        )
-
-
 def time_limit(scenario: Scenario) -> float:
     """Default time that an estimator may take for a run [s]: a fifth of real time, at least a minute."""
     return max(60.0, 0.2 * scenario.duration)
@@ -260,20 +209,20 @@ def run_campaign(
     simulator = simulator_version()
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     variants = {
-        s.id: {e.request.label: _variant(e, recordings[s.id]) for e in entrants} for s in scenarios
+        s.id: {e.label: _variant(e, recordings[s.id]) for e in entrants} for s in scenarios
     }  # scenario -> label -> variant
     current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
     store.select(path, current)
 
-    units: list[_Unit] = []
+    units: list[Unit] = []
     for seed in seeds:
         for scenario in scenarios:
-            keyed = ((e, f"{variants[scenario.id][e.request.label]}-{seed}") for e in entrants)
+            keyed = ((e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants)
             missing = tuple((e, key) for e, key in keyed if key not in there)
             if missing:
                 limit = time_limit(scenario) if timeout is None else timeout
                 units.append(
-                    _Unit(scenario, seed, missing, recordings[scenario.id], simulator, path, limit, memory, os.getpid())
+                    Unit(scenario, seed, missing, recordings[scenario.id], simulator, path, limit, memory, os.getpid())
                 )
     total = len(seeds) * len(scenarios) * len(entrants)
     skipped = total - sum(len(u.entrants) for u in units)
@@ -308,16 +257,15 @@ def _unique(what: str, labels: list[str]) -> None:
         raise CampaignError(f"the {what} {twice[0]!r} was asked for twice{hint}")
 
 
-def _variant(entrant: _Entrant, recording: str) -> str:
-    request = entrant.request
+def _variant(entrant: Entrant, recording: str) -> str:
     # Of a file only the name of the class counts, not the folder: its sources have a digest.
-    return variant(recording, request.label, os.path.basename(request.name), request.parameters, entrant.source)
+    return variant(recording, entrant.label, os.path.basename(entrant.name), entrant.parameters, entrant.source)
 
 
 # --- before the run -----------------------------------------------------------------------------------
 
 
-def _resolve(request: EstimatorRequest) -> _Entrant:
+def _resolve(request: EstimatorRequest) -> Entrant:
     """Find an estimator and look at it, in isolation: importing a file runs it."""
     name = request.name
     file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
@@ -330,7 +278,7 @@ def _resolve(request: EstimatorRequest) -> _Entrant:
         reason = outcome.reason.removeprefix("EstimatorError: ").removeprefix("CampaignError: ")
         raise CampaignError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
     reference, source = outcome.value
-    return _Entrant(replace(request, name=name), reference, source)
+    return Entrant(name, dict(request.parameters), request.label, reference, source)
 
 
 def _describe(name: str, parameters: dict[str, Any]) -> tuple[bool, str]:
@@ -372,8 +320,8 @@ def _compile(report: Callable[[Progress], None]) -> None:
 
 
 def _outcomes(
-    units: list[_Unit], workers: int, backend: str, scheduler: str | None
-) -> Generator[tuple[_Unit, Counter[str]], None, None]:
+    units: list[Unit], workers: int, backend: str, scheduler: str | None
+) -> Generator[tuple[Unit, Counter[str]], None, None]:
     """Run the units and yield what became of them, in the order in which they end."""
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
@@ -401,7 +349,7 @@ def _outcomes(
 
 
 def _parallel(
-    units: Mapping[int, _Unit], workers: int, backend: str, scheduler: str | None
+    units: Mapping[int, Unit], workers: int, backend: str, scheduler: str | None
 ) -> Iterator[tuple[int, Counter[str]]]:
     from joblib import Parallel, delayed, parallel_config
 
@@ -423,7 +371,7 @@ def _parallel(
         for message in (".*tasks which were still being processed.*", "A worker stopped while some jobs.*"):
             warnings.filterwarnings("ignore", message, UserWarning)
         parallel = Parallel(return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-        outcomes = parallel(delayed(_run_unit)(index, unit) for index, unit in list(units.items()))
+        outcomes = parallel(delayed(run_unit)(index, unit) for index, unit in list(units.items()))
         stack.callback(outcomes.close)
         yield from outcomes
 
@@ -448,105 +396,3 @@ def _environment(**values: str) -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
-
-
-# --- in a worker --------------------------------------------------------------------------------------
-
-_prepared = False
-
-
-def _prepare_worker(parent: int) -> None:
-    """Once a worker: Ctrl-C is the parent's business, and kernels are loaded before the first fork."""
-    global _prepared
-    if _prepared:
-        return
-    _prepared = True
-    if os.getpid() != parent:
-        with contextlib.suppress(ValueError):  # not in the main thread of a Dask worker
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from simnav.estimator import names
-    from simnav.warmup import warmup
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a broken plug-in the parent has warned
-        warmup(load=True)
-        names()
-
-
-def _run_unit(index: int, unit: _Unit) -> tuple[int, Counter[str]]:
-    """Record a run and try everyone on it; return how many ended how."""
-    from simnav.source import record
-
-    _prepare_worker(unit.parent)
-    statuses: Counter[str] = Counter()
-    recording: Recording | None = None
-    try:
-        recording = record(unit.scenario, unit.seed)
-    except Exception as error:
-        reason = f"no recording: {' '.join(str(error).split()) or type(error).__name__}"
-        for entrant, key in unit.entrants:
-            store.write(unit.folder, unit.result(entrant, key, "no-recording", reason))
-            statuses["no-recording"] += 1
-    if recording is not None:
-        for entrant, key in unit.entrants:
-            result = _try(unit, entrant, key, recording)
-            store.write(unit.folder, result)
-            statuses[result.status] += 1
-    return index, statuses
-
-
-def _try(unit: _Unit, entrant: _Entrant, key: str, recording: Recording) -> Result:
-    """One estimator on one recording."""
-    import numpy as np
-
-    from simnav.scoring import score, series
-
-    request = entrant.request
-    outcome: Outcome = isolate(
-        _attempt,
-        request.name,
-        dict(request.parameters),
-        recording,
-        timeout=unit.timeout,
-        memory=unit.memory,
-    )
-    blank = replace(
-        unit.result(entrant, key, outcome.status, outcome.reason),
-        note=recording.note,
-        seconds=outcome.seconds,
-        peak_memory=outcome.peak_memory,
-    )
-    if outcome.status != "ok":
-        return blank
-    trial, libraries = outcome.value
-    for name in libraries:  # the next one need not import them again
-        with contextlib.suppress(Exception):
-            importlib.import_module(name)
-    try:
-        scores = score(trial, recording) if len(trial) else {}
-        curves = series(trial, recording) if len(trial) else {}
-    except Exception as error:
-        return replace(blank, status="error", reason=f"it cannot be scored: {type(error).__name__}: {error}")
-    return replace(
-        blank,
-        status=trial.status,
-        reason=trial.reason,
-        scores=scores,
-        series={name: np.asarray(values, dtype=np.float32) for name, values in curves.items()},
-    )
-
-
-def _attempt(name: str, parameters: dict[str, Any], recording: Recording) -> tuple[Trial, list[str]]:
-    """In the isolated process: make the estimator and run it."""
-    import numpy as np
-
-    from simnav.estimator import make
-    from simnav.trial import run_trial
-
-    before = set(sys.modules)
-    # Whoever draws from a global generator gets the same numbers in every campaign.
-    random.seed(recording.seed)
-    np.random.seed(recording.seed % 2**32)  # noqa: NPY002
-    trial = run_trial(make(name, **parameters), recording)
-    new = [m for m in sorted(set(sys.modules) - before) if m.partition(".")[0] in _LIBRARIES]
-    return trial, new
