@@ -77,7 +77,9 @@ def _bias(model: InertialModel, sheet: Datasheet, jacobian: Array, predicted: li
 
 
 @kernel("void(b1, f8, f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
-def velocity_of_arm(body, latitude, dcm, velocity, rate, bias, arm, jacobian, predicted):  # type:
+def velocity_of_arm(  # type: ignore[no-untyped-def]
+    body, latitude, dcm, velocity, rate, bias, arm, jacobian, predicted
+):
     """Velocity at the end of a lever arm, in body axes or north-east-down, and its Jacobian (equations in the module).
 
     Parameters
