@@ -3,10 +3,27 @@
 Importing the package registers the rows; compiled code and large libraries load when an estimator first runs.
 """
 
+from estimators.adaptive import (
+    Adkf,
+    AdkfPaper,
+    FadingEkf,
+    GatedEkf,
+    HuberKf,
+    Iae,
+    IaeFixed,
+    Igg3,
+    Imm,
+    Mckf,
+    Rae,
+    SageHusaKf,
+    SageHusaPaper,
+    VbAkf,
+)
 from estimators.dead_reckoning import DeadReckoning
 from estimators.ekf import Ekf
 from estimators.ekf_presets import Ekf9, Ekf23
 from estimators.federated import Federated, FederatedNoReset
+from estimators.filterpy_rows import FilterpyUkf
 from estimators.gnss_only import GnssOnly
 from estimators.inertial import PureInertial
 from estimators.invariant import InvariantEkf
@@ -19,27 +36,42 @@ from estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
 from estimators.smoothers import EkfRts, ShipEkfRts
 
 __all__ = [
+    "Adkf",
+    "AdkfPaper",
     "Ckf",
     "DeadReckoning",
     "Ekf",
     "Ekf9",
     "Ekf23",
     "EkfRts",
+    "FadingEkf",
     "Federated",
     "FederatedNoReset",
+    "FilterpyUkf",
+    "GatedEkf",
     "GnssOnly",
+    "HuberKf",
+    "Iae",
+    "IaeFixed",
+    "Igg3",
+    "Imm",
     "InvariantEkf",
     "IteratedEkf",
     "Kf",
     "Kf23",
+    "Mckf",
     "Oracle",
     "OracleClairvoyant",
     "OracleMixture",
     "OracleRts",
     "PureInertial",
+    "Rae",
+    "SageHusaKf",
+    "SageHusaPaper",
     "ShipCkf",
     "ShipEkf",
     "ShipEkfRts",
     "ShipUkf",
     "Ukf",
+    "VbAkf",
 ]
