@@ -1,0 +1,205 @@
+"""Adaptive robust factors (paper 003, "ADKF"): three statistics, three factor functions, two targets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import exp, sqrt
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from estimators.adaptations.base import Innovation
+from estimators.adaptations.gating import chi_square_limits
+from estimators.adaptations.noise import NoiseAdaptation, Posterior
+from estimators.adaptations.robust import igg3
+from simnav.types import Array, Instruments
+
+__all__ = ["FACTORS", "AdaptiveFactor", "exponential", "three_segment", "two_segment"]
+
+Statistic = Literal["discrepancy", "residual", "ratio"]
+Factor = Literal["two-segment", "three-segment", "exponential"]
+
+FIX_KINDS = ("gnss_position", "gnss_velocity", "terrain_fix")
+LOG_KINDS = ("dvl", "speed_log")
+
+
+def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
+    """Eq. 34: 1 up to c0, then ``c0/s``; continuous.
+
+    Examples
+    --------
+    >>> two_segment(0.5, 1.0), two_segment(4.0, 1.0)
+    (1.0, 0.25)
+    """
+    return 1.0 if s <= c0 else c0 / s
+
+
+def three_segment(s: float, c0: float, c1: float) -> float:
+    """Eq. 35, the same function as IGG-III: 1 up to c0, falling to 0 at c1; continuous."""
+    return igg3(s, c0, c1)
+
+
+def exponential(s: float, c0: float, c1: float = 0.0) -> float:
+    """Eq. 36: 1 up to c0, then ``exp(-(s - c0)^2)``; continuous."""
+    return 1.0 if s <= c0 else exp(-min((s - c0) ** 2, 700.0))
+
+
+#: The factor functions of the paper, by name; the statistic, c0 and c1 in, the factor in [0, 1] out.
+FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
+    "two-segment": two_segment,
+    "three-segment": three_segment,
+    "exponential": exponential,
+}
+
+
+class _Preset(NamedTuple):
+    c0: Mapping[str, float]
+    c1: float
+
+
+#: Thresholds: those of the paper's experiment, and ours for whitened statistics, which exceed 2 seldom on clean data.
+PRESETS = {
+    "paper": _Preset({"two-segment": 1.0, "three-segment": 1.5, "exponential": 1.0}, 4.0),
+    "default": _Preset({"two-segment": 2.0, "three-segment": 2.0, "exponential": 2.0}, 8.0),
+}
+
+
+class AdaptiveFactor(NoiseAdaptation):
+    """Divides R, or P, by a factor ``a`` in (0, 1] that falls as a statistic of the innovation grows.
+
+    Zhan et al. (2026), PLoS One 21(2) e0342016 (paper 003), eqs. 23-36; Yang and Gao (2006), J. Geodesy 80. With the
+    innovation v of m components, ``S = H P H' + R``, the correction dx and the residual e after the update:
+
+    ===========  ============================  ==========================================================
+    statistic    printed (``paper``)           default: whitened, 1 on average where the filter is right
+    ===========  ============================  ==========================================================
+    discrepancy  |dx| / sqrt(tr P)    (30)     sqrt(dx' P^-1 dx / r_x),  r_x = tr(S^-1 H P H')
+    residual     v'v / sqrt(tr S)     (31)     sqrt(v' S^-1 v / m)
+    ratio        s_x^2 / s_0^2     (32-33)     sqrt(s_x^2 / mean s_0^2)
+    ===========  ============================  ==========================================================
+
+    with ``s_x^2 = dx' P^-1 dx / r_x`` and ``s_0^2 = e' R^-1 e / r``, ``r = m - r_x``. Eq. 30 compares the posterior
+    with the prediction and adds metres to radians; eq. 31 as printed is a length and fires nearly always; the ratio
+    of one epoch is 1 whatever happens where m = 1, so that the default compares with the mean s_0^2 of about the last
+    20 epochs. The factor functions are eqs. 34-36 (`FACTORS`); a is floored at 1e-3, since eq. 35 gives 0 and eq. 28
+    divides by it.
+
+    ``target="P"`` is eq. 28: P/a, for each measurement. ``target="R"`` is what the text does in the end ("the adaptive
+    factor can be used to inflate the measurement noise"): R/a by instrument; with the residual statistic and the
+    three-segment function these are IGG-III weights. By default it also doubts the prediction when the chi-square tests
+    of a position or velocity fix and of a DVL or log have failed ``together`` times running: then R stands and P is
+    inflated by the square of the residual statistic, at most `LARGEST`. Gross errors of the two that coincide once do
+    not count as a failure of the model. The covariance is Joseph's with the noise and P in use (eq. 29's first line
+    lacks the factor).
+
+    Parameters
+    ----------
+    statistic : "discrepancy", "residual" or "ratio"
+    factor : "two-segment", "three-segment" or "exponential"
+    target : "R" or "P"
+    preset : "default" or "paper"
+        ``paper``: statistics and thresholds as printed, no doubt of the prediction with target R.
+    c0, c1 : float or None
+        Thresholds; None: the preset's (paper: c = 1; c0 = 1.5, c1 = 4).
+    together : int
+        See above; 0: never.
+    """
+
+    SMALLEST = 1e-3
+    LARGEST = 100.0
+    RECENT = 5.0  # s; a failure older than this is no company
+
+    def __init__(
+        self,
+        statistic: Statistic = "residual",
+        factor: Factor = "three-segment",
+        target: Literal["R", "P"] = "R",
+        preset: Literal["default", "paper"] = "default",
+        c0: float | None = None,
+        c1: float | None = None,
+        together: int = 3,
+    ):
+        for name, value, known in (
+            ("statistic", statistic, ("discrepancy", "residual", "ratio")),
+            ("factor", factor, tuple(FACTORS)),
+            ("target", target, ("R", "P")),
+            ("preset", preset, tuple(PRESETS)),
+        ):
+            if value not in known:
+                raise ValueError(f"{name} = {value!r}: it must be one of {', '.join(known)}")
+        self.statistic, self.target, self.printed = statistic, target, preset == "paper"
+        self.c0 = PRESETS[preset].c0[factor] if c0 is None else c0
+        self.c1 = PRESETS[preset].c1 if c1 is None else c1
+        if not (self.c0 > 0.0 and (factor != "three-segment" or self.c1 > self.c0)):
+            raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
+        self.factor = FACTORS[factor]
+        self.together = 0 if self.printed else together
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._limits = chi_square_limits(0.999)
+        self._groups = {n: 0 if s.kind in FIX_KINDS else 1 for n, s in instruments.items() if s.kind in _DOUBTED}
+        self._failures: dict[str, tuple[int, float]] = {}
+        self._variance: dict[str, float] = {}
+
+    def choose(self, innovation: Innovation) -> Array:
+        """The noise, over the factor where R is the target; sets the inflation of P."""
+        name = innovation.measurement.instrument
+        posterior = Posterior(innovation, innovation.noise)
+        self.inflation = 1.0
+        if posterior.nis < 0.0:  # singular: the solver leaves it out
+            return innovation.noise
+        factor = max(self.factor(self._statistic(innovation, posterior), self.c0, self.c1), self.SMALLEST)
+        if self.target == "P":
+            self.inflation = 1.0 / factor
+        elif self._model_fails(innovation, posterior.nis):
+            self.inflation = min(max(posterior.nis / len(innovation.residual), 1.0), self.LARGEST)
+            factor = 1.0
+        self.report(f"factor.{name}", factor)
+        if self.target == "P" or factor == 1.0:
+            return innovation.noise
+        return innovation.noise / factor
+
+    def _statistic(self, innovation: Innovation, posterior: Posterior) -> float:
+        m = len(innovation.residual)
+        if self.statistic == "residual":
+            if not self.printed:
+                return sqrt(posterior.nis / m)
+            v = innovation.residual
+            return float(v @ v) / sqrt(float(np.trace(innovation.predicted) + np.trace(innovation.noise)))
+        # y = S^-1 v = R^-1 e, and S^-1 H P H' = R^-1 H P+ H'
+        solved = np.linalg.solve(innovation.noise, np.column_stack((posterior.residual, posterior.predicted)))
+        y = solved[:, 0]
+        if self.statistic == "discrepancy" and self.printed:
+            if innovation.covariance is None or innovation.cross is None:
+                raise ValueError("the printed discrepancy (eq. 30) needs P and P H' in the innovation")
+            return float(np.linalg.norm(innovation.cross @ y) / sqrt(float(np.trace(innovation.covariance))))
+        share = min(max(float(np.trace(solved[:, 1:])), 1e-9), m - 1e-9)
+        moved = max(float(posterior.correction @ y), 0.0) / share
+        if self.statistic == "discrepancy":
+            return sqrt(moved)
+        left = max(float(posterior.residual @ y), 1e-12) / (m - share)
+        if self.printed:
+            return moved / left
+        name = innovation.measurement.instrument
+        usual = self._variance.get(name, 1.0)
+        self._variance[name] = 0.95 * usual + 0.05 * left
+        return sqrt(moved / usual)
+
+    def _model_fails(self, innovation: Innovation, nis: float) -> bool:
+        """Whether this instrument and one of the other group have failed often enough running."""
+        name, time = innovation.measurement.instrument, innovation.measurement.time
+        group = self._groups.get(name)
+        if group is None or not self.together:
+            return False
+        failed = nis > self._limits[len(innovation.residual)]
+        count = self._failures.get(name, (0, time))[0] + 1 if failed else 0
+        self._failures[name] = count, time
+        return count >= self.together and any(
+            self._groups[other] != group and n >= self.together and time - t <= self.RECENT
+            for other, (n, t) in self._failures.items()
+        )
+
+
+_DOUBTED = (*FIX_KINDS, *LOG_KINDS)

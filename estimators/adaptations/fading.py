@@ -1,0 +1,41 @@
+"""Fading memory: P is inflated, so that old information counts for less."""
+
+from __future__ import annotations
+
+from math import exp
+
+from estimators.adaptations.base import Innovation
+from estimators.adaptations.noise import NoiseAdaptation
+from simnav.types import Array, Instruments
+
+__all__ = ["FadingMemory"]
+
+
+class FadingMemory(NoiseAdaptation):
+    """Old information loses weight as ``exp(-age/memory)``.
+
+    Simon (2006), section 7.4: ``P <- a^2 F P F' + Q``, here with ``a^2 = exp(dt/memory)``, so that the memory does not
+    depend on how many instruments there are. P is inflated when a measurement comes.
+
+    Parameters
+    ----------
+    memory : float
+        [s]
+    """
+
+    def __init__(self, memory: float = 1000.0):
+        if not memory > 0.0:
+            raise ValueError(f"memory = {memory:g} s: it must be above 0")
+        self.memory = memory
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._time: float | None = None
+
+    def choose(self, innovation: Innovation) -> Array:
+        """The nominal noise."""
+        time = innovation.measurement.time
+        self.inflation = exp((time - self._time) / self.memory) if self._time is not None else 1.0
+        self._time = time
+        return innovation.noise

@@ -1,0 +1,56 @@
+"""Chi-square gating, with a way back."""
+
+from __future__ import annotations
+
+from estimators.adaptations.base import Innovation
+from estimators.adaptations.noise import NoiseAdaptation, Posterior
+from simnav.types import Array, Instruments
+
+__all__ = ["ChiSquareGate", "chi_square_limits"]
+
+
+def chi_square_limits(probability: float) -> list[float]:
+    """Limits of chi-square of 0, 1, 2, 3 degrees of freedom that hold with a probability."""
+    from scipy.special import chdtri
+
+    return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]
+
+
+class ChiSquareGate(NoiseAdaptation):
+    """Leaves out a measurement whose normalised innovation squared fails its chi-square test.
+
+    Bar-Shalom, Li and Kirubarajan (2001), section 5.4; Groves (2013), section 17.3.1. A gate alone can lock a filter
+    out for ever: once it is wrong and sure, every good measurement fails. So where an instrument has failed for
+    ``patience`` seconds without a pass, it is the filter that is doubted: its measurements are used again, until one
+    passes.
+
+    Parameters
+    ----------
+    probability : float
+        Of a good measurement to pass.
+    patience : float
+        [s]
+    """
+
+    def __init__(self, probability: float = 0.999, patience: float = 10.0):
+        if not 0.0 < probability < 1.0:
+            raise ValueError(f"probability = {probability:g}: it must lie between 0 and 1")
+        if not patience >= 0.0:
+            raise ValueError(f"patience = {patience:g} s: it must not be negative")
+        self.probability, self.patience = probability, patience
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._limits = chi_square_limits(self.probability)
+        self._failing: dict[str, float] = {}
+
+    def choose(self, innovation: Innovation) -> Array | None:
+        """The nominal noise, or None."""
+        nis = Posterior(innovation, innovation.noise).nis
+        name, time = innovation.measurement.instrument, innovation.measurement.time
+        if nis <= self._limits[len(innovation.residual)]:
+            self._failing.pop(name, None)
+            return innovation.noise
+        since = self._failing.setdefault(name, time)
+        return innovation.noise if time - since >= self.patience else None

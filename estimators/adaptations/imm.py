@@ -1,0 +1,215 @@
+"""Interacting multiple models over the level of an instrument's noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, log, sqrt
+
+import numpy as np
+
+from estimators.models.base import ErrorModel
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.compiled import kernel
+from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
+
+__all__ = ["ImmEstimator", "mixture_update"]
+
+
+@kernel("f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def mixture_update(  # type: ignore[no-untyped-def]
+    covariance, cross, predicted, noise, residual, variances, probability, correction
+):
+    """Kalman update with every noise level, weighed by likelihood and merged by moments, in place.
+
+    With ``S_j = H P H' + variances_j R``, ``y_j = S_j^-1 v`` and mu_j proportional to the probability times N(v; 0,
+    S_j): the correction is ``P H' sum(mu_j y_j)``, and P loses ``P H' (sum(mu_j S_j^-1) - spread of y_j) H P``.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        P, updated.
+    cross : (n, m) array
+        P H'.
+    predicted, noise : (m, m) array
+        H P H' and R.
+    residual : (m,) array
+        v.
+    variances, probability : (j,) arrays
+        Of each level: its variance in units of R, and its probability, which is updated.
+    correction : (n,) array
+        Overwritten.
+
+    Returns
+    -------
+    float
+        Normalised innovation squared of the first level; -1 where an S_j is singular, and nothing is changed.
+    """
+    n, m = cross.shape
+    count = variances.size
+    inverses, solved = np.zeros((count, m, m)), np.zeros((count, m))
+    likelihood, distance = np.empty(count), np.empty(count)
+    L, W = np.zeros((m, m)), np.zeros((m, m))
+    for j in range(count):
+        determinant = 0.0
+        for r in range(m):
+            for c in range(r + 1):
+                s = predicted[r, c] + variances[j] * noise[r, c]
+                x = s
+                for k in range(c):
+                    x -= L[r, k] * L[c, k]
+                if r == c:
+                    if not x > 1e-14 * s:
+                        return -1.0
+                    L[r, r] = sqrt(x)
+                    determinant += log(x)
+                else:
+                    L[r, c] = x / L[c, c]
+        for c in range(m):  # W = L^-1
+            for r in range(c, m):
+                x = 1.0 if r == c else 0.0
+                for k in range(c, r):
+                    x -= L[r, k] * W[k, c]
+                W[r, c] = x / L[r, r]
+        for r in range(m):
+            for c in range(m):
+                x = 0.0
+                for k in range(max(r, c), m):
+                    x += W[k, r] * W[k, c]
+                inverses[j, r, c] = x
+        nis = 0.0
+        for r in range(m):
+            x = 0.0
+            for c in range(m):
+                x += inverses[j, r, c] * residual[c]
+            solved[j, r] = x
+            nis += x * residual[r]
+        distance[j] = nis
+        likelihood[j] = -0.5 * (nis + determinant)
+    best = likelihood.max()
+    total = 0.0
+    for j in range(count):
+        likelihood[j] = probability[j] * exp(likelihood[j] - best)
+        total += likelihood[j]
+    if not total > 0.0:
+        return -1.0
+    merged = np.zeros(m)
+    for j in range(count):
+        probability[j] = likelihood[j] / total
+        for r in range(m):
+            merged[r] += probability[j] * solved[j, r]
+    information = np.zeros((m, m))
+    for j in range(count):
+        for r in range(m):
+            for c in range(m):
+                apart = (solved[j, r] - merged[r]) * (solved[j, c] - merged[c])
+                information[r, c] += probability[j] * (inverses[j, r, c] - apart)
+    half = np.zeros((n, m))
+    for r in range(n):
+        correction[r] = 0.0
+        for i in range(m):
+            correction[r] += cross[r, i] * merged[i]
+            for k in range(m):
+                half[r, i] += cross[r, k] * information[k, i]
+    for r in range(n):
+        for c in range(r + 1):
+            x = covariance[r, c]
+            for i in range(m):
+                x -= half[r, i] * cross[c, i]
+            covariance[r, c] = x
+            covariance[c, r] = x
+    return distance[0]
+
+
+class ImmEstimator(KalmanEstimator):
+    """Kalman filter in which every instrument's noise jumps between levels, after a Markov chain of its own.
+
+    Blom and Bar-Shalom (1988), "The interacting multiple model algorithm for systems with Markovian switching
+    coefficients"; Bar-Shalom, Li and Kirubarajan (2001), section 11.6. The levels differ in R alone and the instruments
+    switch independently, so that with J levels and several instruments there would be J filters for each combination of
+    levels. Here the J updates of a measurement share one prediction, and their results are merged, with the spread of
+    their means, before the next: mode probabilities interact, mode-conditioned estimates do not outlive the
+    measurement (the first-order generalised pseudo-Bayesian form of the algorithm; the same as IMM where the chain
+    forgets its level from one measurement to the next). One propagation, whatever J.
+
+    Diagnostics: ``sigma_<component>.<instrument>`` is the root of the expected variance; ``quiet.<instrument>`` the
+    probability of the lowest level.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    levels : sequence of float
+        Sigmas in units of the nominal one, the first 1.
+    stay : float
+        Probability to stay on the lowest level from one measurement to the next.
+    stay_high : float
+        Likewise for each of the others; they leave for the lowest most often.
+    """
+
+    def __init__(
+        self,
+        model: ErrorModel,
+        levels: Sequence[float] = (1.0, 3.0, 10.0, 30.0),
+        stay: float = 0.99,
+        stay_high: float = 0.8,
+    ):
+        super().__init__(model)
+        if len(levels) < 2 or list(levels) != sorted(set(levels)) or not levels[0] > 0.0:
+            raise ValueError(f"levels = {', '.join(f'{x:g}' for x in levels)}: two or more, above 0 and rising")
+        for name, p in (("stay", stay), ("stay_high", stay_high)):
+            if not 0.0 < p < 1.0:
+                raise ValueError(f"{name} = {p:g}: it must lie between 0 and 1")
+        self._variances = np.square(np.array(levels, dtype=np.float64))
+        self.transition = _chain(len(levels), stay, stay_high)
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(start, instruments)
+        # The chain's stationary distribution
+        values, vectors = np.linalg.eig(self.transition.T)
+        first = np.real(vectors[:, int(np.argmax(np.real(values)))])
+        self._probability = dict.fromkeys(self._used, first / first.sum())
+        self._report: dict[str, float | Array] = {}
+        self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
+        for name in self._used:
+            self._report.update(zip(self._labels[name], map(float, instruments[name].sigma)))
+            self._report[f"quiet.{name}"] = float(self._probability[name][0])
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step's measurements."""
+        estimate = super().update(measurements)
+        estimate.diagnostics = {**estimate.diagnostics, **self._report}
+        return estimate
+
+    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
+        observation = self._observe(m)
+        if observation is None:
+            self._skipped += 1
+            return
+        residual, cross, predicted, noise = observation
+        probability = self._probability[m.instrument] @ self.transition
+        nis = mixture_update(
+            self.covariance, cross, predicted, noise, residual, self._variances, probability, self._correction
+        )
+        if nis < 0.0:
+            self._skipped += 1
+            return
+        self._probability[m.instrument] = probability
+        self._correct(self._correction)
+        expected = sqrt(float(probability @ self._variances))
+        for label, variance in zip(self._labels[m.instrument], noise.diagonal().tolist()):
+            self._report[label] = expected * sqrt(variance)
+        self._report[f"quiet.{m.instrument}"] = float(probability[0])
+        diagnostics[f"innovation.{m.instrument}"] = sqrt(float(residual @ residual))
+        diagnostics[f"nis.{m.instrument}"] = nis
+
+
+def _chain(n: int, stay: float, stay_high: float) -> Array:
+    """(n, n) probabilities from level to level; from a high one half of the leavers go to the lowest, or all of two."""
+    chain = np.full((n, n), (1.0 - stay) / (n - 1))
+    chain[0, 0] = stay
+    for i in range(1, n):
+        others = n - 2
+        down = (1.0 - stay_high) * (0.5 if others else 1.0)
+        chain[i] = (1.0 - stay_high - down) / others if others else 0.0
+        chain[i, 0], chain[i, i] = down, stay_high
+    return chain

@@ -1,0 +1,167 @@
+"""What adaptations of the noise share: the report of the sigma in use, bounds on an estimate, and the posterior."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from math import sqrt
+from typing import Literal
+
+import numpy as np
+
+from estimators.adaptations.base import Adaptation, Innovation
+from estimators.solvers.kalman import joseph_update
+from simnav.types import KINDS, Array, Instruments
+
+__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "scaled"]
+
+Scope = Literal["fixes", "all"]
+
+
+class Posterior:
+    """What using a measurement with noise R would give, in the measurement's own m components.
+
+    With ``S = H P H' + R``: NIS ``v' S^-1 v``; residual after the update ``v - H P H' S^-1 v``; and
+    ``H P+ H' = H P H' - H P H' S^-1 H P H'``. A state of m components observed directly is the same problem,
+    so the solver's own kernel computes it.
+
+    Parameters
+    ----------
+    innovation : Innovation
+    noise : (m, m) array
+
+    Attributes
+    ----------
+    nis : float
+        -1 where S is singular; then nothing is corrected.
+    residual : (m,) array
+    predicted : (m, m) array
+        H P+ H'.
+    correction : (m,) array
+        ``H K v``.
+    """
+
+    __slots__ = ("correction", "nis", "predicted", "residual")
+
+    def __init__(self, innovation: Innovation, noise: Array):
+        self.predicted = innovation.predicted.copy()
+        self.correction = np.zeros(len(innovation.residual))
+        self.nis: float = joseph_update(
+            self.predicted, innovation.predicted, innovation.predicted + noise, innovation.residual, self.correction
+        )
+        self.residual = innovation.residual - self.correction
+
+
+def scaled(noise: Array, factors: list[float]) -> Array:
+    """A covariance with the variance of component i multiplied by ``factors[i]``, correlations kept."""
+    if all(f == 1.0 for f in factors):
+        return noise
+    root = np.array([sqrt(f) for f in factors])
+    product: Array = noise * np.multiply.outer(root, root)
+    return product
+
+
+class NoiseAdaptation(Adaptation):
+    """An adaptation that reports the sigma that it used: ``sigma_<component>.<instrument>``, for example
+    ``sigma_north.gnss``; a subclass gives `choose`.
+
+    Before an instrument's first measurement its datasheet's sigma stands.
+    """
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        self.inflation = 1.0
+        self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
+        self._report: dict[str, float | Array] = {}
+        for name, sheet in instruments.items():
+            self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
+
+    @abstractmethod
+    def choose(self, innovation: Innovation) -> Array | None:
+        """The (m, m) noise to use, or None to leave the measurement out."""
+
+    def report(self, label: str, value: float) -> None:
+        """Set a diagnostic; it stands until it is set again."""
+        self._report[label] = value
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """`choose`, with its sigma noted."""
+        noise = self.choose(innovation)
+        if noise is not None:
+            for label, variance in zip(self._labels[innovation.measurement.instrument], noise.diagonal().tolist()):
+                self._report[label] = sqrt(variance)
+        return noise
+
+    def diagnostics(self) -> dict[str, float | Array]:
+        """The sigmas last used, and what else was reported."""
+        return self._report
+
+
+class EstimatedNoise(NoiseAdaptation):
+    """An adaptation that estimates R; holds its bounds and says whose R is estimated. A subclass gives `estimate`.
+
+    Parameters
+    ----------
+    lowest, highest : float
+        The estimated sigma stays between these multiples of the nominal one (for a full matrix: the roots of its
+        eigenvalues, in units of the nominal variances).
+    full : bool
+        False: variances only, with the nominal correlations. An instrument's components err independently by its
+        datasheet, and m (m - 1)/2 covariances that are zero cost accuracy to estimate.
+    scope : "fixes" or "all"
+        Whose noise is estimated: GNSS positions and terrain fixes (as in paper 001), or every instrument's. Where the
+        prediction is less certain than the measurement, as often for a DVL or a compass, an innovation says little of
+        R.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are not 0 < lowest <= highest, or the scope is none.
+    """
+
+    FIXES = ("gnss_position", "terrain_fix")
+
+    def __init__(self, lowest: float, highest: float, full: bool = False, scope: Scope = "fixes"):
+        if not 0.0 < lowest <= highest:
+            raise ValueError(f"lowest = {lowest:g} and highest = {highest:g}: it must be 0 < lowest <= highest")
+        if scope not in ("fixes", "all"):
+            raise ValueError(f"scope = {scope!r}: it must be 'fixes' or 'all'")
+        self.lowest, self.highest, self.full, self.scope = lowest, highest, full, scope
+
+    @abstractmethod
+    def estimate(self, innovation: Innovation) -> Array:
+        """The (m, m) noise estimated, within the bounds, this innovation included."""
+
+    def choose(self, innovation: Innovation) -> Array:
+        """The estimate, or the nominal noise where the instrument is out of scope."""
+        if self.scope == "fixes" and innovation.measurement.kind not in self.FIXES:
+            return innovation.noise
+        return self.estimate(innovation)
+
+    def entries(self, matrix: Array) -> list[float]:
+        """What is estimated of a covariance: its diagonal, or all of it row by row."""
+        listed: list[float] = (matrix.ravel() if self.full else matrix.diagonal()).tolist()
+        return listed
+
+    def squares(self, v: Array) -> list[float]:
+        """`entries` of v v'."""
+        listed: list[float] = v.tolist()
+        return [a * b for a in listed for b in listed] if self.full else [a * a for a in listed]
+
+    def bounded(self, estimate: list[float], nominal: Array) -> Array:
+        """An estimate of R, which may be indefinite, brought within the bounds.
+
+        Parameters
+        ----------
+        estimate : list of float
+            `entries` of the estimate.
+        nominal : (m, m) array
+        """
+        low, high = self.lowest * self.lowest, self.highest * self.highest
+        m = len(nominal)
+        if self.full and m > 1:
+            sigma = np.sqrt(nominal.diagonal())
+            unit = sigma[:, None] * sigma
+            values, axes = np.linalg.eigh(np.array(estimate).reshape(m, m) / unit)
+            bounded: Array = (axes * np.clip(values, low, high)) @ axes.T * unit
+            return bounded
+        return scaled(nominal, [min(max(e / n, low), high) for e, n in zip(estimate, nominal.diagonal().tolist())])

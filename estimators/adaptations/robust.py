@@ -1,0 +1,77 @@
+"""Equivalent weights: a measurement whose innovation is too large counts with more noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import sqrt
+
+from estimators.adaptations.base import Innovation
+from estimators.adaptations.noise import NoiseAdaptation, scaled
+from simnav.types import Array, Instruments
+
+__all__ = ["EquivalentWeights", "huber", "igg3"]
+
+
+def huber(u: float, k: float = 1.345) -> float:
+    """Huber's weight: 1 up to k, then ``k/|u|`` (Huber 1964); continuous.
+
+    Examples
+    --------
+    >>> huber(1.0), huber(-2.69)
+    (1.0, 0.5)
+    """
+    u = abs(u)
+    return 1.0 if u <= k else k / u
+
+
+def igg3(u: float, k0: float = 2.5, k1: float = 8.0) -> float:
+    """IGG-III weight: 1 up to k0, ``k0/|u| ((k1 - |u|)/(k1 - k0))^2`` up to k1, then 0 (Yang 1999); continuous.
+
+    Examples
+    --------
+    >>> igg3(1.0), igg3(4.0, 2.0, 6.0), igg3(-9.0)
+    (1.0, 0.125, 0.0)
+    """
+    u = abs(u)
+    if u <= k0:
+        return 1.0
+    return k0 / u * ((k1 - u) / (k1 - k0)) ** 2 if u < k1 else 0.0
+
+
+class EquivalentWeights(NoiseAdaptation):
+    """Divides the variance of each component by the weight of its standardised innovation.
+
+    Component i of an innovation v with covariance ``S = H P H' + R`` is standardised as ``u = v_i / sqrt(S_ii)``;
+    ``R_ij`` becomes ``R_ij / sqrt(w(u_i) w(u_j))``, which keeps the correlations (the two-factor form of Yang, Song and
+    Xu 2002). S and not R standardises, so that a filter that knows itself to be uncertain does not doubt good
+    measurements. A weight is never less than ``smallest`` (0.01: ten times the sigma), so that a filter that is wrong
+    itself is pulled back, if slowly, and not locked out.
+
+    Parameters
+    ----------
+    weight : callable
+        Of the standardised innovation; in [0, 1].
+    smallest : float
+        Least weight.
+    """
+
+    def __init__(self, weight: Callable[[float], float], smallest: float = 1e-2):
+        if not 0.0 < smallest <= 1.0:
+            raise ValueError(f"smallest = {smallest:g}: it must lie in (0, 1]")
+        self.weight, self.smallest = weight, smallest
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._weights = {name: f"weight.{name}" for name in instruments}
+
+    def choose(self, innovation: Innovation) -> Array:
+        """The noise over the weights; reports the least of them."""
+        predicted = innovation.predicted.diagonal().tolist()
+        noise = innovation.noise.diagonal().tolist()
+        weights = [
+            max(self.weight(v / sqrt(p + r)), self.smallest)
+            for v, p, r in zip(innovation.residual.tolist(), predicted, noise)
+        ]
+        self.report(self._weights[innovation.measurement.instrument], min(weights))
+        return scaled(innovation.noise, [1.0 / w for w in weights])

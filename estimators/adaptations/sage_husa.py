@@ -1,0 +1,68 @@
+"""Sage-Husa estimation of the measurement noise."""
+
+from __future__ import annotations
+
+from estimators.adaptations.base import Innovation
+from estimators.adaptations.noise import EstimatedNoise, Scope
+from simnav.types import Array, Instruments
+
+__all__ = ["SageHusa"]
+
+
+class SageHusa(EstimatedNoise):
+    """Recursive maximum-a-posteriori estimate of R from all innovations so far, with or without fading.
+
+    Sage and Husa (1969), "Adaptive filtering with unknown prior statistics", Joint Automatic Control Conference;
+    the rival of paper 001. For the k-th innovation v of an instrument::
+
+        R_k = (1 - d_k) R_(k-1) + d_k (v v' - H P H'),    d_k = (1 - b) / (1 - b^(k + 1)),
+
+    and d_k = 1 / (k + 1) for b = 1. The estimate may leave the positive definite matrices; the recursion goes on with
+    it as it is, which keeps it unbiased, and what the filter uses is brought within bounds. Only R is estimated: Q
+    and R together are not identifiable from one innovation sequence, and paper 001 needs R.
+
+    Paper 001 does not print b. Its figures come out with a filter that does not forget (b = 1, the row
+    ``sage-husa-paper``); a fading one is the fair rival.
+
+    Parameters
+    ----------
+    fading : float
+        b, in (0, 1].
+    prior : int
+        How many innovations the datasheet's noise counts for at the start; they fade too.
+    lowest, highest, full, scope
+        See `EstimatedNoise`.
+    """
+
+    def __init__(
+        self,
+        fading: float = 0.97,
+        prior: int = 10,
+        lowest: float = 0.5,
+        highest: float = 30.0,
+        full: bool = False,
+        scope: Scope = "fixes",
+    ):
+        super().__init__(lowest, highest, full, scope)
+        if not 0.0 < fading <= 1.0:
+            raise ValueError(f"fading = {fading:g}: it must lie in (0, 1]")
+        if prior < 0:
+            raise ValueError(f"prior = {prior}: it must not be negative")
+        self.fading, self.prior = fading, prior
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._estimates: dict[str, tuple[int, list[float]]] = {}
+
+    def estimate(self, innovation: Innovation) -> Array:
+        """The bounded estimate, this innovation included."""
+        name = innovation.measurement.instrument
+        k, estimate = self._estimates.get(name) or (self.prior, self.entries(innovation.noise))
+        k += 1
+        b = self.fading
+        d = 1.0 / (k + 1) if b == 1.0 else (1.0 - b) / (1.0 - b ** (k + 1))
+        squares, predicted = self.squares(innovation.residual), self.entries(innovation.predicted)
+        estimate = [(1.0 - d) * e + d * (vv - p) for e, vv, p in zip(estimate, squares, predicted)]
+        self._estimates[name] = k, estimate
+        return self.bounded(estimate, innovation.noise)

@@ -1,0 +1,313 @@
+"""Adaptive and robust rows: the Kalman filter with one adaptation each.
+
+Every row takes the inertial model where there is an IMU and the ship model where there is none, so that it is ``ekf``
+or ``ship-ekf`` but for its adaptation.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from estimators.adaptations.adkf import AdaptiveFactor, Factor, Statistic
+from estimators.adaptations.base import Adaptation
+from estimators.adaptations.correntropy import MaximumCorrentropy
+from estimators.adaptations.fading import FadingMemory
+from estimators.adaptations.gating import ChiSquareGate
+from estimators.adaptations.imm import ImmEstimator
+from estimators.adaptations.innovation_based import InnovationBased
+from estimators.adaptations.noise import Scope
+from estimators.adaptations.robust import EquivalentWeights, huber, igg3
+from estimators.adaptations.sage_husa import SageHusa
+from estimators.adaptations.variational_bayes import VariationalBayes
+from estimators.models.base import ErrorModel
+from estimators.models.inertial import InertialModel
+from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, ShipModel
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimator import UnsuitableScenario, register
+from simnav.types import InitialState, Instruments
+
+__all__ = [
+    "Adkf",
+    "AdkfPaper",
+    "FadingEkf",
+    "GatedEkf",
+    "HuberKf",
+    "Iae",
+    "IaeFixed",
+    "Igg3",
+    "Imm",
+    "Mckf",
+    "Rae",
+    "SageHusaKf",
+    "SageHusaPaper",
+    "VbAkf",
+]
+
+
+def model_for(instruments: Instruments) -> ErrorModel:
+    """The inertial model where there is an IMU, else the ship model; UnsuitableScenario where neither will do."""
+    if instruments.imu is not None:
+        if not instruments:
+            raise UnsuitableScenario("the filter needs an instrument beside the IMU; there is none")
+        return InertialModel()
+    if not instruments.of_kind(*HEADING_KINDS):
+        raise UnsuitableScenario("without an IMU the filter needs a compass; there is none")
+    if not instruments.of_kind(*POSITION_KINDS, "gnss_velocity", "dvl", "speed_log"):
+        raise UnsuitableScenario("without an IMU the filter needs GNSS, a terrain fix, a log or a DVL; there is none")
+    return ShipModel()
+
+
+class _Adaptive(KalmanEstimator):
+    """A Kalman filter over the model that suits the instruments."""
+
+    def __init__(self, adaptation: Adaptation):
+        super().__init__(InertialModel(), adaptation)
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; needs an IMU and another instrument, or what the ship model needs."""
+        self.model = model_for(instruments)
+        super().reset(start, instruments)
+
+
+@register("sage-husa")
+class SageHusaKf(_Adaptive):
+    """Sage-Husa filter: the measurement noise estimated from all innovations, the old ones fading.
+
+    See `estimators.adaptations.sage_husa`, also for the parameters.
+    """
+
+    def __init__(
+        self,
+        fading: float = 0.97,
+        prior: int = 10,
+        lowest: float = 0.5,
+        highest: float = 30.0,
+        full: bool = False,
+        scope: Scope = "fixes",
+    ):
+        super().__init__(SageHusa(fading, prior, lowest, highest, full, scope))
+
+
+@register("sage-husa-paper")
+class SageHusaPaper(_Adaptive):
+    """Sage-Husa filter without fading, as the figures of paper 001 have it.
+
+    See `estimators.adaptations.sage_husa`, also for the parameters.
+    """
+
+    def __init__(
+        self, fading: float = 1.0, prior: int = 0, lowest: float = 0.5, highest: float = 30.0, full: bool = True
+    ):
+        super().__init__(SageHusa(fading, prior, lowest, highest, full))
+
+
+@register("iae")
+class Iae(_Adaptive):
+    """Innovation-based adaptive estimation of the measurement noise, window after paper 001, eqs. 16-20.
+
+    See `estimators.adaptations.innovation_based`, also for the parameters.
+    """
+
+    def __init__(
+        self,
+        shortest: int = 10,
+        longest: int = 20,
+        low: float = 2.0,
+        high: float = 5.0,
+        forgetting: float = 0.9,
+        newest: bool = False,
+        lowest: float = 0.5,
+        highest: float = 30.0,
+        full: bool = False,
+        scope: Scope = "fixes",
+    ):
+        super().__init__(
+            InnovationBased(
+                "innovation", shortest, longest, low, high, forgetting, newest, lowest, highest, full, scope
+            )
+        )
+
+
+@register("iae-fixed")
+class IaeFixed(_Adaptive):
+    """Innovation-based adaptive estimation of the measurement noise over a fixed window.
+
+    See `estimators.adaptations.innovation_based`, also for the parameters.
+    """
+
+    def __init__(
+        self,
+        window: int = 20,
+        forgetting: float = 0.9,
+        newest: bool = False,
+        lowest: float = 0.5,
+        highest: float = 30.0,
+        full: bool = False,
+        scope: Scope = "fixes",
+    ):
+        super().__init__(
+            InnovationBased(
+                "innovation", window, window, forgetting=forgetting, newest=newest, lowest=lowest, highest=highest,
+                full=full, scope=scope,
+            )
+        )  # fmt: skip
+
+
+@register("rae")
+class Rae(_Adaptive):
+    """Residual-based adaptive estimation of the measurement noise over a fixed window.
+
+    See `estimators.adaptations.innovation_based`, also for the parameters.
+    """
+
+    def __init__(
+        self,
+        window: int = 20,
+        forgetting: float = 0.9,
+        lowest: float = 0.5,
+        highest: float = 30.0,
+        full: bool = False,
+        scope: Scope = "fixes",
+    ):
+        super().__init__(
+            InnovationBased(
+                "residual",
+                window,
+                window,
+                forgetting=forgetting,
+                lowest=lowest,
+                highest=highest,
+                full=full,
+                scope=scope,
+            )
+        )
+
+
+@register("adkf")
+class Adkf(_Adaptive):
+    """Adaptive robust filter after paper 003: R or P over a factor that falls with a statistic of the innovation.
+
+    See `estimators.adaptations.adkf`, also for the parameters.
+    """
+
+    def __init__(
+        self,
+        statistic: Statistic = "residual",
+        factor: Factor = "three-segment",
+        target: Literal["R", "P"] = "R",
+        preset: Literal["default", "paper"] = "default",
+        c0: float | None = None,
+        c1: float | None = None,
+        together: int = 3,
+    ):
+        super().__init__(AdaptiveFactor(statistic, factor, target, preset, c0, c1, together))
+
+
+@register("adkf-paper")
+class AdkfPaper(_Adaptive):
+    """Adaptive robust filter with the statistics and thresholds as paper 003 prints them.
+
+    See `estimators.adaptations.adkf`, also for the parameters.
+    """
+
+    def __init__(
+        self,
+        statistic: Statistic = "residual",
+        factor: Factor = "three-segment",
+        target: Literal["R", "P"] = "R",
+    ):
+        super().__init__(AdaptiveFactor(statistic, factor, target, "paper"))
+
+
+@register("igg3")
+class Igg3(_Adaptive):
+    """IGG-III equivalent weights: full weight up to k0 sigma, almost none from k1 sigma on.
+
+    See `estimators.adaptations.robust`.
+    """
+
+    def __init__(self, k0: float = 2.5, k1: float = 8.0):
+        if not 0.0 < k0 < k1:
+            raise ValueError(f"k0 = {k0:g} and k1 = {k1:g}: it must be 0 < k0 < k1")
+        super().__init__(EquivalentWeights(lambda u: igg3(u, k0, k1)))
+
+
+@register("huber-kf")
+class HuberKf(_Adaptive):
+    """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
+
+    See `estimators.adaptations.robust`; k = 1.345 keeps 95 % of the efficiency on Gaussian noise.
+    """
+
+    def __init__(self, k: float = 1.345):
+        if not k > 0.0:
+            raise ValueError(f"k = {k:g}: it must be above 0")
+        super().__init__(EquivalentWeights(lambda u: huber(u, k)))
+
+
+@register("gated-ekf")
+class GatedEkf(_Adaptive):
+    """Chi-square gating: measurements that fail the test are left out; a filter that fails for long is doubted.
+
+    See `estimators.adaptations.gating`, also for the parameters.
+    """
+
+    def __init__(self, probability: float = 0.999, patience: float = 10.0):
+        super().__init__(ChiSquareGate(probability, patience))
+
+
+@register("fading-ekf")
+class FadingEkf(_Adaptive):
+    """Fading memory: information loses weight with its age.
+
+    See `estimators.adaptations.fading`, also for the parameters.
+    """
+
+    def __init__(self, memory: float = 1000.0):
+        super().__init__(FadingMemory(memory))
+
+
+@register("vb-akf")
+class VbAkf(_Adaptive):
+    """Variational-Bayes adaptive filter: state and noise variances estimated together.
+
+    See `estimators.adaptations.variational_bayes`, also for the parameters.
+    """
+
+    def __init__(
+        self,
+        forgetting: float = 0.97,
+        prior: float = 10.0,
+        iterations: int = 2,
+        lowest: float = 0.5,
+        highest: float = 30.0,
+        scope: Scope = "fixes",
+    ):
+        super().__init__(VariationalBayes(forgetting, prior, iterations, lowest, highest, scope))
+
+
+@register("mckf")
+class Mckf(_Adaptive):
+    """Maximum correntropy Kalman filter: residuals weighted by a Gaussian kernel.
+
+    See `estimators.adaptations.correntropy`, also for the parameters.
+    """
+
+    def __init__(self, bandwidth: float = 4.0, iterations: int = 5, begin: Literal["update", "prediction"] = "update"):
+        super().__init__(MaximumCorrentropy(bandwidth, iterations, begin=begin))
+
+
+@register("imm")
+class Imm(ImmEstimator):
+    """Interacting multiple models: the noise of each instrument jumps between levels.
+
+    See `estimators.adaptations.imm`, also for the parameters.
+    """
+
+    def __init__(self, levels: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0), stay: float = 0.99, stay_high: float = 0.8):
+        super().__init__(InertialModel(), levels, stay, stay_high)
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; needs an IMU and another instrument, or what the ship model needs."""
+        self.model = model_for(instruments)
+        super().reset(start, instruments)
