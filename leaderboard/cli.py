@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from leaderboard.console import USER, Output, UserError, session
+from leaderboard.reproduce import command as reproduce
 
 __all__ = ["app", "main"]
 
@@ -241,6 +242,9 @@ def warmup(json: Json = False, debug: Debug = False) -> None:
         from leaderboard import single
 
         single.warmup(out)
+
+
+reproduce.register(app)
 
 
 def _leave_out_working_directory() -> None:

@@ -1,0 +1,78 @@
+"""The command ``simnav reproduce``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from leaderboard.console import Output, UserError, absolute, mistakes, sentence, session
+from leaderboard.reproduce import PAPERS
+
+if TYPE_CHECKING:
+    from leaderboard.campaign import Progress
+
+__all__ = ["register", "run"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application."""
+    app.command("reproduce")(_command)
+
+
+def _command(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help=f"{', '.join(PAPERS)}: see docs/papers.md.")],
+    runs: Annotated[
+        int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [few: ends within minutes]")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder of results, CSV and figures. [reproduced/PAPER]")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> None:
+    """Run a paper's comparison again: ours beside theirs, row by row; started again, it goes on where it was."""
+    with session(json, debug) as out:
+        run(out, paper, runs, output, workers)
+
+
+def run(out: Output, key: str, runs: int | None, output: Path | None, workers: int) -> None:
+    """Reproduce a paper and show it."""
+    from leaderboard.campaign import CampaignError
+    from leaderboard.reproduce import figures, paper, report
+    from leaderboard.reproduce.reproduction import reproduce
+    from leaderboard.store import StoreError
+
+    with mistakes(ValueError):
+        chosen = paper.load(key)
+    folder = absolute(output or Path("reproduced") / key)
+    begun: list[str] = []
+    with out.progress("starting") as bar:
+
+        def told(scenario: str, p: Progress) -> None:
+            begun.append(scenario)
+            bar.begin("compiling kernels" if p.stage == "compile" else scenario)
+            bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
+
+        try:
+            found = reproduce(chosen, runs or chosen.runs, folder / "results", workers=workers, progress=told)
+        except StoreError as error:
+            raise UserError(sentence(error)) from error
+        except CampaignError as error:
+            if not begun:
+                raise UserError(sentence(error)) from error
+            raise
+    folder.mkdir(parents=True, exist_ok=True)
+    table = report.write_csv(found, folder / f"paper-{key}.csv")
+    drawn = figures.write_figures(found, folder)
+    out.document({**found.to_dict(), "csv": str(table), "figures": [str(p) for p in drawn]})
+    out.print(f"Paper {key}: {chosen.title}", f"{chosen.citation}\n")
+    for shown in report.paper_tables(found):
+        out.print(shown)
+    for note in chosen.notes:
+        out.print(f"note: {note}")
+    out.print(f"{report.summary(found)}; the paper's number: --runs {chosen.full}", f"table:   {table}")
+    for path in drawn:
+        out.print(f"figure:  {path}")

@@ -1,0 +1,203 @@
+"""What is known of a paper: the methods that it compares, their figures, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Literal
+
+from leaderboard.reproduce import PAPERS
+from simnav.scenario import Scenario
+from simnav.scenario import load as load_scenario
+
+__all__ = ["Curves", "Gain", "Method", "Paper", "Range", "Row", "Rule", "Table", "Value", "load"]
+
+#: A figure, or the two ends of what a paper gives as a range.
+Range = float | tuple[float, float]
+
+#: ``equal``: ours should be the paper's; ``at-most``, ``at-least``: the paper's is a bound.
+Rule = Literal["equal", "at-most", "at-least"]
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of a paper, and the registered estimators that can stand for it.
+
+    Attributes
+    ----------
+    name : str
+        As the paper calls it.
+    rows : tuple of str
+        Estimators as typed on the command line (``adkf:factor=two-segment``), the best first: the first that is
+        registered is taken.
+    """
+
+    name: str
+    rows: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Value:
+    """One figure of a method.
+
+    Attributes
+    ----------
+    scenario, method : str
+        A scenario of the catalogue, or one of the paper's variants; a name of the paper's methods.
+    score : str
+        Name of a measure (`leaderboard.reproduce.measures`).
+    paper : float, pair of float or None
+        In the measure's unit; None where the paper has no figure: ours is shown all the same.
+    rule : str
+    derived : bool
+        The paper does not print the figure, but it follows from others that it prints, or is read from its prose.
+    lower, higher : str
+        Why ours is lower, or higher, than the paper's: a sentence, shown only where it is so.
+    """
+
+    scenario: str
+    method: str
+    score: str
+    paper: Range | None = None
+    rule: Rule = "equal"
+    derived: bool = False
+    lower: str = ""
+    higher: str = ""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A claim that one method is better than another.
+
+    Attributes
+    ----------
+    scenario, method, than, score
+        As for `Value`.
+    paper : float
+        By what fraction the score of ``method`` is below that of ``than``; negative where it is above.
+    than_score : str
+        Where the other is scored by another measure (filtered against smoothed).
+    derived : bool
+    lower, higher : str
+        Why our gain is smaller, or larger.
+    """
+
+    scenario: str
+    method: str
+    than: str
+    score: str
+    paper: float
+    than_score: str = ""
+    derived: bool = False
+    lower: str = ""
+    higher: str = ""
+
+
+Row = Value | Gain
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows that belong together."""
+
+    title: str
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """A figure over time that can be drawn from our runs.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    title : str
+    scenario : str
+    methods : tuple of str
+    series : mapping of str to str
+        Label of each panel -> name of a series of the results (`simnav.scoring.series`), or a diagnostic of the
+        first run with the instrument's true sigma beside it (``sigma_north.gnss``).
+    """
+
+    name: str
+    title: str
+    scenario: str
+    methods: tuple[str, ...]
+    series: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper.
+
+    Attributes
+    ----------
+    key : str
+        ``000`` to ``004``.
+    title, citation : str
+    runs : int
+        Seeds a scenario, so that it ends within a few minutes.
+    full : int
+        As many as the paper has, or as settle the rows.
+    methods : tuple of Method
+    tables : tuple of Table
+    curves : tuple of Curves
+    notes : tuple of str
+        What the reader has to know of the comparison.
+    undisturbed : mapping of str to str
+        Variants: name -> scenario of the catalogue, which the variant is without its faults.
+    """
+
+    key: str
+    title: str
+    citation: str
+    runs: int
+    full: int
+    methods: tuple[Method, ...]
+    tables: tuple[Table, ...]
+    curves: tuple[Curves, ...] = ()
+    notes: tuple[str, ...] = ()
+    undisturbed: Mapping[str, str] = field(default_factory=dict)
+
+    def rows(self) -> Iterator[Row]:
+        """All rows of all tables."""
+        for table in self.tables:
+            yield from table.rows
+
+    def method(self, name: str) -> Method:
+        """The method of that name."""
+        return next(m for m in self.methods if m.name == name)
+
+    def scenario(self, name: str) -> Scenario:
+        """A scenario of the catalogue, or a variant of one."""
+        if name in self.undisturbed:
+            return load_scenario(self.undisturbed[name]).model_copy(update={"name": name, "faults": ()})
+        return load_scenario(name)
+
+    def participants(self) -> dict[str, list[str]]:
+        """Scenario -> methods that its rows and curves are about, in the paper's order."""
+        wanted: dict[str, set[str]] = {}
+        for row in self.rows():
+            wanted.setdefault(row.scenario, set()).add(row.method)
+            if isinstance(row, Gain):
+                wanted[row.scenario].add(row.than)
+        for curves in self.curves:
+            wanted.setdefault(curves.scenario, set()).update(curves.methods)
+        return {s: [m.name for m in self.methods if m.name in names] for s, names in wanted.items()}
+
+
+def load(key: str) -> Paper:
+    """The paper of that key.
+
+    Raises
+    ------
+    ValueError
+        If there is none; one sentence.
+    """
+    if key not in PAPERS:
+        raise ValueError(f"there is no paper {key!r}; there are {', '.join(PAPERS)}")
+    paper = import_module(f"leaderboard.reproduce.paper_{key}").PAPER
+    assert isinstance(paper, Paper)
+    return paper

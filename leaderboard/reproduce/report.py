@@ -1,0 +1,119 @@
+"""A reproduction as tables for people and as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from leaderboard import tables
+from leaderboard.reproduce.measures import measure
+from leaderboard.reproduce.paper import Gain, Range
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from leaderboard.reproduce.reproduction import Finding, Reproduction
+
+__all__ = ["paper_tables", "summary", "write_csv"]
+
+_WORDS = {"ours": "", "absent": "not there yet"}
+
+
+def summary(found: Reproduction) -> str:
+    """One line: how many rows agree."""
+    words = ("agrees", "differs", "undecided", "absent", "failed", "unsuitable")
+    texts = {"agrees": "agree", "differs": "differ", "absent": "not there yet"}
+    counts = [f"{n} {texts.get(w, w)}" for w in words if (n := found.count(w))]
+    return f"paper {found.paper.key}, {len(found.seeds)} runs a scenario: {', '.join(counts)}"
+
+
+def paper_tables(found: Reproduction) -> Iterator[Table]:
+    """One table for each of the paper's."""
+    for of in found.paper.tables:
+        rows = [f for f in found.findings if f.table == of.title]
+        columns = ["method", "ours by", "", "paper", "ours [95 %]", "runs", "verdict"]
+        cells = [
+            [_method(f), _by(f), _title(f), _paper(f), _ours(f), _runs(f), _verdict(f)] for f in rows
+        ]  # fmt: skip
+        strong = [i for i, f in enumerate(rows) if f.verdict == "differs"]
+        dim = [i for i, f in enumerate(rows) if f.verdict in ("absent", "ours")]
+        caption = "~ follows from other figures of the paper, or from its prose" if _derived(rows) else None
+        yield tables.table(of.title, columns, cells, numeric=["paper", "ours [95 %]", "runs"], strong=strong, dim=dim,
+                           caption=caption)  # fmt: skip
+
+
+def _derived(rows: list[Finding]) -> bool:
+    return any(f.row.derived and f.row.paper is not None for f in rows)
+
+
+def _method(f: Finding) -> str:
+    return f"{f.row.method} against {f.row.than}" if isinstance(f.row, Gain) else f.row.method
+
+
+def _by(f: Finding) -> str:
+    return " / ".join(f.estimators)
+
+
+def _title(f: Finding) -> str:
+    m = measure(f.row.score)
+    return f"{m.title}, better by" if isinstance(f.row, Gain) else f"{m.title} [{m.unit}]"
+
+
+def _paper(f: Finding) -> str:
+    if f.row.paper is None:
+        return tables.MISSING
+    mark = "~ " if f.row.derived else ""
+    if isinstance(f.row, Gain):
+        return mark + tables.percent(f.row.paper)
+    sign = {"at-most": "≤ ", "at-least": "≥ ", "equal": ""}[f.row.rule]
+    return mark + sign + _figure(f.row.paper)
+
+
+def _figure(value: Range) -> str:
+    return " to ".join(map(tables.number, value)) if isinstance(value, tuple) else tables.number(value)
+
+
+def _ours(f: Finding) -> str:
+    if f.ours is None:
+        return tables.MISSING
+    if not isinstance(f.row, Gain):
+        return tables.interval(f.ours.value, f.ours.low, f.ours.high)
+    value, low, high = (1.0 - x for x in (f.ours.value, f.ours.high, f.ours.low))
+    if low != low or high != high:
+        return tables.percent(value)
+    return f"{tables.percent(value)} [{100.0 * low:.1f}, {100.0 * high:.1f}]"
+
+
+def _runs(f: Finding) -> str:
+    if f.ours is None:
+        return tables.MISSING
+    return f"{f.ours.runs}, {f.failed} failed" if f.failed else str(f.ours.runs)
+
+
+def _verdict(f: Finding) -> str:
+    word = _WORDS.get(f.verdict, f.verdict)
+    if f.verdict == "absent":
+        return f.why
+    return f"{word}: {f.why}" if f.why else word
+
+
+def write_csv(found: Reproduction, path: Path) -> Path:
+    """All rows, one a line; written at once or not at all."""
+    rows = found.to_dict()["rows"]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        flat = {k: v if v == v else None for k, v in row.items()}
+        flat["estimators"] = " / ".join(row["estimators"])
+        if isinstance(row["paper"], list):
+            flat["paper"] = " to ".join(map(str, row["paper"]))
+        writer.writerow(flat)
+    partial = path.with_name(f".{path.name}.part")
+    partial.write_text(text.getvalue(), encoding="utf-8")
+    os.replace(partial, path)
+    return path
