@@ -3,13 +3,15 @@
 The eight are constants, after the DVL's datasheet: misalignment eta (3) [rad], lever-arm error dl (3) [m], scale-factor
 error k [-] and delay tau [s]. A DVL measurement that is stamped t reads ::
 
-    z = (1 + k) (I - [eta x]) u,    u = C' v + w x (l + dl) - u' tau,    u' = f + C' g - w x C' v
+    z = (1 + k) D u,    D = I - [eta x] + [eta x]^2 / 2
+    u = C' v + w x (l + dl) - u' tau,    u' = f + C' g - w x C' v
 
 with w the body rate relative to the Earth, f the specific force and g gravity; u' is the acceleration of the body as
-its own axes see it. So, with M = (1 + k) (I - [eta x]) and errors that are estimate minus truth, the Jacobian is
+its own axes see it. D is a rotation to second order: two degrees to first order look like a scale factor of 5e-4.
+With M = (1 + k) D and errors that are estimate minus truth, the Jacobian is
 
 - velocity ``M C'``; attitude ``M C' [v x]``; gyroscope bias ``M [l x]``
-- eta ``(1 + k) [u x]``; dl ``M [w x]``; k ``(I - [eta x]) u``; tau ``-M u'``
+- eta ``(1 + k) ([u x] - ([(eta x u) x] + [eta x] [u x]) / 2)``; dl ``M [w x]``; k ``D u``; tau ``-M u'``
 
 All other instruments have no states: their biases and in-run errors count as white noise.
 
@@ -17,7 +19,7 @@ Source: Zhan et al. 2026 (paper 003), eqs. 1-2 and 13-21. Where it is unclear, t
 
 - Eq. 19 has ``v - v x eta``, but eq. 17 with the DCM C_b^d of a small turn eta is ``v - eta x v = v + v x eta``. Here
   eta is the rotation vector by which the instrument's axes are turned from the body's, hence the latter;
-  `simnav.sensors.dvl` is the same, without the small-angle form.
+  `simnav.sensors.dvl` is the same, with the whole rotation.
 - One lever arm and one time error are shared by GNSS and DVL in eqs. 16 and 21. Here the GNSS antenna's lever arm is
   known and its time is right; both errors are the DVL's.
 - H1 of eq. 16 has 20 columns for 23 states and H2 of eq. 21 none for the time error; here the columns are as above.
@@ -97,11 +99,12 @@ class DvlCalibrationModel(InertialModel):
         turn = skew(rate)
         acceleration = self.raw_force - self.bias[3:] + to_body @ self._gravity - turn @ (to_body @ self.velocity)
         u -= acceleration * tau
-        turned = _IDENTITY - skew(eta)
+        s, across = skew(eta), skew(u)
+        turned = _IDENTITY - s + 0.5 * (s @ s)
         matrix = (1.0 + k) * turned
         jacobian = np.zeros((3, self.size))
         jacobian[:, 3:12] = matrix @ raw[:, 3:]
-        jacobian[:, MISALIGNMENT] = (1.0 + k) * skew(u)
+        jacobian[:, MISALIGNMENT] = (1.0 + k) * (across - 0.5 * (skew(s @ u) + s @ across))
         jacobian[:, LEVER_ARM] = matrix @ turn
         jacobian[:, SCALE] = turned @ u
         jacobian[:, DELAY] = -(matrix @ acceleration)
