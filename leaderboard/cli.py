@@ -53,6 +53,9 @@ MemoryLimit = Annotated[
 ]
 
 
+_RUNS, _QUICK_RUNS = 50, 4
+
+
 class Topic(StrEnum):
     """What `simnav list` knows."""
 
@@ -198,10 +201,10 @@ def evaluate(
 def campaign(
     scenario: Scenarios = None,
     estimator: Estimators = None,
-    runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 10]")] = None,
+    runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 4]")] = None,
     seed: FirstSeed = 0,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("results"),
-    quick: Annotated[bool, typer.Option("--quick", help="Ends within minutes: 10 seeds, no long scenarios.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Ends within minutes: 4 seeds, no long scenarios.")] = False,
     set_: Set = None,
     workers: Workers = 2,
     time_limit: TimeLimit = None,
@@ -213,7 +216,7 @@ def campaign(
     with session(json, debug) as out:
         from leaderboard import arguments, monte_carlo
 
-        seeds = range(seed, seed + (runs or (10 if quick else 50)))
+        seeds = range(seed, seed + (runs or (_QUICK_RUNS if quick else _RUNS)))
         out.code = monte_carlo.campaign(
             out, arguments.scenarios(scenario, out, quick=quick), arguments.requests(estimator, set_), seeds,
             monte_carlo.Limits(workers, time_limit, memory_limit), output,

@@ -102,6 +102,7 @@ class Progress:
             TextColumn("left {task.fields[left]}"),
             TextColumn("[dim]{task.fields[note]}"),
             console=console,
+            refresh_per_second=5,
             disable=not console.is_terminal,
             transient=True,
             expand=True,
@@ -132,7 +133,8 @@ class Progress:
         if text != self._text:
             self._text, self._done, self._total = text, 0, None
             self._start = self._said = time.monotonic()
-            self._bar.reset(self._task, description=text, total=None, note="", left="–")
+            self._bar.remove_task(self._task)
+            self._task = self._bar.add_task(text, total=None, note="", left="–")
 
     def left(self) -> float | None:
         """Seconds left by the mean pace so far, or None."""

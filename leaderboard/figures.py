@@ -242,8 +242,10 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
     written = []
     with _styled():
         FigureCanvasAgg(fig)
-        fig.draw_without_rendering()
-        fig.set_layout_engine("none")  # laid out once: all formats look the same, and come quicker
+        layout = fig.get_layout_engine()
+        if layout is not None:
+            layout.execute(fig)
+            fig.set_layout_engine("none")  # laid out once: all formats look the same, and come quicker
         for kind in formats:
             # The canvases' own methods: Figure.savefig draws everything twice. No date, so that the same results
             # give the same file.
@@ -255,7 +257,7 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
                 FigureCanvasPdf(fig).print_pdf(buffer, metadata={"CreationDate": None})  # type: ignore[no-untyped-call]
             else:
                 fig.set_dpi(dpi)
-                FigureCanvasAgg(fig).print_png(buffer)  # type: ignore[no-untyped-call]
+                FigureCanvasAgg(fig).print_png(buffer, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
             content = buffer.getvalue()
             if kind == "svg":
                 content = _follow_theme(content.decode()).encode()

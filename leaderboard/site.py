@@ -271,10 +271,11 @@ class _Site:
     def _draw(self) -> Iterator[list[dict[str, Any]]]:
         """The figures of one scenario after the other; several processes where it is worth their start."""
         tasks = []
+        ranked = {s["scenario"]: [row["estimator"] for row in s["rows"]] for s in self.ranking["scenarios"]}
         for s in self.scenarios:
             by = self.runs[s["id"]]
             head = {key: s[key] for key in ("id", "page", "seeds")}
-            tasks.append((self.folder, head, [by[e] for e in self.estimators if e in by and by[e].tried], self.style))
+            tasks.append((self.folder, head, [by[e] for e in ranked[s["id"]]], self.style))
         if self.workers < 2 or len(tasks) < _WORTH_PROCESSES:
             yield from (scenario_figures(*task) for task in tasks)
             return
@@ -320,7 +321,7 @@ class _Site:
                 "Overall score of every estimator with its interval, as in the table above",
             )
         return {
-            "score": {"title": SCORE_TITLE, "caption": SCORE_CAPTION, "lead": SCORE_LEAD},
+            "score": {"title": SCORE_TITLE.replace(" ", "\u00a0"), "caption": SCORE_CAPTION, "lead": SCORE_LEAD},
             "facts": [{"name": n, "value": v} for n, v in facts],
             "ranking": rows,
             "matrix": self._matrix(),
@@ -372,7 +373,7 @@ class _Site:
             "columns": columns,
             "rows": rows,
             "baseline": ranking["baseline"],
-            "unsuitable": ranking["unsuitable"],
+            "unsuitable": _by_reason(ranking["unsuitable"]),
             "failures": [
                 {"label": row["estimator"], "status": status, "runs": count,
                  "reason": _reason(by[row["estimator"]], status)}
@@ -404,7 +405,7 @@ class _Site:
                  "runs": len(r.tried), "cells": c, "badge": _badge(r)}
                 for r, c in zip(suited, cells, strict=True)
             ],
-            "unsuitable": {described[r.scenario]["name"]: r.results[0].reason for r in mine if not r.tried},
+            "unsuitable": _by_reason({described[r.scenario]["name"]: r.results[0].reason for r in mine if not r.tried}),
             "parameters": tables.parameters(mine[0].results[0].parameters) if mine else "",
         }  # fmt: skip
 
@@ -453,6 +454,14 @@ def _badge(runs: Runs) -> str:
     return str(badge(np.array(runs.scores("nees_horizontal"))))
 
 
+def _by_reason(reasons: Mapping[str, str]) -> dict[str, list[str]]:
+    """Reason -> those that share it."""
+    found: dict[str, list[str]] = {}
+    for name, why in reasons.items():
+        found.setdefault(why, []).append(name)
+    return found
+
+
 def _reason(runs: Runs, status: str) -> str:
     """Why the first run with a status ended so."""
     if status == "incomplete":
@@ -461,12 +470,13 @@ def _reason(runs: Runs, status: str) -> str:
 
 
 def _score_cells(runs: Sequence[tuple[Runs, bool]]) -> tuple[list[dict[str, str]], list[dict[str, Any]]]:
-    """Columns in which anybody has a figure, and the cells of each row; the second of a pair bars it from the best."""
+    """Columns in which anybody who is ranked has a figure, and the cells of each row; the second of a pair bars it from the best."""
     columns = []
     cells: list[dict[str, Any]] = [{} for _ in runs]
     for key, title, factor, form, lower in _COLUMNS:
         found = [r.score(key) for r, _ in runs]
-        if all(math.isnan(f.value) for f in found):
+        ranked = [f for f, (r, _) in zip(found, runs, strict=True) if not r.reference] or found
+        if all(math.isnan(f.value) for f in ranked):
             continue
         columns.append({"key": key, "title": title})
         best = min((f.value for f, (_, barred) in zip(found, runs, strict=True) if not barred and f.value == f.value),

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["catalogued", "scenario_figures", "write_figure"]
 
+#: More curves than this in one figure cannot be told apart.
+MOST_CURVES = 8
+
 _PIXELS = 96  # of an inch, in CSS
 _PANELS = (
     ("horizontal", "Horizontal error [m]", 1.0),
@@ -49,7 +52,7 @@ def scenario_figures(
     scenario : mapping
         Its ``id``, ``page`` and ``seeds``.
     runs : sequence of Runs
-        Of the estimators that it suits, in the order in which they are shown.
+        Of the estimators that it suits, best first. Curves are drawn of the `MOST_CURVES` best, and of references.
     style : Style
 
     Returns
@@ -61,7 +64,10 @@ def scenario_figures(
     count = len(scenario["seeds"])
     seed = _seed_to_show(runs, scenario["seeds"])
     fixes, outages = _of_recording(scenario["id"], seed)
-    truth, estimates = tracks(runs, seed)
+    best = [r for r in runs if not r.reference][:MOST_CURVES]
+    drawn = [*best, *(r for r in runs if r.reference)]
+    which = f" The {MOST_CURVES} best." if len(drawn) < len(runs) else ""
+    truth, estimates = tracks(drawn, seed)
     if truth is not None:
         note = next((r.note for run in runs if (r := run.at(seed)) is not None), "")
         made.append(
@@ -70,18 +76,18 @@ def scenario_figures(
                 trajectory(truth, estimates, style, fixes=fixes, title=f"Trajectory, seed {seed}"),
                 f"{name}-trajectory",
                 f"Truth, fixes and estimates of seed {seed}{', ' + note if note else ''}. An estimate that leaves "
-                "the frame has drifted off.",
+                f"the frame has drifted off.{which}",
                 f"Chart of seed {seed}: the true track and the estimated tracks",
             )
         )
-    quantiles = [b for r in runs if (b := r.quantiles()) is not None]
+    quantiles = [b for r in drawn if (b := r.quantiles()) is not None]
     if quantiles:
         made.append(
             write_figure(
                 folder,
                 error_cdf(quantiles, style, label="Horizontal error [m]", title="Distribution of the error"),
                 f"{name}-cdf",
-                "Share of the epochs of all seeds whose horizontal error is below a value.",
+                f"Share of the epochs of all seeds whose horizontal error is below a value.{which}",
                 "Cumulative distribution of the horizontal error of every estimator",
             )
         )
@@ -98,7 +104,7 @@ def scenario_figures(
         )
     panels = {}
     for key, label, factor in _PANELS:
-        bands = [b for r in runs if (b := r.band(key, factor)) is not None]
+        bands = [b for r in drawn if (b := r.band(key, factor)) is not None]
         if bands:
             panels[label] = bands
     if panels:
@@ -108,7 +114,7 @@ def scenario_figures(
                 folder,
                 error_over_time(panels, style, outages=outages, title=f"Error over time, {count} seeds"),
                 f"{name}-error",
-                f"Median over the seeds, and the band from the 5th to the 95th percentile.{shaded}",
+                f"Median over the seeds, and the band from the 5th to the 95th percentile.{shaded}{which}",
                 "Error of every estimator over time, with its spread over the seeds",
             )
         )

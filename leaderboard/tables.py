@@ -17,8 +17,8 @@ MISSING = "–"
 def number(value: Any, digits: int = 3) -> str:
     """A figure with ``digits`` significant digits, without exponents where they can be avoided.
 
-    >>> number(1234.5), number(0.012345), number(2.0), number(None)
-    ('1230', '0.0123', '2.00', '–')
+    >>> number(1234.5), number(0.012345), number(0.9999), number(None)
+    ('1230', '0.0123', '1.00', '–')
     """
     if value is None:
         return MISSING
@@ -33,11 +33,12 @@ def number(value: Any, digits: int = 3) -> str:
         return "∞" if x > 0 else "-∞"
     if x == 0.0:
         return "0"
+    x = float(f"{x:.{digits - 1}e}")
     exponent = math.floor(math.log10(abs(x)))
     if exponent >= 6 or exponent < -4:
         return f"{x:.{digits - 1}e}"
     decimals = digits - 1 - exponent
-    return f"{round(x, decimals):.{max(decimals, 0)}f}"
+    return f"{x:.{max(decimals, 0)}f}"
 
 
 def interval(value: Any, low: Any, high: Any) -> str:

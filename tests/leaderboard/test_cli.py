@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from leaderboard import arguments, cli
@@ -390,6 +392,22 @@ def test_progress_without_a_terminal_says_how_long(capsys, monkeypatch):
     assert said.out == ""
     assert "running: 1/4" in said.err
     assert "1:15 left" in said.err
+
+
+def test_progress_on_a_terminal_begins_each_stage_anew():
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=100)
+    with Progress(console, "starting") as progress:
+        progress.begin("compiling")
+        progress(7, 16, "a kernel", 30.0)
+        progress._bar.refresh()
+        assert "7/16" in screen.getvalue()
+        assert "0:30" in screen.getvalue()
+        screen.truncate(0)
+        progress.begin("running")
+        progress._bar.refresh()
+    assert "running" in screen.getvalue()
+    assert "16" not in screen.getvalue()
 
 
 def test_estimators_are_split_with_their_parameters():
