@@ -95,7 +95,7 @@ class Bound:
     def summary(self) -> dict[str, Any]:
         """A small dict for JSON: the RMS over the run and the last value of each component, SI units."""
         sigma = self.sigma
-        known = np.isfinite(sigma).all(axis=0).tolist()
+        known = [bool(k) for k in np.all(np.isfinite(sigma), axis=0)]
         rms = np.sqrt(np.mean(sigma**2, axis=0))
         return {
             "scenario": self.scenario,

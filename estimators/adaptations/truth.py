@@ -35,6 +35,8 @@ __all__ = ["FisherNoise", "MixtureNoise", "NominalNoise", "TrueNoise", "fisher_i
 LIMIT = 3.0
 #: A gross error is one, to those that have to guess, above this probability.
 CERTAIN = 0.95
+#: Points of the integral for the Fisher information, as a power of two.
+_POINTS = 14
 #: Size of each kind of fault that lasts: the stem of its parameter.
 LASTING = {"multipath": "sigma", "bias_step": "offset", "ramp": "slope"}
 
@@ -225,26 +227,26 @@ class FisherNoise(MixtureNoise):
         if mixture is None or len(mixture) == 1:
             return None if mixture is None else mixture[0][1]
         variances = np.array([np.diag(noise) for _, noise in mixture])
-        key = np.round(variances, 12).tobytes()
+        # In units of the first hypothesis' sigmas the information hardly changes from one measurement to the next.
+        ratio = np.round(np.log(variances / variances[0]), 2)
+        key = ratio.tobytes()
         if key not in self._known:
-            self._known[key] = fisher_information(np.array([p for p, _ in mixture]), variances)
-        gain = 1.0 / np.sqrt(self._known[key] * variances[0])  # sigma of the noise over that without gross errors
+            self._known[key] = fisher_information(np.array([p for p, _ in mixture]), np.exp(ratio))
+        gain = 1.0 / np.sqrt(self._known[key])
         return np.asarray(mixture[0][1] * np.outer(gain, gain))
 
 
-def fisher_information(probability: Array, variance: Array, nodes: int = 24) -> Array:
+def fisher_information(probability: Array, variance: Array) -> Array:
     """Diagonal of the Fisher information of location of a mixture of zero-mean normal densities.
 
     ``J_ii = integral of (d p / d x_i)^2 / p``; the rest is zero by symmetry. Components of one hypothesis are
-    independent, but share the hit.
+    independent, but share the hit. The integral is a mean over quasi-random points, good to 0.5 %.
 
     Parameters
     ----------
     probability : (c,) array
     variance : (c, d) array
         Of each component under each hypothesis.
-    nodes : int
-        Of the Gauss-Hermite quadrature, in each component.
 
     Returns
     -------
@@ -252,21 +254,22 @@ def fisher_information(probability: Array, variance: Array, nodes: int = 24) -> 
 
     Examples
     --------
-    >>> fisher_information(np.array([1.0]), np.array([[4.0]])).round(6)
+    >>> fisher_information(np.array([1.0]), np.array([[4.0]])).round(3)
     array([0.25])
     """
-    x, w = np.polynomial.hermite_e.hermegauss(nodes)
+    from scipy.special import ndtri
+    from scipy.stats.qmc import Sobol
+
     d = variance.shape[1]
-    grid = np.array(list(product(x, repeat=d)))
-    weight = np.prod(np.array(list(product(w / w.sum(), repeat=d))), axis=1)
+    points = ndtri(np.clip(Sobol(d, seed=0).random_base2(_POINTS), 1e-9, 1.0 - 1e-9))
     information = np.zeros(d)
     for p, v in zip(probability, variance, strict=True):
-        at = grid * np.sqrt(v)
+        at = points * np.sqrt(v)
         logs = np.log(probability) - 0.5 * (np.log(variance).sum(axis=1) + at**2 @ (1.0 / variance).T)
         share = np.exp(logs - logs.max(axis=1, keepdims=True))
         share /= share.sum(axis=1, keepdims=True)
         score = at * (share @ (1.0 / variance))
-        information += p * (weight @ score**2)
+        information += p * np.mean(score**2, axis=0)
     return information
 
 
