@@ -281,7 +281,7 @@ def _missing(factory: Factory, recording: Recording) -> Finding:
             )
         if trial.status == "unsuitable":
             needed.append(label)
-    sentence = f"it says what it needs without {', '.join(needed)}" if needed else "it needs none of them"
+    sentence = f"without {', '.join(needed)} it says what it needs" if needed else "it works without any of them"
     return Finding("missing instruments", True, sentence)
 
 

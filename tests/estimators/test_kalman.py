@@ -222,12 +222,17 @@ def with_streams(recording: Recording, change) -> Recording:
     return replace(recording, data=replace(data, aids={n: change(s) for n, s in data.aids.items()}))
 
 
+@pytest.fixture(scope="module")
+def long_recording(recording_of) -> Recording:
+    return recording_of(7, 180.0)
+
+
 @pytest.mark.parametrize("name", names())
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_every_estimator_stays_finite_on_bad_input(recording_of, run_over, name: str, data: st.DataObject):
+def test_every_estimator_stays_finite_on_bad_input(long_recording, run_over, name: str, data: st.DataObject):
     """Gaps of minutes, absurd values, repetitions, disorder, late measurements: finite, or a sentence."""
-    recording = recording_of(7, 180.0)
+    recording = long_recording
     gap = data.draw(st.tuples(st.floats(0.0, 100.0), st.floats(1.0, 150.0)), label="gap")
     absurd = data.draw(st.sampled_from([np.nan, np.inf, -np.inf, 1e9, -1e9, 1e300]), label="value")
     every = data.draw(st.integers(2, 20), label="every")
