@@ -165,7 +165,7 @@ def test_realised_errors_are_found(recording_of, run_over):
     assert sigma[3:5].max() < 0.15
     assert sigma[6] < 0.002
     assert sigma[7] < 0.01
-    assert (MISALIGNMENT, LEVER_ARM, SCALE) == (slice(15, 18), slice(18, 21), 21)
+    assert (slice(15, 18), slice(18, 21), 21) == (MISALIGNMENT, LEVER_ARM, SCALE)
 
 
 def test_it_needs_a_dvl_and_has_23_states_whatever_else_there_is(recording_of):

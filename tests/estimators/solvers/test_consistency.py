@@ -1,7 +1,8 @@
 """Consistency of the Kalman solvers over 50 seeds on matched clean scenarios: ANEES within its 95 % band.
 
 The realised biases of the IMU, which no recording holds, are read off the simulated IMU: the same seed and datasheet
-without white noise, fed with zeros, delivers its turn-on bias and random walk, for each process has a stream of its own.
+without white noise, fed with zeros, delivers its turn-on bias and random walk, for each process has a stream of its
+own.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def open_sea() -> Scenario:
 
 
 def uuv() -> Scenario:
-    """The UUV of paper 003 without faults; its DVL draws a scale factor and a misalignment, and no noise of its speed."""
+    """The UUV of paper 003 without faults; its DVL draws a scale factor and a misalignment."""
     s = load("uuv-surface")
     dvl = s.instruments["dvl"].model_copy(update={"speed_noise": 0.0, "bias": (0.0, 0.0, 0.0)})
     changes = {"faults": (), "duration": DURATION, "instruments": {**s.instruments, "dvl": dvl}}
@@ -92,7 +93,7 @@ def nees(estimator, recording, true_bias: np.ndarray) -> dict[str, np.ndarray]:
 
 def anees(scenario: Scenario, filters: dict) -> dict[str, dict[str, np.ndarray]]:
     """By filter and group: NEES by epoch, averaged over seeds and divided by its dimension."""
-    out = {name: {group: 0.0 for group in GROUPS} for name in filters}
+    out = {name: dict.fromkeys(GROUPS, 0.0) for name in filters}
     for seed in range(SEEDS):
         recording = record(scenario, seed)
         true_bias = biases(scenario, seed, recording.data.truth.time)
@@ -135,5 +136,5 @@ def test_linear_filters_within_their_range(linear, name: str, group: str):
 
 
 def test_the_linear_filter_out_of_its_range():
-    """Milli-g accelerometers: after 100 s the free inertial solution is off by 1 m/s, and velocity is not consistent."""
+    """Milli-g accelerometers: after 100 s free inertial navigation is off by 1 m/s, and velocity is not consistent."""
     assert anees(uuv(), {"kf": ("kf", {})})["kf"]["velocity"][-20:].mean() > 5.0
