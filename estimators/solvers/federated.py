@@ -12,7 +12,8 @@ over the states that all have in common, and feeds x_f back to the shared refere
 - *with reset*, every local filter takes P_f / beta_i and x_f (Carlson's fusion-reset mode). Where all fuse after every
   measurement this is the centralized filter exactly, as long as no sensor has states of its own.
 - *without reset*, every local filter goes on with what it knows (no-reset mode): it is never told what the others saw,
-  so that a fault of one stays in one, at the price of a worse estimate. The sum is then an upper bound of the error.
+  so that a fault of one stays in one (but for the shared reference, about which all are linear), at the price of a
+  worse estimate. The sum is then an upper bound of the error.
 
 Calibration states belong to the local filter of their sensor. They are not fused; given the common states they are
 independent of the other filters' (which holds exactly at one time only, and is the price of the architecture). A reset
@@ -39,6 +40,7 @@ from estimators.adaptations.base import Adaptation
 from estimators.models.inertial import InertialModel
 from estimators.models.propagation import propagate_covariance
 from estimators.solvers.kalman import KalmanEstimator, Observation
+from simnav.estimator import UnsuitableScenario
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["FederatedEstimator"]
@@ -100,7 +102,7 @@ class FederatedEstimator(KalmanEstimator):
         names = list(self._used)
         shares = self.shares or tuple((1.0 - self.master_share) / len(names) for _ in names)
         if len(shares) != len(names):
-            raise ValueError(f"{len(shares)} shares do not fit {len(names)} aiding sensors: {', '.join(names)}")
+            raise UnsuitableScenario(f"{len(shares)} shares do not fit {len(names)} aiding sensors: {', '.join(names)}")
         model = self.model
         self._common = c = len(model.transition)
         starts = {name: [at[name] for at in (model.bias_at, model.scale_at) if name in at] for name in names}
