@@ -470,7 +470,10 @@ def _reason(runs: Runs, status: str) -> str:
 
 
 def _score_cells(runs: Sequence[tuple[Runs, bool]]) -> tuple[list[dict[str, str]], list[dict[str, Any]]]:
-    """Columns in which anybody who is ranked has a figure, and the cells of each row; the second of a pair bars it from the best."""
+    """Columns in which anybody who is ranked has a figure, and the cells of each row.
+
+    The second of a pair says whether it is barred from being the best.
+    """
     columns = []
     cells: list[dict[str, Any]] = [{} for _ in runs]
     for key, title, factor, form, lower in _COLUMNS:
