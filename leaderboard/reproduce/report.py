@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["paper_tables", "summary", "write_csv"]
 
-_WORDS = {"ours": "", "absent": "not there yet"}
-
 
 def summary(found: Reproduction) -> str:
     """One line: how many rows agree."""
@@ -32,22 +30,29 @@ def summary(found: Reproduction) -> str:
 
 
 def paper_tables(found: Reproduction) -> Iterator[Table]:
-    """One table for each of the paper's."""
+    """One table for each of the paper's; methods without either figure are left out.
+
+    Why a row differs is a note below its table.
+    """
     for of in found.paper.tables:
-        rows = [f for f in found.findings if f.table == of.title]
-        columns = ["method", "ours by", "", "paper", "ours [95 %]", "runs", "verdict"]
-        cells = [
-            [_method(f), _by(f), _title(f), _paper(f), _ours(f), _runs(f), _verdict(f)] for f in rows
-        ]  # fmt: skip
+        rows = [f for f in found.findings if f.table == of.title and (f.verdict != "absent" or f.row.paper is not None)]
+        columns = ["method", "ours by", "measure", "paper", "ours [95 %]", "runs", "verdict"]
+        whys = list(dict.fromkeys(f.why for f in rows if f.why and f.verdict != "absent"))
+        several = len({f.row.scenario for f in rows}) > 1
+        cells, before = [], ""
+        for f in rows:
+            name = _method(f)
+            same = name == before
+            cells.append(["" if same else name, "" if same else _by(f), _title(f, several), _paper(f), _ours(f), _runs(f),
+                          _verdict(f, whys)])  # fmt: skip
+            before = name
         strong = [i for i, f in enumerate(rows) if f.verdict == "differs"]
         dim = [i for i, f in enumerate(rows) if f.verdict in ("absent", "ours")]
-        caption = "~ follows from other figures of the paper, or from its prose" if _derived(rows) else None
+        notes = [f"({chr(ord('a') + i)}) {why}" for i, why in enumerate(whys)]
+        if any(f.row.derived and f.row.paper is not None for f in rows):
+            notes.insert(0, "~ follows from other figures of the paper, or from its prose")
         yield tables.table(of.title, columns, cells, numeric=["paper", "ours [95 %]", "runs"], strong=strong, dim=dim,
-                           caption=caption)  # fmt: skip
-
-
-def _derived(rows: list[Finding]) -> bool:
-    return any(f.row.derived and f.row.paper is not None for f in rows)
+                           caption="\n".join(notes) or None)  # fmt: skip
 
 
 def _method(f: Finding) -> str:
@@ -58,9 +63,10 @@ def _by(f: Finding) -> str:
     return " / ".join(f.estimators)
 
 
-def _title(f: Finding) -> str:
+def _title(f: Finding, with_scenario: bool) -> str:
     m = measure(f.row.score)
-    return f"{m.title}, better by" if isinstance(f.row, Gain) else f"{m.title} [{m.unit}]"
+    text = f"{m.title}, better by" if isinstance(f.row, Gain) else f"{m.title} [{m.unit}]"
+    return f"{text} ({f.row.scenario})" if with_scenario else text
 
 
 def _paper(f: Finding) -> str:
@@ -94,11 +100,11 @@ def _runs(f: Finding) -> str:
     return f"{f.ours.runs}, {f.failed} failed" if f.failed else str(f.ours.runs)
 
 
-def _verdict(f: Finding) -> str:
-    word = _WORDS.get(f.verdict, f.verdict)
+def _verdict(f: Finding, whys: list[str]) -> str:
     if f.verdict == "absent":
         return f.why
-    return f"{word}: {f.why}" if f.why else word
+    word = "" if f.verdict == "ours" else f.verdict
+    return f"{word} ({chr(ord('a') + whys.index(f.why))})" if f.why else word
 
 
 def write_csv(found: Reproduction, path: Path) -> Path:

@@ -246,6 +246,4 @@ def find(
     sentence = ""
     if verdict.word == "differs":
         sentence = why[verdict.side] or _UNEXPLAINED
-    elif verdict.word == "undecided":
-        sentence = f"{ours.runs} runs are too few to tell"
     return Finding(table, row, ours, verdict.word, sentence, names, failed)
