@@ -22,14 +22,32 @@ from estimators.models.inertial import InertialModel
 from estimators.models.points import PointModel
 from simnav.compiled import kernel
 from simnav.earth import ROTATION_RATE, radii_scalar
-from simnav.rotation import cross, dcm_from_rotation_vector, rotation_coefficients, skew
+from simnav.rotation import cross, rotation_coefficients
 from simnav.strapdown import mechanize_step, sample_from_motion
 from simnav.types import Array, Datasheet, Measurement
 
-__all__ = ["PIECE", "InertialPoints", "propagate_points"]
+__all__ = ["PIECE", "InertialPoints", "propagate_points", "turn_points"]
 
 #: Longest piece of the motion that one equivalent sample stands for [s].
 PIECE = 0.5
+
+
+@kernel()
+def _turn(dcm, r0, r1, r2, turned):  # type: ignore[no-untyped-def]
+    """``turned = exp(r x) dcm``."""
+    a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
+    for j in range(3):
+        c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
+        x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
+        y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
+        turned[0, j], turned[1, j], turned[2, j] = c0 + a * x0 + b * y0, c1 + a * x1 + b * y1, c2 + a * x2 + b * y2
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+def turn_points(dcm, errors, dcms):  # type: ignore[no-untyped-def]
+    """DCMs of k points: ``dcms[k] = exp(errors[k, 6:9] x) dcm``."""
+    for k in range(errors.shape[0]):
+        _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], dcms[k])
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8[:, ::1])")
@@ -83,14 +101,9 @@ def propagate_points(  # type: ignore[no-untyped-def]
         p[0] = position[0] + errors[k, 0] / north
         p[1] = position[1] + errors[k, 1] / east
         p[2] = position[2] - errors[k, 2]
-        r0, r1, r2 = errors[k, 6], errors[k, 7], errors[k, 8]
-        a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
         for j in range(3):
             v[j] = velocity[j] + errors[k, 3 + j]
-            c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
-            x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
-            y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
-            m[0, j], m[1, j], m[2, j] = c0 + a * x0 + b * y0, c1 + a * x1 + b * y1, c2 + a * x2 + b * y2
+        _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
         memory[:] = 0.0
         mechanize_step(
             p, v, m, memory,
@@ -146,7 +159,8 @@ class InertialPoints(InertialModel, PointModel):
         sheet = self.instruments[measurement.instrument]
         with_state = np.zeros((len(errors) + 1, self.size))
         with_state[1:] = errors
-        dcm = dcm_from_rotation_vector(with_state[:, 6:9]) @ self.dcm
+        dcm = np.empty((len(with_state), 3, 3))
+        turn_points(self.dcm, with_state, dcm)
         predicted = _FUNCTIONS[sheet.kind](self, sheet, with_state, dcm)
         at = self.bias_at.get(sheet.name)
         if at is not None:
@@ -161,7 +175,8 @@ class InertialPoints(InertialModel, PointModel):
         latitude = float(self.position[0])
         earth = np.array([ROTATION_RATE * cos(latitude), 0.0, -ROTATION_RATE * sin(latitude)])
         rate = self.raw_rate - self.bias[:3] - errors[:, 9:12] - earth @ dcm
-        return np.asarray(rate @ skew(sheet.lever_arm))
+        l0, l1, l2 = sheet.lever_arm.tolist()
+        return np.asarray(rate @ np.array([[0.0, -l2, l1], [l2, 0.0, -l0], [-l1, l0, 0.0]]))
 
     def body_velocity(self, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
         """(k, 3) velocity over the ground of an instrument, body axes: C' v + w x l."""
