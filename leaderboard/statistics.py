@@ -150,10 +150,10 @@ def tiers(
 ) -> dict[str, Place]:
     """Sort entries into tiers that hold together what cannot be told apart.
 
-    The entry with the lowest score leads the first tier; all others are tested against it, paired and Holm-corrected,
-    and those that are not significantly worse join it. The same again with the rest, until nobody is left. An entry
-    with few or noisy runs may thus join a better tier than one with a lower score; five runs or fewer never tell
-    anything apart.
+    The entry with the lowest score leads the first tier; all others are tested against it, paired and Holm-corrected.
+    The tier ends at the first, in order of score, that is significantly worse; that one leads the next tier, and so
+    on. So an entry with few or noisy runs never stands above one with a better score that was told apart. Five runs or
+    fewer never tell anything apart.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def tiers(
     Returns
     -------
     dict of name to Place
-        In order of tier, then score.
+        In order of score, and so of tier.
     """
     left = sorted(scores, key=lambda name: (scores[name], name))
     places: dict[str, Place] = {}
@@ -179,10 +179,10 @@ def tiers(
         p = dict(zip(others, holm([_worse(differences(name, leader)) for name in others]).tolist(), strict=True))
         if tier == 1:
             from_best = p
-        joined = [name for name in others if p[name] >= level]
-        for name in [leader, *joined]:
+        end = next((i for i, name in enumerate(others) if p[name] < level), len(others))
+        for name in [leader, *others[:end]]:
             places[name] = Place(tier, from_best.get(name))
-        left = [name for name in others if name not in places]
+        left = others[end:]
     return places
 
 
