@@ -1,0 +1,146 @@
+"""The Cramer-Rao bound: against closed forms, its order, and the oracle that attains it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm, solve_discrete_are
+
+from estimators.bound import KINDS, Bound, bound, information
+from simnav.estimator import make
+from simnav.scenario import Scenario, load
+from simnav.scoring import errors
+from simnav.scoring.consistency import GROUPS, nees, nees_band
+from simnav.sensors.faults import GrossError, Multipath, NoiseStep, Outage
+from simnav.sensors.imu import AccelerometerSpec, GyroscopeSpec, ImuSpec
+from simnav.simulator import ideal, simulate
+from simnav.spec import SpecError
+from simnav.trial import run_trial
+
+
+def shortened(name: str, duration: float, **changes) -> Scenario:
+    return load(name).model_copy(update={"duration": duration, **changes})
+
+
+@pytest.fixture(scope="module")
+def drift() -> Scenario:
+    """Perfect gyroscopes, accelerometers of white noise only, and position fixes: three double integrators."""
+    scenario = load("open-sea")
+    gnss = scenario.instruments["gnss"].model_copy(update={"lever_arm": (0.0, 0.0, 0.0)})
+    imu = ImuSpec(rate=50.0, gyroscope=GyroscopeSpec(), accelerometer=AccelerometerSpec(random_walk=0.02))
+    start = scenario.initial_error.model_copy(update={"attitude": (1e-7, 1e-7, 1e-7)})
+    return shortened("open-sea", 120.0, instruments={"imu": imu, "gnss": gnss}, initial_error=start, sea=None)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_fixes_and_white_acceleration_reach_the_riccati_fixed_point(drift: Scenario, axis: int):
+    """p' = v, v' = white noise of density q, p measured each second: the discrete algebraic Riccati equation."""
+    q, r = 0.02**2, drift.instruments["gnss"].sigma[axis] ** 2
+    g = 2.0 * 9.8 / 6.378e6 if axis == 2 else 0.0  # gravity falls with height
+    F = expm(np.array([[0.0, 1.0], [g, 0.0]]))
+    Q = q * np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]])
+    predicted = solve_discrete_are(F.T, np.array([[1.0], [0.0]]), Q, np.array([[r]]))
+    posterior = predicted - predicted[:, :1] @ predicted[:1] / (predicted[0, 0] + r)
+    found = bound(drift, [0]).covariance[-1][np.ix_([axis, axis + 3], [axis, axis + 3])]
+    np.testing.assert_allclose(found, posterior, rtol=2e-3)
+
+
+def test_a_constant_position_is_known_as_one_over_n(drift: Scenario):
+    """No noise in the motion, the velocity known: the information of n fixes adds to that of the start."""
+    imu = ImuSpec(rate=50.0, gyroscope=GyroscopeSpec(), accelerometer=AccelerometerSpec())
+    start = drift.initial_error.model_copy(update={"velocity": (1e-9, 1e-9, 1e-9), "position": (2.0, 3.0, 4.0)})
+    still = drift.model_copy(
+        update={"instruments": {**drift.instruments, "imu": imu}, "initial_error": start, "duration": 40.0}
+    )
+    found = bound(still, [0])
+    sigma = np.array(drift.instruments["gnss"].sigma)
+    n = np.searchsorted(simulate(still, 0).data.aids["gnss"].time, found.time + 1e-6)
+    expected = 1.0 / np.sqrt(np.array([2.0, 3.0, 4.0]) ** -2.0 + n[:, None] / sigma**2)
+    np.testing.assert_allclose(found.sigma[:, :2], expected[:, :2], rtol=1e-4)
+
+
+def test_the_kinds_agree_without_faults_and_are_in_order_with_them():
+    clean = shortened("open-sea", 60.0)
+    a, b, c = (bound(clean, [1], kind) for kind in KINDS)
+    np.testing.assert_allclose(a.covariance, b.covariance)
+    np.testing.assert_allclose(a.covariance, c.covariance)
+    faults = (
+        NoiseStep(instruments=("gnss",), factor=2.0, start=20.0),
+        GrossError(instruments=("gnss",), probability=0.3, size_position=(2.0, 9.0), start=20.0),
+    )
+    wrong = shortened("open-sea", 60.0, faults=faults)
+    clean_, flags, mix = (bound(wrong, range(4), kind) for kind in KINDS)
+    np.testing.assert_allclose(clean_.covariance, bound(clean, range(4)).covariance, rtol=1e-9)
+    assert np.all(flags.sigma[25:, :3] > clean_.sigma[25:, :3])
+    assert mix.horizontal_rms > 1.003 * flags.horizontal_rms
+    np.testing.assert_allclose(mix.sigma[:19], flags.sigma[:19], rtol=1e-12)
+
+
+def test_an_outage_is_no_information_and_multipath_is_a_state():
+    out = shortened("open-sea", 60.0, faults=(Outage(instruments=("gnss",), start=20.0),))
+    without = bound(out, [0])
+    everything = bound(shortened("open-sea", 60.0), [0])
+    assert np.all(without.sigma[25:, 0] > 1.1 * everything.sigma[25:, 0])
+    # Multipath of no correlation is noise, one that never changes says where the vessel moves, not where it is.
+    sigma = 6.0
+    horizontal = {}
+    for time in (0.001, 10.0, 1e6):
+        fault = Multipath(instruments=("gnss",), sigma_position=sigma, correlation_time=time)
+        horizontal[time] = bound(shortened("open-sea", 60.0, faults=(fault,)), [0]).horizontal[-1]
+    gnss = load("open-sea").instruments["gnss"]
+    louder = gnss.model_copy(update={"sigma": tuple(np.hypot(gnss.sigma, sigma))})
+    instruments = {**load("open-sea").instruments, "gnss": louder}
+    noise = bound(shortened("open-sea", 60.0, instruments=instruments), [0]).horizontal[-1]
+    assert horizontal[0.001] == pytest.approx(noise, rel=1e-6)
+    assert horizontal[0.001] < horizontal[10.0] < horizontal[1e6]
+
+
+@pytest.mark.parametrize(("name", "duration"), [("open-sea", 240.0), ("window-bias", 300.0)])
+def test_the_oracle_attains_the_bound_over_50_seeds(name: str, duration: float):
+    """Below 0.97 of the bound something leaks the truth; above 1.08 the oracle wastes what it knows."""
+    scenario = shortened(name, duration)
+    limit = bound(scenario, range(3))
+    error, means = [], []
+    for seed in range(50):
+        recording = simulate(scenario, seed)
+        trial = run_trial(make("oracle"), recording)
+        error.append(errors(trial, recording))
+        means.append([nees(error[-1], trial.covariance, index)[0].mean() / len(index) for index in GROUPS.values()])
+    horizontal = np.sqrt(np.mean(np.sum(np.square(error)[..., :2], axis=-1)))
+    assert 0.97 < horizontal / limit.horizontal_rms < 1.08
+    for index, mean in zip(GROUPS.values(), np.mean(means, axis=0), strict=True):
+        low, high = nees_band(len(index), 50)
+        assert low < mean < high
+
+
+def test_information_is_averaged_before_it_is_inverted():
+    scenario = shortened(
+        "open-sea", 40.0, faults=(GrossError(instruments=("gnss",), probability=0.5, size_position=(30.0, 60.0)),)
+    )
+    both = bound(scenario, [0, 1])
+    by_hand = np.linalg.inv(0.5 * sum(information(ideal(scenario, s))[0] for s in (0, 1)))
+    np.testing.assert_allclose(both.covariance, by_hand, rtol=1e-6)
+    each = [bound(scenario, [s]).covariance for s in (0, 1)]
+    assert np.linalg.eigvalsh(0.5 * (each[0] + each[1]) - both.covariance).min() > -1e-9
+
+
+def test_summary_and_a_ship_without_imu():
+    found = bound(shortened("ship-dead-reckoning", 30.0), [0])
+    assert isinstance(found, Bound)
+    assert np.isnan(found.sigma[:, 2]).all()
+    summary = found.summary()
+    assert set(summary["rms"]) == {"north", "east", "velocity_north", "velocity_east", "attitude_down"}
+    assert summary["horizontal_last_m"] == pytest.approx(np.hypot(*found.sigma[-1, :2]))
+    assert summary["scenario"] == "ship-dead-reckoning-v1"
+
+
+def test_what_has_no_bound():
+    with pytest.raises(SpecError, match="recorded run"):
+        bound(load("car-kitti"), [0])
+    with pytest.raises(SpecError, match="there are: clean, flags, mix"):
+        bound(load("open-sea"), [0], "best")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="at least one seed"):
+        bound(load("open-sea"), [])
+    lonely = shortened("open-sea", 10.0, instruments={"imu": load("open-sea").instruments["imu"]})
+    with pytest.raises(SpecError, match="open-sea-v1, seed 0: there is no bound"):
+        bound(lonely, [0])
