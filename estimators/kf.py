@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from estimators.ekf import AidedInertial
 from estimators.models.dvl_calibration import DvlCalibrationModel
 from estimators.models.inertial import InertialModel
@@ -38,7 +40,9 @@ class Kf23(LinearKalmanEstimator, AidedInertial):
         Sigma of each component of the DVL's lever-arm error [m].
     delay : float
         Sigma of the DVL's time error [s].
+    preset : "default" or "paper"
+        "paper": the noise of GNSS and DVL as printed, 5 m and 0.1 m/s, instead of the datasheets'.
     """
 
-    def __init__(self, lever_arm: float = 0.02, delay: float = 0.005):
-        super().__init__(DvlCalibrationModel(lever_arm, delay))
+    def __init__(self, lever_arm: float = 0.02, delay: float = 0.005, preset: Literal["default", "paper"] = "default"):
+        super().__init__(DvlCalibrationModel(lever_arm, delay, preset))

@@ -24,28 +24,38 @@ Source: Zhan et al. 2026 (paper 003), eqs. 1-2 and 13-21. Where it is unclear, t
   known and its time is right; both errors are the DVL's.
 - H1 of eq. 16 has 20 columns for 23 states and H2 of eq. 21 none for the time error; here the columns are as above.
 - F of eq. 13 is continuous; here it is integrated (`estimators.models.inertial`), and G has 23 rows.
+- The noise of the measurements is the datasheets'; the printed one is the preset ``paper``. None of the states is
+  printed.
 - The paper's state begins with attitude, ours with position; the eight follow in its order: eta, dl, k, tau.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from math import cos, sin
+from typing import Literal
 
 import numpy as np
 
 from estimators.models.base import Linearised
 from estimators.models.inertial import InertialModel
 from estimators.models.measurements import velocity_of_arm
-from simnav.earth import earth_rate, gravity
+from simnav.earth import ROTATION_RATE, gravity
 from simnav.estimator import UnsuitableScenario
-from simnav.rotation import skew
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
 
 #: Places of the DVL's errors in the state.
 MISALIGNMENT, LEVER_ARM, SCALE, DELAY = slice(15, 18), slice(18, 21), 21, 22
+#: Of each component, after the paper's simulation: "diag(0.1, 0.1, 0.1, 5, 5, 5)^2" [m/s], [m].
+_PRINTED = {"gnss_position": 5.0, "gnss_velocity": 0.1, "dvl": 0.1}
 _IDENTITY = np.eye(3)
+
+
+def _across(vector: Array) -> Array:
+    """``[vector x]``, without the overhead of stacks."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 class DvlCalibrationModel(InertialModel):
@@ -60,13 +70,15 @@ class DvlCalibrationModel(InertialModel):
         Sigma of each component of the lever-arm error [m].
     delay : float
         Sigma of the DVL's time error [s].
+    preset : "default" or "paper"
+        "paper": the noise of GNSS and DVL as printed, 5 m and 0.1 m/s, instead of the datasheets'.
     """
 
-    states: ClassVar[int] = 23
-
-    def __init__(self, lever_arm: float = 0.02, delay: float = 0.005):
+    def __init__(self, lever_arm: float = 0.02, delay: float = 0.005, preset: Literal["default", "paper"] = "default"):
         super().__init__(calibrate=False)
-        self.lever_arm, self.delay = lever_arm, delay
+        if preset not in ("default", "paper"):
+            raise ValueError(f'preset is {preset!r}; it must be "default" or "paper"')
+        self.lever_arm, self.delay, self.preset = lever_arm, delay, preset
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU or a DVL."""
@@ -76,7 +88,11 @@ class DvlCalibrationModel(InertialModel):
         self._dvl = dvls[0]
         self._gravity = np.array([0.0, 0.0, float(gravity(start.position[0], start.position[2]))])
         self._raw = np.zeros((3, 12))
-        return super().begin(start, instruments)
+        covariance = super().begin(start, instruments)
+        if self.preset == "paper":
+            for sheet in instruments.of_kind(*_PRINTED):
+                self.noise[sheet.name] = _PRINTED[sheet.kind] ** 2 * np.eye(3)
+        return covariance
 
     def _more_states(self) -> list[tuple[float, float, float]]:
         sigmas = [*self._dvl.misalignment, *[self.lever_arm] * 3, self._dvl.scale, self.delay]
@@ -95,16 +111,17 @@ class DvlCalibrationModel(InertialModel):
         velocity_of_arm(
             True, self.position[0], self.dcm, self.velocity, self.raw_rate, self.bias, sheet.lever_arm + dl, raw, u
         )  # fmt: skip
-        rate = self.raw_rate - self.bias[:3] - to_body @ earth_rate(self.position[0])
-        turn = skew(rate)
+        latitude = float(self.position[0])
+        earth = np.array([ROTATION_RATE * cos(latitude), 0.0, -ROTATION_RATE * sin(latitude)])
+        turn = _across(self.raw_rate - self.bias[:3] - to_body @ earth)
         acceleration = self.raw_force - self.bias[3:] + to_body @ self._gravity - turn @ (to_body @ self.velocity)
         u -= acceleration * tau
-        s, across = skew(eta), skew(u)
+        s, across = _across(eta), _across(u)
         turned = _IDENTITY - s + 0.5 * (s @ s)
         matrix = (1.0 + k) * turned
         jacobian = np.zeros((3, self.size))
         jacobian[:, 3:12] = matrix @ raw[:, 3:]
-        jacobian[:, MISALIGNMENT] = (1.0 + k) * (across - 0.5 * (skew(s @ u) + s @ across))
+        jacobian[:, MISALIGNMENT] = (1.0 + k) * (across - 0.5 * (_across(s @ u) + s @ across))
         jacobian[:, LEVER_ARM] = matrix @ turn
         jacobian[:, SCALE] = turned @ u
         jacobian[:, DELAY] = -(matrix @ acceleration)

@@ -44,10 +44,12 @@ from estimators.adaptations.base import Adaptation
 from estimators.models.inertial import InertialModel
 from estimators.solvers.iterated import left_jacobian
 from estimators.solvers.kalman import KalmanEstimator
-from simnav.rotation import dcm_from_rotation_vector, skew
+from simnav.rotation import skew
 from simnav.types import Array
 
 __all__ = ["InvariantKalmanEstimator"]
+
+_IDENTITY = np.eye(3)
 
 
 class InvariantKalmanEstimator(KalmanEstimator):
@@ -73,15 +75,14 @@ class InvariantKalmanEstimator(KalmanEstimator):
     def _correct(self, dx: Array) -> None:
         """Correct on the group, and take the covariance of the invariant error along."""
         turn, P = dx[6:9], self.covariance
-        J = left_jacobian(turn)
+        J, across = left_jacobian(turn), skew(turn)
         dx[0:3], dx[3:6] = J @ dx[0:3], J @ dx[3:6]
         self.model.correct(dx)
         if self.error == "left":
-            N = dcm_from_rotation_vector(turn)
-            for at in (slice(0, 3), slice(3, 6), slice(6, 9)):
-                P[at] = N @ P[at]
-            for at in (slice(0, 3), slice(3, 6), slice(6, 9)):
-                P[:, at] = P[:, at] @ N.T
+            N = np.zeros((9, 9))
+            N[0:3, 0:3] = N[3:6, 3:6] = N[6:9, 6:9] = _IDENTITY + across @ J  # exp(turn x)
+            P[:9] = N @ P[:9]
+            P[:, :9] = P[:, :9] @ N.T
         else:
             shift = np.concatenate([skew(dx[0:3]), skew(dx[3:6])])
             P[0:6] -= shift @ P[6:9]

@@ -179,6 +179,18 @@ def test_it_needs_a_dvl_and_has_23_states_whatever_else_there_is(recording_of):
         assert estimator.covariance.shape == (23, 23)
 
 
+def test_the_noise_as_printed(recording_of):
+    recording = recording_of(0, 2.0)
+    model = DvlCalibrationModel(preset="paper")
+    model.begin(recording.start, Instruments(SHEETS, recording.instruments.imu))
+    assert {n: model.noise[n][0, 0] for n in ("gnss", "gnss_velocity", "dvl")} == pytest.approx(
+        {"gnss": 25.0, "gnss_velocity": 0.01, "dvl": 0.01}
+    )
+    assert model.noise["depth"][0, 0] == pytest.approx(1.0)
+    with pytest.raises(ValueError, match='preset is \'print\'; it must be "default" or "paper"'):
+        Ekf23(preset="print")
+
+
 def test_second_dvl_has_no_states(recording_of):
     second = replace(SHEETS[2], name="dvl_two")
     model = DvlCalibrationModel()
