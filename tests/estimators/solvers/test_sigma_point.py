@@ -343,6 +343,21 @@ def test_on_clean_data_it_is_the_ekf_and_consistent(clean, run_over, name: str):
     assert low < last.mean() < high
 
 
+def test_points_drawn_ten_times_as_often_gain_nothing(clean, run_over):
+    """Once between measurements is enough: the estimates differ by less than a hundredth of their sigma."""
+
+    class Often(type(make("ukf"))):
+        def _propagate(self, until):
+            while until - self.model.time > 0.1:
+                super()._propagate(self.model.time + 0.05)
+            super()._propagate(until)
+
+    once, covariances = run_over(make("ukf"), clean[0])
+    often, _ = run_over(Often(), clean[0])
+    sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    assert np.abs((often - once) / sigma).max() < 0.01
+
+
 def test_with_calibration_states_it_is_still_the_ekf(recording_of, run_over):
     aids = (
         Datasheet("gnss", "gnss_position", 1.0, np.array([1.5, 1.5, 3.0]), bias_instability=np.full(3, 1.0),
