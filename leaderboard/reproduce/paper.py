@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Literal
@@ -146,8 +146,8 @@ class Paper:
     curves : tuple of Curves
     notes : tuple of str
         What the reader has to know of the comparison.
-    undisturbed : mapping of str to str
-        Variants: name -> scenario of the catalogue, which the variant is without its faults.
+    variants : mapping of str to (str, callable)
+        Other readings of a scenario: name -> scenario of the catalogue, and what makes the variant of it.
     """
 
     key: str
@@ -159,7 +159,7 @@ class Paper:
     tables: tuple[Table, ...]
     curves: tuple[Curves, ...] = ()
     notes: tuple[str, ...] = ()
-    undisturbed: Mapping[str, str] = field(default_factory=dict)
+    variants: Mapping[str, tuple[str, Callable[[Scenario], Scenario]]] = field(default_factory=dict)
 
     def rows(self) -> Iterator[Row]:
         """All rows of all tables."""
@@ -172,8 +172,9 @@ class Paper:
 
     def scenario(self, name: str) -> Scenario:
         """A scenario of the catalogue, or a variant of one."""
-        if name in self.undisturbed:
-            return load_scenario(self.undisturbed[name]).model_copy(update={"name": name, "faults": ()})
+        if name in self.variants:
+            base, change = self.variants[name]
+            return change(load_scenario(base)).model_copy(update={"name": name})
         return load_scenario(name)
 
     def participants(self) -> dict[str, list[str]]:

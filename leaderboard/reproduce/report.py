@@ -43,8 +43,8 @@ def paper_tables(found: Reproduction) -> Iterator[Table]:
         for f in rows:
             name = _method(f)
             same = name == before
-            cells.append(["" if same else name, "" if same else _by(f), _title(f, several), _paper(f), _ours(f), _runs(f),
-                          _verdict(f, whys)])  # fmt: skip
+            who = ["", ""] if same else [name, _by(f)]
+            cells.append([*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys)])
             before = name
         strong = [i for i, f in enumerate(rows) if f.verdict == "differs"]
         dim = [i for i, f in enumerate(rows) if f.verdict in ("absent", "ours")]
