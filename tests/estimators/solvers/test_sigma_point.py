@@ -251,19 +251,27 @@ def test_points_move_as_a_state_through_every_sample(recording_of):
         np.testing.assert_allclose(e[9:], expected[9:], rtol=1e-6, atol=1e-15)
 
 
+@pytest.mark.parametrize("calibration", [False, True], ids=["navigation", "calibration"])
 @pytest.mark.parametrize("sheet", SHEETS, ids=lambda s: s.name)
-def test_points_read_what_the_instrument_would(recording_of, sheet: Datasheet):
-    """Against the innovation at a state that is where the point is; a heading over the wrap among them."""
+def test_points_read_what_the_instrument_would(recording_of, sheet: Datasheet, calibration: bool):
+    """Against the innovation at a state that is where the point is; a heading over the wrap among them.
+
+    Products of calibration and navigation errors are left out, so one of the two is exact at a time.
+    """
     center = inertial(recording_of, InertialPoints)
+    if not calibration:
+        center.calibration[:] = 0.0
     value = {3: np.array([0.9, 0.1, 5.0]), 2: np.array([0.9, 0.1]), 1: np.array([3.0])}[len(sheet.sigma)]
     m = Measurement(7.0, sheet.name, sheet.kind, value)
     sigma = np.concatenate([np.full(3, 3.0), np.full(3, 1.0), np.full(3, 0.2), np.full(6, 1e-2)])
     sigma = np.concatenate([sigma, np.full(center.size - 15, 0.05)])
+    sigma[slice(15) if calibration else slice(15, None)] = 0.0
     errors = sigma * np.random.default_rng(4).standard_normal((7, center.size))
     here = center.measure(m).innovation
     readings = center.observe_points(m, errors)
     for e, reading in zip(errors, readings):
         point = inertial(recording_of, InertialPoints)
+        point.calibration[:] = center.calibration
         displaced(point, e)
         expected = here - point.measure(m).innovation
         if sheet.kind in ("magnetic_compass", "gyrocompass"):
