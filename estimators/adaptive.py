@@ -78,9 +78,9 @@ class SageHusaKf(_Adaptive):
 
     def __init__(
         self,
-        fading: float = 0.97,
+        fading: float = 0.96,
         prior: int = 10,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
@@ -116,7 +116,7 @@ class Iae(_Adaptive):
         high: float = 5.0,
         forgetting: float = 0.9,
         newest: bool = False,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
@@ -140,7 +140,7 @@ class IaeFixed(_Adaptive):
         window: int = 20,
         forgetting: float = 0.9,
         newest: bool = False,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
@@ -164,7 +164,7 @@ class Rae(_Adaptive):
         self,
         window: int = 20,
         forgetting: float = 0.9,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
@@ -276,10 +276,10 @@ class VbAkf(_Adaptive):
 
     def __init__(
         self,
-        forgetting: float = 0.97,
+        forgetting: float = 0.96,
         prior: float = 10.0,
         iterations: int = 2,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         scope: Scope = "fixes",
     ):

@@ -9,7 +9,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from estimators.adaptations.base import Innovation
-from estimators.adaptations.gating import chi_square_limits
 from estimators.adaptations.noise import NoiseAdaptation, Posterior
 from estimators.adaptations.robust import igg3
 from simnav.types import Array, Instruments
@@ -18,9 +17,6 @@ __all__ = ["FACTORS", "AdaptiveFactor", "exponential", "three_segment", "two_seg
 
 Statistic = Literal["discrepancy", "residual", "ratio"]
 Factor = Literal["two-segment", "three-segment", "exponential"]
-
-FIX_KINDS = ("gnss_position", "gnss_velocity", "terrain_fix")
-LOG_KINDS = ("dvl", "speed_log")
 
 
 def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
@@ -86,11 +82,10 @@ class AdaptiveFactor(NoiseAdaptation):
 
     ``target="P"`` is eq. 28: P/a, for each measurement. ``target="R"`` is what the text does in the end ("the adaptive
     factor can be used to inflate the measurement noise"): R/a by instrument; with the residual statistic and the
-    three-segment function these are IGG-III weights. By default it also doubts the prediction when the chi-square tests
-    of a position or velocity fix and of a DVL or log have failed ``together`` times running: then R stands and P is
-    inflated by the square of the residual statistic, at most `LARGEST`. Gross errors of the two that coincide once do
-    not count as a failure of the model. The covariance is Joseph's with the noise and P in use (eq. 29's first line
-    lacks the factor).
+    three-segment function these are IGG-III weights. By default it also doubts the prediction, when a fix and a log
+    have failed ``together`` times running: then R stands and P is inflated (`PredictionTest`, which also limits every
+    inflation: eq. 28 with ten gross errors in a row would multiply by 1e30 what nothing observes). The covariance is
+    Joseph's with the noise and P in use (eq. 29's first line lacks the factor).
 
     Parameters
     ----------
@@ -106,8 +101,6 @@ class AdaptiveFactor(NoiseAdaptation):
     """
 
     SMALLEST = 1e-3
-    LARGEST = 100.0
-    RECENT = 5.0  # s; a failure older than this is no company
 
     def __init__(
         self,
@@ -133,29 +126,22 @@ class AdaptiveFactor(NoiseAdaptation):
         if not (self.c0 > 0.0 and (factor != "three-segment" or self.c1 > self.c0)):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
         self.factor = FACTORS[factor]
-        self.together = 0 if self.printed else together
+        self.together = 0 if self.printed or target == "P" else together
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(instruments)
-        self._limits = chi_square_limits(0.999)
-        self._groups = {n: 0 if s.kind in FIX_KINDS else 1 for n, s in instruments.items() if s.kind in _DOUBTED}
-        self._failures: dict[str, tuple[int, float]] = {}
         self._variance: dict[str, float] = {}
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise, over the factor where R is the target; sets the inflation of P."""
         name = innovation.measurement.instrument
         posterior = Posterior(innovation, innovation.noise)
-        self.inflation = 1.0
         if posterior.nis < 0.0:  # singular: the solver leaves it out
             return innovation.noise
         factor = max(self.factor(self._statistic(innovation, posterior), self.c0, self.c1), self.SMALLEST)
         if self.target == "P":
-            self.inflation = 1.0 / factor
-        elif self._model_fails(innovation, posterior.nis):
-            self.inflation = min(max(posterior.nis / len(innovation.residual), 1.0), self.LARGEST)
-            factor = 1.0
+            self.inflation = self._prediction.limited(1.0 / factor, innovation)
         self.report(f"factor.{name}", factor)
         if self.target == "P" or factor == 1.0:
             return innovation.noise
@@ -186,20 +172,3 @@ class AdaptiveFactor(NoiseAdaptation):
         usual = self._variance.get(name, 1.0)
         self._variance[name] = 0.95 * usual + 0.05 * left
         return sqrt(moved / usual)
-
-    def _model_fails(self, innovation: Innovation, nis: float) -> bool:
-        """Whether this instrument and one of the other group have failed often enough running."""
-        name, time = innovation.measurement.instrument, innovation.measurement.time
-        group = self._groups.get(name)
-        if group is None or not self.together:
-            return False
-        failed = nis > self._limits[len(innovation.residual)]
-        count = self._failures.get(name, (0, time))[0] + 1 if failed else 0
-        self._failures[name] = count, time
-        return count >= self.together and any(
-            self._groups[other] != group and n >= self.together and time - t <= self.RECENT
-            for other, (n, t) in self._failures.items()
-        )
-
-
-_DOUBTED = (*FIX_KINDS, *LOG_KINDS)

@@ -40,7 +40,7 @@ class MaximumCorrentropy(NoiseAdaptation):
         self,
         bandwidth: float = 4.0,
         iterations: int = 5,
-        smallest: float = 1e-2,
+        smallest: float = 1e-3,
         begin: Literal["update", "prediction"] = "update",
     ):
         if not bandwidth > 0.0:
@@ -71,8 +71,8 @@ class MaximumCorrentropy(NoiseAdaptation):
             before = weights
             weights = [max(exp(-e * e * q), self.smallest) for e, q in zip(residual.tolist(), inverse)]
             noise = scaled(nominal, [1.0 / w for w in weights])
-            if min(weights) > 0.9 or (before and all(abs(a - b) <= 0.01 * b for a, b in zip(before, weights))):
-                break  # another round would not change them
+            if min(weights) > 0.7 or (before and all(abs(a - b) <= 0.02 * b for a, b in zip(before, weights))):
+                break  # another round would hardly change them
             if k < self.iterations - 1:
                 residual = Posterior(innovation, noise).residual
         self.report(self._weights[innovation.measurement.instrument], min(weights))

@@ -23,6 +23,8 @@ class FadingMemory(NoiseAdaptation):
         [s]
     """
 
+    together = 0
+
     def __init__(self, memory: float = 1000.0):
         if not memory > 0.0:
             raise ValueError(f"memory = {memory:g} s: it must be above 0")

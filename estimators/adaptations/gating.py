@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from estimators.adaptations.base import Innovation
 from estimators.adaptations.noise import NoiseAdaptation, Posterior
+from estimators.adaptations.prediction import chi_square_limits
 from simnav.types import Array, Instruments
 
-__all__ = ["ChiSquareGate", "chi_square_limits"]
-
-
-def chi_square_limits(probability: float) -> list[float]:
-    """Limits of chi-square of 0, 1, 2, 3 degrees of freedom that hold with a probability."""
-    from scipy.special import chdtri
-
-    return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]
+__all__ = ["ChiSquareGate"]
 
 
 class ChiSquareGate(NoiseAdaptation):
@@ -31,6 +25,8 @@ class ChiSquareGate(NoiseAdaptation):
     patience : float
         [s]
     """
+
+    together = 0
 
     def __init__(self, probability: float = 0.999, patience: float = 10.0):
         if not 0.0 < probability < 1.0:

@@ -7,6 +7,8 @@ from math import exp, log, sqrt
 
 import numpy as np
 
+from estimators.adaptations.base import Innovation
+from estimators.adaptations.prediction import PredictionTest
 from estimators.models.base import ErrorModel
 from estimators.solvers.kalman import KalmanEstimator
 from simnav.compiled import kernel
@@ -131,6 +133,8 @@ class ImmEstimator(KalmanEstimator):
     measurement (the first-order generalised pseudo-Bayesian form of the algorithm; the same as IMM where the chain
     forgets its level from one measurement to the next). One propagation, whatever J.
 
+    Where the prediction is at fault (`PredictionTest`), the plain filter's update is used, with P inflated.
+
     Diagnostics: ``sigma_<component>.<instrument>`` is the root of the expected variance; ``quiet.<instrument>`` the
     probability of the lowest level.
 
@@ -164,6 +168,7 @@ class ImmEstimator(KalmanEstimator):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(start, instruments)
+        self._prediction = PredictionTest(instruments)
         # The chain's stationary distribution
         values, vectors = np.linalg.eig(self.transition.T)
         first = np.real(vectors[:, int(np.argmax(np.real(values)))])
@@ -186,6 +191,12 @@ class ImmEstimator(KalmanEstimator):
             self._skipped += 1
             return
         residual, cross, predicted, noise = observation
+        innovation = Innovation(m, residual, predicted, noise, self.covariance, cross)
+        if self._prediction.fails(innovation):
+            self.adaptation.inflation = self._prediction.inflation(innovation)
+            super()._take(m, diagnostics, flagged)
+            self.adaptation.inflation = 1.0
+            return
         probability = self._probability[m.instrument] @ self.transition
         nis = mixture_update(
             self.covariance, cross, predicted, noise, residual, self._variances, probability, self._correction

@@ -113,7 +113,7 @@ class InnovationBased(EstimatedNoise):
         high: float = 5.0,
         forgetting: float = 0.9,
         newest: bool = False,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
+from estimators.adaptations.prediction import PredictionTest
 from estimators.solvers.kalman import joseph_update
 from simnav.types import KINDS, Array, Instruments
 
@@ -64,12 +65,20 @@ class NoiseAdaptation(Adaptation):
     """An adaptation that reports the sigma that it used: ``sigma_<component>.<instrument>``, for example
     ``sigma_north.gnss``; a subclass gives `choose`.
 
-    Before an instrument's first measurement its datasheet's sigma stands.
+    Before an instrument's first measurement its datasheet's sigma stands. Where the prediction is at fault
+    (`PredictionTest`), the nominal noise is used and P inflated, and the adaptation does not see the innovation.
+
+    Attributes
+    ----------
+    together : int
+        See `PredictionTest`; 0: the prediction is never at fault.
     """
+
+    together = 3
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self.inflation = 1.0
+        self._prediction = PredictionTest(instruments, self.together)
         self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
         self._report: dict[str, float | Array] = {}
         for name, sheet in instruments.items():
@@ -84,8 +93,15 @@ class NoiseAdaptation(Adaptation):
         self._report[label] = value
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """`choose`, with its sigma noted."""
-        noise = self.choose(innovation)
+        """`choose`, with its sigma noted; an instrument without noise stays as it is."""
+        self.inflation = 1.0
+        if min(innovation.noise.diagonal().tolist()) <= 0.0:
+            return innovation.noise
+        if self._prediction.fails(innovation):
+            noise: Array | None = innovation.noise
+            self.inflation = self._prediction.inflation(innovation)
+        else:
+            noise = self.choose(innovation)
         if noise is not None:
             for label, variance in zip(self._labels[innovation.measurement.instrument], noise.diagonal().tolist()):
                 self._report[label] = sqrt(variance)
@@ -103,7 +119,8 @@ class EstimatedNoise(NoiseAdaptation):
     ----------
     lowest, highest : float
         The estimated sigma stays between these multiples of the nominal one (for a full matrix: the roots of its
-        eigenvalues, in units of the nominal variances).
+        eigenvalues, in units of the nominal variances). By default never below the datasheet: an instrument at its best
+        is what that describes, and an estimate from ten innovations scatters by 45 %, half of it downwards.
     full : bool
         False: variances only, with the nominal correlations. An instrument's components err independently by its
         datasheet, and m (m - 1)/2 covariances that are zero cost accuracy to estimate.

@@ -44,7 +44,7 @@ class EquivalentWeights(NoiseAdaptation):
     Component i of an innovation v with covariance ``S = H P H' + R`` is standardised as ``u = v_i / sqrt(S_ii)``;
     ``R_ij`` becomes ``R_ij / sqrt(w(u_i) w(u_j))``, which keeps the correlations (the two-factor form of Yang, Song and
     Xu 2002). S and not R standardises, so that a filter that knows itself to be uncertain does not doubt good
-    measurements. A weight is never less than ``smallest`` (0.01: ten times the sigma), so that a filter that is wrong
+    measurements. A weight is never less than ``smallest``, so that a filter that is wrong
     itself is pulled back, if slowly, and not locked out.
 
     Parameters
@@ -55,7 +55,7 @@ class EquivalentWeights(NoiseAdaptation):
         Least weight.
     """
 
-    def __init__(self, weight: Callable[[float], float], smallest: float = 1e-2):
+    def __init__(self, weight: Callable[[float], float], smallest: float = 1e-3):
         if not 0.0 < smallest <= 1.0:
             raise ValueError(f"smallest = {smallest:g}: it must lie in (0, 1]")
         self.weight, self.smallest = weight, smallest

@@ -36,9 +36,9 @@ class SageHusa(EstimatedNoise):
 
     def __init__(
         self,
-        fading: float = 0.97,
+        fading: float = 0.96,
         prior: int = 10,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",

@@ -4,8 +4,7 @@ A fault is known by its statistics, not by the value that it took. Of those that
 
 - a noise step changes the sigma, which is known;
 - multipath, a bias step and a ramp last: they are states (`estimators.models.fault_states`), since taking an error that
-  is correlated in time for noise makes a filter believe it more with every epoch; a model without states for them
-  counts multipath as white noise of the same density at low frequency, and leaves the others out;
+  is correlated in time for noise makes a filter believe it more with every epoch;
 - a gross error is noise of the second moment of its distribution, and left out where that is more than `LIMIT` sigma;
 - a frozen or false value says nothing, and is left out.
 
@@ -17,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from itertools import product
-from math import exp
 from typing import Any
 
 import numpy as np
@@ -109,10 +107,6 @@ class TrueNoise(Adaptation):
             variance = None
             if fault.kind == "gross_error" and fault.parameters:
                 variance = _second_moment(fault, stream)
-            elif fault.kind == "multipath" and fault.parameters:
-                a = exp(-1.0 / (self._sheets[stream.name].rate * fault.parameters["correlation_time"]))
-                size = _size(fault, "sigma", stream)
-                variance = None if size is None else size**2 * (1.0 + a) / (1.0 - a)
             self._variances[key] = variance
         if not fault.parameters and fault.kind not in ("frozen", "false_zero"):
             return np.asarray(stream.fault_error[k, :d] ** 2)

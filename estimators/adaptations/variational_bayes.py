@@ -37,10 +37,10 @@ class VariationalBayes(EstimatedNoise):
 
     def __init__(
         self,
-        forgetting: float = 0.97,
+        forgetting: float = 0.96,
         prior: float = 10.0,
         iterations: int = 2,
-        lowest: float = 0.5,
+        lowest: float = 1.0,
         highest: float = 30.0,
         scope: Scope = "fixes",
     ):

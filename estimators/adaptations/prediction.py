@@ -1,0 +1,102 @@
+"""Whose fault it is: where instruments of two kinds disagree with the prediction together, it is the prediction's."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from estimators.adaptations.base import Innovation
+from simnav.types import Array, Instruments
+
+__all__ = ["PredictionTest", "chi_square_limits"]
+
+FIXES = ("gnss_position", "gnss_velocity", "terrain_fix")
+LOGS = ("dvl", "speed_log")
+
+
+def chi_square_limits(probability: float) -> list[float]:
+    """Limits of chi-square of 0, 1, 2, 3 degrees of freedom that hold with a probability."""
+    from scipy.special import chdtri
+
+    return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]
+
+
+class PredictionTest:
+    """Chi-square tests of the fixes and of the logs, which fail together when the prediction is wrong.
+
+    An adaptation that gives less weight to what does not fit the prediction is lost when it is the prediction that is
+    wrong (a disturbed IMU): nothing fits, nothing is believed, and nothing brings the filter back. Paper 003 tells the
+    two cases apart by the chi-square tests of GNSS and DVL: one fails, that instrument is wrong; both fail, the
+    prediction. Gross errors of both that coincide are no such case, so that both must fail ``together`` times running.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    together : int
+        0: never.
+    probability : float
+        Of a good measurement to pass.
+    """
+
+    RECENT = 5.0  # s; a failure older than this is no company
+    LARGEST, TOTAL = 100.0, 1e8
+
+    def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
+        self.together = together
+        self._limits = chi_square_limits(probability)
+        self._group = {n: s.kind in FIXES for n, s in instruments.items() if s.kind in (*FIXES, *LOGS)}
+        if len(set(self._group.values())) < 2 or not together:
+            self._group = {}
+        self._failures: dict[str, tuple[int, float]] = {}
+        self._first: Array | None = None
+        self._blamed = 0
+
+    def fails(self, innovation: Innovation) -> bool:
+        """Whether this instrument and one of the other group have failed often enough running, this time included.
+
+        The statistic is the sum of the squared standardised components of the innovation.
+        """
+        name, time = innovation.measurement.instrument, innovation.measurement.time
+        group = self._group.get(name)
+        if group is None:
+            return False
+        if _squares(innovation) <= self._limits[len(innovation.residual)]:
+            self._failures[name] = 0, time
+            self._blamed = 0
+            return False
+        count = self._failures.get(name, (0, time))[0] + 1
+        self._failures[name] = count, time
+        return count >= self.together and any(
+            self._group[other] != group and n >= self.together and time - t <= self.RECENT
+            for other, (n, t) in self._failures.items()
+        )
+
+    def inflation(self, innovation: Innovation) -> float:
+        """What to multiply P by, now that the prediction has failed: once for every ``together`` rounds of failures.
+
+        The root of the mean squared standardised component, over 2 (eqs. 28 and 34 of paper 003), within `limited`.
+        """
+        self._blamed += 1
+        if (self._blamed - 1) % (self.together * len(self._group)):
+            return 1.0
+        return self.limited(0.5 * sqrt(_squares(innovation) / len(innovation.residual)), innovation)
+
+    def limited(self, inflation: float, innovation: Innovation) -> float:
+        """An inflation that leaves P sound: what nothing observes would else grow without end.
+
+        At most `LARGEST` at a time, and no variance beyond `TOTAL` times what it was at the first of them.
+        """
+        if inflation <= 1.0 or innovation.covariance is None:
+            return 1.0
+        variances = innovation.covariance.diagonal()
+        if self._first is None:
+            self._first = np.maximum(variances, 1e-30)
+        grown = float(np.max(variances / self._first))
+        return max(1.0, min(inflation, self.LARGEST, self.TOTAL / grown))
+
+
+def _squares(innovation: Innovation) -> float:
+    predicted, noise = innovation.predicted.diagonal().tolist(), innovation.noise.diagonal().tolist()
+    total: float = sum(v * v / (p + r) for v, p, r in zip(innovation.residual.tolist(), predicted, noise))
+    return total
