@@ -13,7 +13,7 @@ Estimation*, 1977, for Joseph's form.
 from __future__ import annotations
 
 from itertools import pairwise
-from math import sqrt
+from math import hypot, sqrt
 
 import numpy as np
 
@@ -216,7 +216,7 @@ class KalmanEstimator(Estimator):
             self._skipped += 1
             return
         self._correct(self._correction)
-        diagnostics[f"innovation.{m.instrument}"] = sqrt(float(residual @ residual))
+        diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
         diagnostics[f"nis.{m.instrument}"] = nis
 
 

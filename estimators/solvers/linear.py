@@ -9,10 +9,18 @@ state, minus the error), r the measurement minus what the nominal state predicts
 
 It holds as long as the nominal error stays in the linear range. Free inertial navigation leaves it sooner or later:
 level errors oscillate with Schuler's period (84 min), and height runs away by a factor of e in 9.5 minutes
-(``sqrt(R / 2 g)``). What is lost then is of second order in the error: ``|phi|^2 v`` in the velocity, ``d^2 / 2R`` in
-the height for a position off by d, and the specific force times ``|phi|^2 / 2``; the covariance does not know. With a
-navigation-grade IMU an hour is harmless; a MEMS unit (1 deg/h and worse) is beyond it after a few minutes. The
-nominal's error is the diagnostic ``nominal_error`` [m].
+(``sqrt(R / 2 g)``). What is lost then is of second order in the error, and the covariance does not know: attitude error
+times velocity error in a DVL's axes, its scale error times velocity error, ``d^2 / 2R`` in the height for a position
+off by d. Measured (errors of one seed, ANEES over 50):
+
+- open-sea, tactical IMU (1 deg/h, 200 ug): nominal off by 0.2 km after 225 s and 6.8 km after 900 s; horizontal RMSE
+  0.6 m (EKF 0.3 m). Velocity ANEES 1.6 in the first 120 s, but within its band when aligned to 0.05 deg and with
+  accelerometers of 20 ug.
+- uuv-surface without its faults (0.01 deg/h, 1000 ug, DVL scale 2.55 %): velocity ANEES above 5 after 100 s.
+- harbour-multipath, MEMS: nominal off by 55 km after 900 s; heading RMSE 4.3 deg (EKF 2.3 deg).
+- coastal-voyage, 100 min: the nominal height has run away, and so has the estimate (more than 100 km off) after 75 min.
+
+The nominal's error is the diagnostic ``nominal_error`` [m].
 
 Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, section 6.3 (feed-forward and
 feedback configurations); P. D. Groves 2013, section 14.1.1 (open loop).
