@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from estimators.adaptations.truth import TrueNoise, imu_faults
+from estimators.models.base import ErrorModel
 from estimators.models.fault_states import FaultStateModel
 from estimators.models.inertial import InertialModel
 from estimators.models.ship import ShipModel
@@ -51,7 +52,9 @@ class Oracle(KalmanEstimator):
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
-        self.model = FaultStateModel(self.truth.states()) if instruments.imu is not None else ShipModel()
+        inner: ErrorModel = InertialModel() if instruments.imu is not None else ShipModel()
+        states = self.truth.states()
+        self.model = FaultStateModel(inner, states) if states else inner
         super().reset(start, instruments)
 
     def update(self, measurements: Measurements) -> Estimate:

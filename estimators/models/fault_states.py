@@ -1,4 +1,4 @@
-"""The inertial model with states for the errors that faults make last: only for estimators that are told of the faults.
+"""States for the errors that faults make last, behind any model: only for estimators that are told of the faults.
 
 An error that is correlated in time is no noise. Whoever knows that it is there has it in the state, and the other
 instruments tell it apart:
@@ -18,9 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.models.base import Linearised
-from estimators.models.inertial import InertialModel
-from simnav.types import Array, Measurement
+from estimators.models.base import ErrorModel, Linearised
+from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
 
 __all__ = ["FaultState", "FaultStateModel"]
 
@@ -45,37 +44,101 @@ class FaultState(NamedTuple):
     factor: Callable[[float], float]
 
 
-class FaultStateModel(InertialModel):
-    """`InertialModel` with fault states behind its calibration states.
+class FaultStateModel(ErrorModel):
+    """A model with fault states behind its own.
 
     Parameters
     ----------
+    inner : ErrorModel
+        One that can `carry` an error along.
     faults : sequence of FaultState
     """
 
-    def __init__(self, faults: Sequence[FaultState]):
-        super().__init__()
-        self.faults = faults
+    def __init__(self, inner: ErrorModel, faults: Sequence[FaultState]):
+        self.inner, self.faults = inner, faults
 
-    def _more_states(self) -> list[tuple[float, float, float]]:
-        states = super()._more_states()
-        first = 15 + len(self._states) + len(states)
-        self._faults_of: dict[str, list[tuple[FaultState, NDArray[np.intp], int]]] = {}
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; the fault states begin with their stationary variance."""
+        own = self.inner.begin(start, instruments)
+        self.time, n = start.time, len(own)
+        self._of: dict[str, list[tuple[FaultState, NDArray[np.intp], int]]] = {}
+        sigma, rate = [0.0] * n, [0.0] * n
         for fault in self.faults:
             axes = np.flatnonzero(fault.sigma)
-            self._faults_of.setdefault(fault.instrument, []).append((fault, axes, first))
-            first += len(axes)
-            decay = 1.0 / fault.correlation_time
-            states += [(s * s, decay, 2.0 * s * s * decay) for s in fault.sigma[axes].tolist()]
-        return states
+            self._of.setdefault(fault.instrument, []).append((fault, axes, len(sigma)))
+            sigma += fault.sigma[axes].tolist()
+            rate += [1.0 / fault.correlation_time] * len(axes)
+        self.size = len(sigma)
+        self._variance, self._rate = np.array(sigma[n:]) ** 2, np.array(rate[n:])
+        self.values = np.zeros(self.size - n)
+        covariance = np.diag(np.square(sigma))
+        covariance[:n, :n] = own
+        return covariance
+
+    def observes(self, instrument: Datasheet) -> bool:
+        """As the model within."""
+        return self.inner.observes(instrument)
+
+    def load(self, imu: ImuSamples | None) -> None:
+        """Take the IMU samples of the step that follows."""
+        self.inner.load(imu)
+
+    def propagate(self, covariance: Array, until: float) -> None:
+        """Advance the states and their covariance."""
+        elapsed, n = until - self.time, self.inner.size
+        if elapsed <= 0.0:
+            return
+        own, cross = covariance[:n, :n].copy(), covariance[:n, n:].copy()
+        self.inner.propagate(own, until)
+        self.inner.carry(cross, elapsed)
+        self.time = until
+        decay = np.exp(-self._rate * elapsed)
+        self.values *= decay
+        cross *= decay
+        covariance[:n, :n], covariance[:n, n:], covariance[n:, :n] = own, cross, cross.T
+        covariance[n:, n:] *= np.outer(decay, decay)
+        index = np.arange(n, self.size)
+        covariance[index, index] += self._variance * (1.0 - decay**2)
+
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an error, or several in columns, through the last propagation, in place."""
+        n = self.inner.size
+        self.inner.carry(error[:n], elapsed)
+        error.T[..., n:] *= np.exp(-self._rate * elapsed)
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement, the errors of its faults included."""
-        linearised = super().measure(measurement)
-        if linearised is not None:
-            for fault, axes, at in self._faults_of.get(measurement.instrument, ()):
-                factor = fault.factor(measurement.time)
-                columns = np.arange(at, at + len(axes))
-                linearised.jacobian[axes, columns] = factor
-                linearised.innovation[axes] -= factor * self.calibration[columns - 15]
-        return linearised
+        linearised = self.inner.measure(measurement)
+        if linearised is None:
+            return None
+        n, d = self.inner.size, len(linearised.innovation)
+        jacobian = np.zeros((d, self.size))
+        jacobian[:, :n] = linearised.jacobian
+        innovation = linearised.innovation
+        for fault, axes, at in self._of.get(measurement.instrument, ()):
+            factor = fault.factor(measurement.time)
+            for k, axis in enumerate(axes.tolist()):
+                if factor and axis < d:  # a ship's model has no height
+                    jacobian[axis, at + k] = factor
+                    innovation[axis] -= factor * self.values[at + k - n]
+        return Linearised(innovation, jacobian, linearised.noise)
+
+    def correct(self, dx: Array) -> None:
+        """Add a correction to the states."""
+        n = self.inner.size
+        self.inner.correct(dx[:n])
+        self.values += dx[n:]
+
+    def snapshot(self) -> list[Array]:
+        """Copies of what `correct` changes."""
+        return [*self.inner.snapshot(), self.values.copy()]
+
+    def restore(self, snapshot: list[Array]) -> None:
+        """Take corrections back."""
+        self.inner.restore(snapshot[:-1])
+        self.values[:] = snapshot[-1]
+
+    def estimate(self, covariance: Array) -> Estimate:
+        """As the model within."""
+        n = self.inner.size
+        return self.inner.estimate(covariance[:n, :n].copy())

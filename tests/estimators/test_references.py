@@ -16,7 +16,7 @@ from simnav.scenario import Scenario, load
 from simnav.scoring import errors
 from simnav.scoring.consistency import nees, nees_band
 from simnav.scoring.navigation_error import smoothed_errors
-from simnav.sensors.faults import BiasStep, GrossError, Multipath, NoiseStep, Ramp
+from simnav.sensors.faults import BiasStep, Frozen, GrossError, Multipath, NoiseStep, Outage, Ramp
 from simnav.simulator import simulate
 from simnav.trial import run_trial
 from simnav.types import Datasheet, Instruments, Measurement
@@ -163,3 +163,20 @@ def test_fisher_information_against_the_integral(p: float, ratio: float):
     })  # fmt: skip
     adaptation, innovation = revealed(FisherNoise(), label, True, 3.0)
     assert adaptation.adapt(innovation)[0, 0] == pytest.approx(1.0 / exact, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        *LASTING.values(),
+        Frozen(instruments=("gnss",), start=50.0, end=90.0),
+        NoiseStep(instruments=("gnss",), factor=5.0, start=50.0, end=140.0),
+        Outage(instruments=("gnss",), start=50.0, end=90.0),
+    ],
+    ids=lambda fault: fault.kind,
+)
+@pytest.mark.parametrize("row", ROWS)
+def test_without_an_imu_the_oracles_still_beat_those_who_are_not_told(row, fault):
+    recording = simulate(shortened("ship-dead-reckoning", 150.0, fault), 3)
+    ours, theirs = (np.sqrt(np.mean(errors(run(name, recording), recording)[:, :2] ** 2)) for name in (row, "ship-ekf"))
+    assert ours < 1.001 * theirs
