@@ -28,7 +28,7 @@ SCORE_TITLE = "× oracle"
 SCORE_AXIS = "Horizontal RMSE, as a multiple of the oracle's"
 SCORE_CAPTION = (
     "× oracle: ratio of the horizontal RMSE to the oracle's on the same run; interquartile mean over the runs, "
-    "each scenario counting the same."
+    "each scenario counting the same. Who does not suit all scenarios is adjusted for how hard the others are."
 )
 SCORE_LEAD = (
     "Ranked is the horizontal error as a multiple of that of an oracle, which knows the true noise and every fault."
