@@ -1,0 +1,64 @@
+"""What an adaptation costs: every row beside the plain EKF, over two minutes of the open sea (four instruments)."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from simnav.estimator import Estimator, make
+from simnav.recording import Recording
+from simnav.scenario import load
+from simnav.source import record
+
+ROWS = (
+    "sage-husa", "sage-husa-paper", "iae", "iae-fixed", "rae", "adkf", "adkf-paper", "igg3", "huber-kf", "gated-ekf",
+    "fading-ekf", "vb-akf", "mckf", "imm",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return record(load("open-sea").model_copy(update={"duration": 120.0}), 1)
+
+
+def run(estimator: Estimator, recording: Recording) -> float:
+    """Median seconds of an update."""
+    estimator.reset(recording.start, recording.instruments)
+    seconds = []
+    for packet in recording.steps():
+        begun = time.perf_counter()
+        estimator.update(packet)
+        seconds.append(time.perf_counter() - begun)
+    return float(np.median(seconds))
+
+
+@pytest.mark.benchmark(group="adaptations")
+@pytest.mark.parametrize("name", ["ekf", *ROWS])
+def test_two_minutes_at_sea(benchmark, recording: Recording, name: str):
+    estimator = make(name)
+    run(estimator, recording)  # compile
+    median = benchmark(run, estimator, recording)
+    if benchmark.enabled:
+        benchmark.extra_info["us_per_epoch"] = 1e6 * median
+    assert median > 0.0
+
+
+@pytest.mark.benchmark(group="adaptations-side-by-side")
+def test_within_one_and_a_half_times_the_plain_filter(benchmark, recording: Recording):
+    """Turn by turn, so that both see the same machine; the least of several medians."""
+    rows = {name: make(name) for name in ("ekf", *ROWS)}
+    best = dict.fromkeys(rows, np.inf)
+
+    def round_of_all() -> None:
+        for name, estimator in rows.items():
+            best[name] = min(best[name], run(estimator, recording))
+
+    benchmark.pedantic(round_of_all, rounds=4, warmup_rounds=1)
+    ratios = {name: round(best[name] / best["ekf"], 2) for name in ROWS}
+    if benchmark.enabled:
+        benchmark.extra_info.update(ratios)
+        benchmark.extra_info["ekf_us"] = 1e6 * best["ekf"]
+    slow = {name: r for name, r in ratios.items() if r > (1.5 if benchmark.enabled else 3.0)}
+    assert not slow, slow
