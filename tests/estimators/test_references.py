@@ -180,3 +180,20 @@ def test_without_an_imu_the_oracles_still_beat_those_who_are_not_told(row, fault
     recording = simulate(shortened("ship-dead-reckoning", 150.0, fault), 3)
     ours, theirs = (np.sqrt(np.mean(errors(run(name, recording), recording)[:, :2] ** 2)) for name in (row, "ship-ekf"))
     assert ours < 1.001 * theirs
+
+
+def test_the_smoothed_oracle_has_fault_states_too():
+    """Consistent and better than its filter while multipath lasts."""
+    filtered, smoothed, normalised = [], [], []
+    for seed in range(10):
+        recording = simulate(shortened("open-sea", 150.0, LASTING["multipath"]), seed)
+        oracle = make("oracle-rts")
+        trial = run_trial(oracle, recording)
+        assert trial.status == "ok", trial.reason
+        filtered.append(errors(trial, recording)[:, :3])
+        error = smoothed_errors(trial, recording)
+        smoothed.append(error[:, :3])
+        normalised.append(nees(error, oracle.smoothed_covariance, (0, 1, 2))[0])
+    assert np.sqrt(np.mean(np.square(smoothed))) < 0.8 * np.sqrt(np.mean(np.square(filtered)))
+    low, high = nees_band(3, 10, 0.99)
+    assert low < np.mean(normalised) / 3.0 < high
