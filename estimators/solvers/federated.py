@@ -217,7 +217,12 @@ def _inverse(matrix: Array, use: NDArray[np.bool_]) -> Array:
     at = np.ix_(use, use)
     part = matrix[at]
     scale = 1.0 / np.sqrt(np.diag(part))
-    root = np.linalg.inv(np.linalg.cholesky(part * (scale[:, None] * scale)))
+    correlation = part * (scale[:, None] * scale)
+    try:
+        root = np.linalg.inv(np.linalg.cholesky(correlation))
+    except np.linalg.LinAlgError:  # singular to rounding: what is known beyond it counts as known to rounding
+        values, vectors = np.linalg.eigh(correlation)
+        root = (vectors / np.sqrt(np.maximum(values, 1e-14 * len(values)))).T
     inverse[at] = (root.T @ root) * (scale[:, None] * scale)
     return inverse
 
