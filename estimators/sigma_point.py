@@ -51,8 +51,8 @@ class Ukf(SigmaPointEstimator, AidedInertial):
 class Ckf(SigmaPointEstimator, AidedInertial):
     """Cubature Kalman filter on the manifold: the states of ``ekf``, moments by third-degree cubature points.
 
-    Its points lie ``sqrt(n)`` sigma out, 3.9 for 15 states: where a heading is known to 20 degrees or worse they go round
-    the circle, and it finds the heading late. ``ukf`` has its points nearer and does not.
+    Its points lie ``sqrt(n)`` sigma out, 3.9 for 15 states: where a heading is known to 20 degrees or worse they go
+    round the circle, and it finds the heading late. ``ukf`` has its points nearer and does not.
 
     Parameters
     ----------
