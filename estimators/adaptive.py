@@ -96,7 +96,7 @@ class SageHusaPaper(_Adaptive):
     """
 
     def __init__(
-        self, fading: float = 1.0, prior: int = 0, lowest: float = 0.5, highest: float = 30.0, full: bool = True
+        self, fading: float = 1.0, prior: int = 0, lowest: float = 0.5, highest: float = 30.0, full: bool = False
     ):
         super().__init__(SageHusa(fading, prior, lowest, highest, full))
 

@@ -136,10 +136,16 @@ class AdaptiveFactor(NoiseAdaptation):
     def choose(self, innovation: Innovation) -> Array:
         """The noise, over the factor where R is the target; sets the inflation of P."""
         name = innovation.measurement.instrument
-        posterior = Posterior(innovation, innovation.noise)
-        if posterior.nis < 0.0:  # singular: the solver leaves it out
-            return innovation.noise
-        factor = max(self.factor(self._statistic(innovation, posterior), self.c0, self.c1), self.SMALLEST)
+        if self.printed and self.statistic == "residual":
+            v = innovation.residual
+            trace = sum(innovation.predicted.diagonal().tolist() + innovation.noise.diagonal().tolist())
+            statistic = float(np.dot(v, v)) / sqrt(trace)
+        else:
+            posterior = Posterior(innovation, innovation.noise)
+            if posterior.nis < 0.0:  # singular: the solver leaves it out
+                return innovation.noise
+            statistic = self._statistic(innovation, posterior)
+        factor = max(self.factor(statistic, self.c0, self.c1), self.SMALLEST)
         if self.target == "P":
             self.inflation = self._prediction.limited(1.0 / factor, innovation)
         self.report(f"factor.{name}", factor)
@@ -150,10 +156,7 @@ class AdaptiveFactor(NoiseAdaptation):
     def _statistic(self, innovation: Innovation, posterior: Posterior) -> float:
         m = len(innovation.residual)
         if self.statistic == "residual":
-            if not self.printed:
-                return sqrt(posterior.nis / m)
-            v = innovation.residual
-            return float(v @ v) / sqrt(float(np.trace(innovation.predicted) + np.trace(innovation.noise)))
+            return sqrt(posterior.nis / m)
         # y = S^-1 v = R^-1 e, and S^-1 H P H' = R^-1 H P+ H'
         solved = np.linalg.solve(innovation.noise, np.column_stack((posterior.residual, posterior.predicted)))
         y = solved[:, 0]

@@ -63,17 +63,24 @@ class MaximumCorrentropy(NoiseAdaptation):
         nominal = innovation.noise
         inverse = [0.5 / (self.bandwidth**2 * r) for r in nominal.diagonal().tolist()]
         noise = nominal
-        residual = innovation.residual
-        if self.begin == "update":
-            residual = Posterior(innovation, noise).residual
+        residual = _after(innovation, noise) if self.begin == "update" else innovation.residual.tolist()
         weights: list[float] = []
         for k in range(self.iterations):
             before = weights
-            weights = [max(exp(-e * e * q), self.smallest) for e, q in zip(residual.tolist(), inverse)]
+            weights = [max(exp(-e * e * q), self.smallest) for e, q in zip(residual, inverse)]
             noise = scaled(nominal, [1.0 / w for w in weights])
             if min(weights) > 0.7 or (before and all(abs(a - b) <= 0.02 * b for a, b in zip(before, weights))):
                 break  # another round would hardly change them
             if k < self.iterations - 1:
-                residual = Posterior(innovation, noise).residual
+                residual = _after(innovation, noise)
         self.report(self._weights[innovation.measurement.instrument], min(weights))
         return noise
+
+
+def _after(innovation: Innovation, noise: Array) -> list[float]:
+    """The residual after an update with this noise."""
+    if len(noise) == 1:
+        p, r, v = float(innovation.predicted[0, 0]), float(noise[0, 0]), float(innovation.residual[0])
+        return [v * r / (p + r)]
+    listed: list[float] = Posterior(innovation, noise).residual.tolist()
+    return listed

@@ -45,10 +45,12 @@ class Posterior:
 
     def __init__(self, innovation: Innovation, noise: Array):
         self.predicted = innovation.predicted.copy()
-        self.correction = np.zeros(len(innovation.residual))
+        self.correction = np.empty(len(innovation.residual))
         self.nis: float = joseph_update(
             self.predicted, innovation.predicted, innovation.predicted + noise, innovation.residual, self.correction
         )
+        if self.nis < 0.0:
+            self.correction[:] = 0.0
         self.residual = innovation.residual - self.correction
 
 
@@ -56,6 +58,8 @@ def scaled(noise: Array, factors: list[float]) -> Array:
     """A covariance with the variance of component i multiplied by ``factors[i]``, correlations kept."""
     if all(f == 1.0 for f in factors):
         return noise
+    if len(factors) == 1:
+        return noise * factors[0]
     root = np.array([sqrt(f) for f in factors])
     product: Array = noise * np.multiply.outer(root, root)
     return product
