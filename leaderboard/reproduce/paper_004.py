@@ -23,7 +23,10 @@ _LESS = (
     "waiting cost little beside the 250 to 350 s without any fix, which both have to bridge alike"
 )
 _MORE = "the paper does not print its information shares or when it fuses"
-_TERRAIN = "the noise of the terrain fixes is not printed: with fixes of 8 m there is more, or less, to smooth"
+_TERRAIN = (
+    "what smoothing gains is decided by how far a filter drifts while fixes are away, and so by the noise of DVL and "
+    "fixes, which is not printed"
+)
 _WORSE = (
     "the noise of the terrain fixes is not printed; 8 m here against errors within 2 m in the paper's figure, which a "
     "smoother cannot reach with one fix in 7 s"
