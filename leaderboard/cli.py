@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from leaderboard import bounds
 from leaderboard.console import USER, Output, UserError, session
 from leaderboard.reproduce import command as reproduce
 
@@ -247,6 +248,7 @@ def warmup(json: Json = False, debug: Debug = False) -> None:
         single.warmup(out)
 
 
+bounds.register(app)
 reproduce.register(app)
 
 
