@@ -101,6 +101,7 @@ class AdaptiveFactor(NoiseAdaptation):
     """
 
     SMALLEST = 1e-3
+    inflates = True
 
     def __init__(
         self,

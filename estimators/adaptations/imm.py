@@ -133,7 +133,7 @@ class ImmEstimator(KalmanEstimator):
     measurement (the first-order generalised pseudo-Bayesian form of the algorithm; the same as IMM where the chain
     forgets its level from one measurement to the next). One propagation, whatever J.
 
-    Where the prediction is at fault (`PredictionTest`), the plain filter's update is used, with P inflated.
+    Where the prediction is at fault (`PredictionTest`), the plain filter's update is used.
 
     Diagnostics: ``sigma_<component>.<instrument>`` is the root of the expected variance; ``quiet.<instrument>`` the
     probability of the lowest level.
@@ -191,11 +191,8 @@ class ImmEstimator(KalmanEstimator):
             self._skipped += 1
             return
         residual, cross, predicted, noise = observation
-        innovation = Innovation(m, residual, predicted, noise, self.covariance, cross)
-        if self._prediction.fails(innovation):
-            self.adaptation.inflation = self._prediction.inflation(innovation)
+        if self._prediction.fails(Innovation(m, residual, predicted, noise)):
             super()._take(m, diagnostics, flagged)
-            self.adaptation.inflation = 1.0
             return
         probability = self._probability[m.instrument] @ self.transition
         nis = mixture_update(

@@ -70,15 +70,20 @@ class NoiseAdaptation(Adaptation):
     ``sigma_north.gnss``; a subclass gives `choose`.
 
     Before an instrument's first measurement its datasheet's sigma stands. Where the prediction is at fault
-    (`PredictionTest`), the nominal noise is used and P inflated, and the adaptation does not see the innovation.
+    (`PredictionTest`), the nominal noise is used, and the adaptation does not see the innovation: the filter is then
+    the plain one.
 
     Attributes
     ----------
     together : int
         See `PredictionTest`; 0: the prediction is never at fault.
+    inflates : bool
+        Whether P is inflated besides. Only `AdaptiveFactor` does: it helps where an IMU is disturbed, and does harm
+        to the attitude where it was the instruments after all.
     """
 
     together = 3
+    inflates = False
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -103,7 +108,8 @@ class NoiseAdaptation(Adaptation):
             return innovation.noise
         if self._prediction.fails(innovation):
             noise: Array | None = innovation.noise
-            self.inflation = self._prediction.inflation(innovation)
+            if self.inflates:
+                self.inflation = self._prediction.inflation(innovation)
         else:
             noise = self.choose(innovation)
         if noise is not None:
