@@ -14,6 +14,7 @@ question is not whether the two are equal but whether they tell the same story:
   paper's, so that 28 % agrees with 20 to 39 %, or the paper's ratio inside the interval. It is undecided where the
   interval holds both "no difference" and the paper's ratio.
 - Fewer than `FEWEST` runs decide nothing.
+- A method that failed in any run differs, whatever the mean of its other runs.
 """
 
 from __future__ import annotations

@@ -8,13 +8,17 @@ __all__ = ["PAPER"]
 
 _SCENARIO = "coastal-voyage"
 _COST = "the clock is of another machine and the code of another language"
+_OPEN_LOOP = (
+    "a linear KF in open loop lets free inertial navigation run on; with gyros of 3 deg/h it is so far off after 100 "
+    "minutes that its linear model no longer holds, so that the paper's KF must have been fed back"
+)
 _DISTURBED = "the sea trial is not public: how far GNSS is off near the shore is our choice of faults"
 
 PAPER = Paper(
     key="000",
     title="INS/GNSS/DVL with a gradient-adaptive factor graph",
     citation="Guo et al. 2026, doi 10.20944/preprints202601.1976.v1; section 4, Figure 7 and Table 3",
-    runs=3,
+    runs=6,
     full=50,
     methods=(
         Method("KF", ("kf",)),
@@ -28,7 +32,7 @@ PAPER = Paper(
         Table(
             "Position RMSE",
             (
-                Value(_SCENARIO, "KF", "position_rmse", 3.84, lower=_DISTURBED, higher=_DISTURBED),
+                Value(_SCENARIO, "KF", "position_rmse", 3.84, lower=_DISTURBED, higher=_OPEN_LOOP),
                 Value(_SCENARIO, "EKF", "position_rmse", 3.86, lower=_DISTURBED, higher=_DISTURBED),
                 Value(_SCENARIO, "EKF, 9 states", "position_rmse"),
                 Value(_SCENARIO, "UKF", "position_rmse", 3.70, derived=True, lower=_DISTURBED, higher=_DISTURBED),
@@ -39,14 +43,14 @@ PAPER = Paper(
         Table(
             "Claims",
             (
-                Gain(_SCENARIO, "KF", "EKF", "position_rmse", 0.005, derived=True),
+                Gain(_SCENARIO, "KF", "EKF", "position_rmse", 0.005, derived=True, lower=_OPEN_LOOP),
                 Gain(
                     _SCENARIO, "UKF", "EKF", "position_rmse", 0.0415, derived=True,
                     lower="both filters carry the same states on the same scale of errors, where the model is all but "
                     "linear: sigma points have nothing to gain",
                 ),
                 Gain(_SCENARIO, "SW-FGO", "EKF", "position_rmse", 0.1373, derived=True),
-                Gain(_SCENARIO, "GA-FGO", "KF", "position_rmse", 0.151),
+                Gain(_SCENARIO, "GA-FGO", "KF", "position_rmse", 0.151, higher=_OPEN_LOOP),
                 Gain(_SCENARIO, "GA-FGO", "EKF", "position_rmse", 0.156),
                 Gain(_SCENARIO, "GA-FGO", "UKF", "position_rmse", 0.120),
                 Gain(_SCENARIO, "GA-FGO", "SW-FGO", "position_rmse", 0.021),

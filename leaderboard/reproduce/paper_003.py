@@ -29,12 +29,12 @@ _ALIGNMENT = (
 )
 _YAW = "the paper's 1.5 deg are the same to the fourth digit with all its filters: they come from elsewhere"
 _VELOCITY = (
-    "GNSS velocity and DVL, white and 0.1 m/s each, average out better than the paper's errors, of which its text gives "
-    "the size alone"
+    "GNSS velocity and DVL, white and 0.1 m/s each, average out better than the paper's errors, of which its text "
+    "gives the size alone"
 )
 _VERTICAL = (
-    "the paper's vertical velocity is three times as good as its horizontal, which a DVL of 0.1 m/s on all axes does not "
-    "give"
+    "the paper's vertical velocity is three times as good as its horizontal, which a DVL of 0.1 m/s on all axes does "
+    "not give"
 )
 _HIT = "how often gross errors strike a velocity is not printed"
 _TILT = (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard.reproduce.comparison import Interval, judge, judge_gain, mean, mean_ratio
+from leaderboard.reproduce.comparison import Interval, Verdict, judge, judge_gain, mean, mean_ratio
 from leaderboard.reproduce.measures import measure, value_of
 from leaderboard.reproduce.paper import Gain, Method, Paper, Row
 from leaderboard.summary import NO_TRIAL
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from leaderboard.campaign import EstimatorRequest, Progress
     from leaderboard.result import Result
 
-__all__ = ["Finding", "Reproduction", "find_method", "reproduce"]
+__all__ = ["Finding", "Reproduction", "find", "find_method", "reproduce"]
 
 _UNEXPLAINED = "not explained"
 
@@ -224,7 +224,8 @@ def find(
             reasons = [f"{name}: {r.reason}" for r in runs] or [f"{name}: no run"]
             unsuitable = bool(runs) and all(r.status in NO_TRIAL for r in runs)
             return Finding(table, row, None, "unsuitable" if unsuitable else "failed", reasons[0], names, len(runs))
-    failed = sum(r.status != "ok" for runs in all_runs for r in runs)
+    failures = [sum(r.status != "ok" for r in runs) for runs in all_runs]
+    failed = sum(failures)
     scores = [row.score, (row.than_score or row.score) if isinstance(row, Gain) else row.score]
     values = [
         {r.seed: value_of(r, score) for r in runs if r.status == "ok"}
@@ -243,6 +244,8 @@ def find(
             return Finding(table, row, ours, "ours", "", names, failed)
         verdict = judge(ours, row.paper, row.rule)
         why = {-1: row.lower, 1: row.higher}
+    if failures[0] or (failed and isinstance(row, Gain)):  # a run that failed is worse than any figure
+        verdict = Verdict("differs", 1 if failures[0] else -1)
     sentence = ""
     if verdict.word == "differs":
         sentence = why[verdict.side] or _UNEXPLAINED

@@ -1,0 +1,426 @@
+"""The papers' comparisons: the rule by closed form, rows by fake results, the command by a tiny paper."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from leaderboard.cli import app
+from leaderboard.reproduce import PAPERS, paper_001
+from leaderboard.reproduce import paper as papers
+from leaderboard.reproduce.comparison import Interval, judge, judge_gain, mean, mean_ratio
+from leaderboard.reproduce.measures import measure, value_of
+from leaderboard.reproduce.paper import Curves, Gain, Method, Paper, Table, Value
+from leaderboard.reproduce.report import paper_tables, summary, write_csv
+from leaderboard.reproduce.reproduction import Reproduction, find, find_method
+from leaderboard.result import Result
+from simnav.scenario import load
+
+ALL = [papers.load(key) for key in PAPERS]
+
+
+# -- the rule ------------------------------------------------------------------------------------------------
+
+
+def exactly(value: float, half: float = 0.0, runs: int = 10) -> Interval:
+    return Interval(value, value - half, value + half, runs)
+
+
+def test_interval_is_students():
+    """Known value of the t distribution: 2.262 with 9 degrees of freedom, for a sample of sigma 1."""
+    x = np.array([-1.0, 1.0] * 5) * math.sqrt(0.9) + 5.0  # sample variance 10 * 0.9 / 9 = 1
+    found = mean(x)
+    assert found.value == pytest.approx(5.0)
+    assert found.high - 5.0 == pytest.approx(2.2622 / math.sqrt(10.0), rel=1e-4)
+    assert (found.low + found.high) / 2.0 == pytest.approx(5.0)
+    assert found.runs == 10
+
+
+def test_interval_covers_as_often_as_it_says():
+    rng = np.random.default_rng(5)
+    inside = sum(i.low <= 3.0 <= i.high for i in (mean(3.0 + rng.standard_normal(5)) for _ in range(1000)))
+    assert 0.93 <= inside / 1000 <= 0.97
+
+
+def test_what_is_unknown_is_left_out():
+    assert mean([1.0, math.nan, 3.0, math.inf]).runs == 2
+    assert mean([math.nan]).runs == 0
+    alone = mean([4.0])
+    assert (alone.value, alone.runs) == (4.0, 1)
+    assert math.isnan(alone.low)
+
+
+def test_ratio_is_geometric_and_paired():
+    found = mean_ratio({0: 1.0, 1: 8.0, 2: 3.0}, {0: 2.0, 1: 4.0, 3: 9.0})
+    assert found.value == pytest.approx(1.0)  # 1/2 and 2
+    assert found.runs == 2
+    swapped = mean_ratio({0: 2.0, 1: 4.0, 3: 9.0}, {0: 1.0, 1: 8.0, 2: 3.0})
+    assert (swapped.low, swapped.high) == pytest.approx((1.0 / found.high, 1.0 / found.low))
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "word", "side"),
+    [
+        (exactly(1.25), 1.0, "agrees", 0),
+        (exactly(0.8), 1.0, "agrees", 0),
+        (exactly(1.26), 1.0, "differs", 1),
+        (exactly(0.79), 1.0, "differs", -1),
+        (exactly(1.5, 0.6), 1.0, "agrees", 0),  # the paper's figure is in the interval
+        (exactly(1.5, 0.4), 1.0, "differs", 1),
+        (exactly(2.0, 1.1), 1.0, "undecided", 0),  # so wide that it holds almost everything
+        (exactly(9.0, 5.0), 1.0, "differs", 1),  # wide, but nowhere near
+        (exactly(1.0, runs=2), 1.0, "undecided", 0),
+        (exactly(5.0), (4.0, 6.0), "agrees", 0),
+        (exactly(3.2), (4.0, 6.0), "agrees", 0),
+        (exactly(3.1), (4.0, 6.0), "differs", -1),
+        (exactly(7.6), (4.0, 6.0), "differs", 1),
+    ],
+)
+def test_figures(ours, paper, word, side):
+    verdict = judge(ours, paper)
+    assert (verdict.word, verdict.side) == (word, side)
+
+
+def test_bounds():
+    assert judge(exactly(19.9, 5.0), 20.0, "at-most").word == "agrees"
+    assert judge(exactly(0.1), 20.0, "at-most").word == "agrees"
+    assert judge(exactly(21.0, 2.0), 20.0, "at-most").word == "undecided"
+    found = judge(exactly(21.0, 0.5), 20.0, "at-most")
+    assert (found.word, found.side) == ("differs", 1)
+    assert judge(exactly(600.0), 500.0, "at-least").word == "agrees"
+    found = judge(exactly(5.0, 1.0), 500.0, "at-least")
+    assert (found.word, found.side) == ("differs", -1)
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "word", "side"),
+    [
+        (exactly(0.7, 0.05), 0.7, "agrees", 0),
+        (exactly(0.9, 0.05), 0.7, "differs", 1),  # a gain, but a third of the paper's
+        (exactly(0.3, 0.05), 0.7, "differs", -1),
+        (exactly(0.5, 0.25), 0.7, "agrees", 0),  # the paper's ratio is in the interval
+        (exactly(1.3, 0.1), 0.7, "differs", 1),  # worse
+        (exactly(0.9, 0.3), 0.7, "undecided", 0),  # nothing, or the paper's
+        (exactly(1.0, 0.01), 0.7, "differs", 1),  # certainly nothing
+        (exactly(1.5, 0.1), 1.5, "agrees", 0),  # where the paper's is worse
+        (exactly(0.7, runs=2), 0.7, "undecided", 0),
+    ],
+)
+def test_gains(ours, paper, word, side):
+    verdict = judge_gain(ours, paper)
+    assert verdict.word == word
+    if word == "differs":
+        assert verdict.side == side
+
+
+def test_size_of_a_gain_is_on_the_scale_of_ratios():
+    """28.1 % agrees with 20 to 39 %: logarithms within a factor of 1.5."""
+    edge = 1.0 - math.exp(math.log(0.719) / 1.5), 1.0 - math.exp(math.log(0.719) * 1.5)
+    assert edge == pytest.approx((0.1974, 0.3904), abs=1e-3)
+    for gain, word in ((edge[0] + 0.01, "agrees"), (edge[0] - 0.01, "differs"), (edge[1] + 0.01, "differs")):
+        assert judge_gain(exactly(1.0 - gain, 1e-6), 0.719).word == word
+
+
+# -- rows ----------------------------------------------------------------------------------------------------
+
+
+def result(estimator: str, seed: int, status: str = "ok", **scores: float) -> Result:
+    return Result("pond-v1", seed, estimator, {}, False, status, "" if status == "ok" else "why not", scores,
+                  peak_memory=3_000_000)  # fmt: skip
+
+
+def runs_of(estimator: str, values: list[float], score: str = "north_rmse") -> list[Result]:
+    return [result(estimator, seed, **{score: v}) for seed, v in enumerate(values)]
+
+
+def found(row, results, labels=None):
+    by = {}
+    for r in results:
+        by.setdefault((r.scenario, r.estimator), []).append(r)
+    return find("table", row, "pond-v1", labels or {"A": "a", "B": "b"}, by)
+
+
+def test_a_row_that_agrees_gives_no_reason():
+    row = Value("pond", "A", "north_rmse", 2.0, lower="lower", higher="higher")
+    f = found(row, runs_of("a", [1.9, 2.0, 2.1, 2.0]))
+    assert (f.verdict, f.why, f.estimators) == ("agrees", "", ("a",))
+    assert f.ours is not None
+    assert f.ours.value == pytest.approx(2.0)
+
+
+def test_reasons_go_by_the_side():
+    row = Value("pond", "A", "north_rmse", 2.0, lower="ours is better", higher="ours is worse")
+    assert found(row, runs_of("a", [1.0, 1.01, 1.02])).why == "ours is better"
+    assert found(row, runs_of("a", [4.0, 4.01, 4.02])).why == "ours is worse"
+    silent = Value("pond", "A", "north_rmse", 2.0)
+    assert found(silent, runs_of("a", [4.0, 4.01, 4.02])).why == "not explained"
+    gain = Gain("pond", "A", "B", "north_rmse", 0.3, lower="smaller", higher="larger")
+    b = runs_of("b", [1.0, 1.01, 1.02])
+    assert found(gain, runs_of("a", [0.95, 0.96, 0.965]) + b).why == "smaller"
+    assert found(gain, runs_of("a", [0.3, 0.31, 0.3]) + b).why == "larger"
+    assert found(gain, runs_of("a", [0.70, 0.71, 0.70]) + b).verdict == "agrees"
+
+
+def test_what_is_not_there_is_said():
+    f = found(Gain("pond", "A", "C", "north_rmse", 0.3), runs_of("a", [1.0] * 3))
+    assert (f.verdict, f.why) == ("absent", "not there yet: C")
+    assert found(Value("pond", "A", "north_rmse"), runs_of("a", [1.0] * 3)).verdict == "ours"
+
+
+def test_failures_are_never_dropped():
+    row = Value("pond", "A", "north_rmse", 1.0, higher="it fell over")
+    good = runs_of("a", [1.0, 1.0, 1.01, 0.99])
+    f = found(row, [*good, result("a", 9, "diverged")])
+    assert (f.verdict, f.why, f.failed) == ("differs", "it fell over", 1)
+    assert found(row, [result("a", 0, "diverged")]).verdict == "failed"
+    assert found(row, [result("a", 0, "unsuitable")]).verdict == "unsuitable"
+    gain = Gain("pond", "A", "B", "north_rmse", 0.3, lower="smaller", higher="larger")
+    f = found(gain, [*good, *runs_of("b", [1.4] * 4), result("b", 9, "error")])
+    assert (f.verdict, f.why) == ("differs", "larger")
+
+
+def test_another_score_of_the_other():
+    row = Gain("pond", "A", "B", "smoothed_north_rmse", 0.75, than_score="north_rmse")
+    f = found(row, runs_of("a", [1.0, 1.1, 0.9], "smoothed_north_rmse") + runs_of("b", [4.0, 4.4, 3.6]))
+    assert f.verdict == "agrees"
+    assert f.ours is not None
+    assert f.ours.value == pytest.approx(0.25)
+
+
+def test_measures():
+    r = result("a", 0, heading_rmse=math.pi / 180.0, horizontal_rmse=3.0, vertical_rmse=4.0, update_mean=0.002)
+    assert value_of(r, "heading_rmse") == pytest.approx(1.0)
+    assert measure("heading_rmse").unit == "deg"
+    assert value_of(r, "position_rmse") == 5.0
+    assert value_of(r, "update_mean") == pytest.approx(2.0)
+    assert value_of(r, "peak_memory") == pytest.approx(3.0)
+    assert math.isnan(value_of(r, "north_rmse"))
+
+
+# -- the papers ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_every_row_can_be_filled(paper):
+    methods = {m.name for m in paper.methods}
+    for row in paper.rows():
+        assert measure(row.score).title
+        assert {row.method, row.than if isinstance(row, Gain) else row.method} <= methods
+        if isinstance(row, Gain) and row.than_score:
+            assert measure(row.than_score)
+        if isinstance(row.paper, tuple):
+            assert row.paper[0] < row.paper[1]
+    for curves in paper.curves:
+        assert set(curves.methods) <= methods
+    scenarios = [paper.scenario(name) for name in paper.participants()]
+    assert len({s.id for s in scenarios}) == len(scenarios)
+    assert 3 <= paper.runs <= paper.full
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_filters_are_there_and_fit(paper):
+    """Issue 3: Sage-Husa and IAE (001), EKF and UKF (002), KF and ADKF (003), federated (004), KF, EKF, UKF (000)."""
+    wanted = {
+        "000": ["KF", "EKF", "UKF"],
+        "001": ["Sage-Husa filter", "IAE filter"],
+        "002": ["EKF", "UKF"],
+        "003": ["KF", "ADKF, two segments", "ADKF, three segments", "ADKF, exponential"],
+        "004": ["Federated KF", "Central EKF"],
+    }
+    for name in wanted[paper.key]:
+        assert find_method(paper.method(name)) is not None, name
+
+
+def test_papers_figures():
+    """Table 2 of paper 001 and Table 3 of paper 003, as printed."""
+    rows = {(r.method, r.score): r.paper for r in papers.load("001").rows() if isinstance(r, Value)}
+    assert [rows[m, "sigma_east_rmse"] for m in paper_001._TABLE_2] == [3.65, 1.86, 1.28, 1.20]
+    assert [rows[m, "sigma_north_rmse"] for m in paper_001._TABLE_2] == [3.55, 1.65, 1.37, 1.07]
+    first = [r for r in papers.load("003").tables[0].rows if isinstance(r, Value)]
+    position = {r.method: r.paper for r in first if r.score == "east_rmse"}
+    assert position["KF"] == 2.6649
+    # The gains that the paper prints follow from its table.
+    claims = {r.score: r.paper for r in papers.load("003").rows() if isinstance(r, Gain)}
+    for score in ("east_rmse", "north_rmse"):
+        of = {r.method: r.paper for r in first if r.score == score}
+        assert 1.0 - of["ADKF, three segments"] / of["KF"] == pytest.approx(claims[score], abs=5e-4)
+
+
+def test_second_set_of_intervals():
+    sheets = load("auv-survey-sparse").instruments_sheet()
+    intervals = {name: 1.0 / sheet.rate for name, sheet in sheets.items()}
+    assert intervals == pytest.approx({"dvl": 0.3, "terrain_fix": 7.0, "magnetic_compass": 0.1, "depth": 2.0})
+
+
+def test_a_variant_is_a_scenario_of_its_own():
+    paper = papers.load("003")
+    clean = paper.scenario("uuv-lake-clean")
+    assert clean.id == "uuv-lake-clean-v1"
+    assert {f.kind for f in clean.faults} == {"multipath"}
+    assert clean.content_hash() != load("uuv-lake").content_hash()
+
+
+def test_the_best_candidate_that_is_there_is_taken():
+    request = find_method(Method("A", ("nobody", "ekf:nonsense=1", "ekf:calibrate=false", "gnss-only")))
+    assert request is not None
+    assert (request.name, request.parameters) == ("ekf", {"calibrate": "false"})
+    assert find_method(Method("A", ("nobody",))) is None
+
+
+# -- tables and the command ----------------------------------------------------------------------------------
+
+POND = """
+name = "pond"
+version = 1
+title = "Ten seconds"
+duration_s = 10.0
+
+[start]
+latitude_deg = 50.0
+longitude_deg = -5.0
+heading_deg = 45.0
+speed_m_s = 1.0
+
+[[manoeuvre]]
+kind = "hold"
+duration_s = 10.0
+
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 1.0
+sigma_m = [1.0, 1.0, 1.0]
+"""
+
+FAKE = '''
+import numpy as np
+from simnav import Estimate, Estimator, register
+
+@register("fake")
+class Fake(Estimator):
+    """The last fix; says that its sigma is what the parameter says."""
+
+    def __init__(self, sigma: float = 1.0):
+        self.sigma = sigma
+
+    def reset(self, start, instruments):
+        self.position = start.position.copy()
+
+    def update(self, measurements):
+        for m in measurements.aids:
+            self.position = m.value
+        return Estimate(measurements.time, self.position,
+                        diagnostics={"sigma_north.gnss": self.sigma, "sigma_east.gnss": self.sigma})
+'''
+
+
+@pytest.fixture
+def tiny(tmp_path, monkeypatch):
+    """A paper about a scenario and estimators in files."""
+    monkeypatch.chdir(tmp_path)
+    scenario, estimator = tmp_path / "pond.toml", tmp_path / "fake.py"
+    scenario.write_text(POND)
+    estimator.write_text(FAKE)
+    where = str(scenario)
+    paper = Paper(
+        key="001",
+        title="Tiny",
+        citation="Nobody 2026",
+        runs=3,
+        full=9,
+        methods=(
+            Method("Right", (f"{estimator}:Fake",)),
+            Method("Wrong", ("nobody", f"{estimator}:Fake:sigma=3.0")),
+            Method("Future", ("nobody",)),
+        ),
+        tables=(
+            Table(
+                "Sigma",
+                (
+                    Value(where, "Right", "sigma_north_rmse", 0.5, lower="it is told"),
+                    Value(where, "Wrong", "sigma_north_rmse", 2.0),
+                    Value(where, "Future", "sigma_north_rmse", 1.0),
+                    Value(where, "Future", "sigma_east_rmse"),
+                    Value(where, "Wrong", "horizontal_rmse"),
+                ),
+            ),
+            Table("Claims", (Gain(where, "Wrong", "Right", "horizontal_rmse", 0.5, lower="they are the same"),)),
+        ),
+        curves=(
+            Curves("errors", "Errors", where, ("Right", "Wrong"), {"Error [m]": "horizontal"}),
+            Curves("sigma", "Sigma", where, ("Right", "Wrong", "Future"), {"Sigma [m]": "sigma_north.gnss"}),
+            Curves("nothing", "Nothing", where, ("Future",), {"Error [m]": "horizontal"}),
+        ),
+        notes=("One note.",),
+    )
+    monkeypatch.setattr("leaderboard.reproduce.paper.load", lambda key: paper)
+    return tmp_path
+
+
+def call(*words: str):
+    return CliRunner().invoke(app, ["reproduce", *words], env={"COLUMNS": "200"})
+
+
+@pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
+def test_the_command(tiny):
+    done = call("001", "--workers", "1", "--output", "out", "--json")
+    assert done.exit_code == 0, done.output
+    document = json.loads(done.stdout)
+    verdicts = [r["verdict"] for r in document["rows"]]
+    assert verdicts == ["differs", "agrees", "absent", "absent", "ours", "differs"]
+    assert [r["why"] for r in document["rows"]] == [
+        "it is told", "", "not there yet: Future", "not there yet: Future", "", "they are the same",
+    ]  # fmt: skip
+    right, wrong = document["rows"][:2]
+    assert (right["ours"], wrong["ours"], wrong["runs"]) == (0.0, 2.0, 3)
+    claim = document["rows"][-1]
+    assert (claim["ours"], claim["paper"], claim["than"]) == (0.0, 0.5, "Right")
+    assert document["methods"]["Future"] is None
+
+    with open(document["csv"], encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [r["verdict"] for r in rows] == verdicts
+    assert float(rows[1]["ours"]) == 2.0
+    assert [os.path.basename(p) for p in document["figures"]] == ["errors.png", "sigma.png"]
+    for path in document["figures"]:
+        with open(path, "rb") as file:
+            assert file.read(8) == b"\x89PNG\r\n\x1a\n"
+
+    shown = call("001", "--workers", "1", "--output", "out").stdout  # nothing is run again
+    for text in ("Nobody 2026", "not there yet: Future", "(a) it is told", "note: One note.", "1 agree, 2 differ"):
+        assert text in shown
+    more = json.loads(call("001", "--workers", "1", "--output", "out", "--json", "-n", "4").stdout)
+    assert more["rows"][1]["runs"] == 4
+    fewer = json.loads(call("001", "--workers", "1", "--output", "out", "--json", "-n", "2").stdout)
+    assert fewer["rows"][1]["runs"] == 2
+    assert fewer["rows"][1]["verdict"] == "undecided"
+
+
+def test_mistakes_get_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call("007")
+    assert done.exit_code == 2
+    assert "there is no paper '007'; there are 000, 001" in done.stderr
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "results").write_text("a file")
+    done = call("001", "--output", "taken")
+    assert done.exit_code == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_tables_hold_every_figure_of_the_papers(tmp_path):
+    """Without any estimator: all rows with a figure are shown as not there yet."""
+    for paper in ALL:
+        findings = [find(t.title, row, "x", {}, {}) for t in paper.tables for row in t.rows]
+        nothing = Reproduction(paper, range(3), findings, dict.fromkeys(m.name for m in paper.methods), [])
+        assert nothing.count("absent") == len(findings)
+        shown = list(paper_tables(nothing))
+        assert sum(t.row_count for t in shown) == sum(r.paper is not None for r in paper.rows())
+        assert f"{len(findings)} not there yet" in summary(nothing)
+        with write_csv(nothing, tmp_path / "t.csv").open(encoding="utf-8") as file:
+            assert len(file.readlines()) == len(findings) + 1
