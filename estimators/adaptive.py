@@ -236,10 +236,11 @@ class Igg3(_Adaptive):
 class HuberKf(_Adaptive):
     """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
 
-    See `estimators.adaptations.robust`; k = 1.345 keeps 95 % of the efficiency on Gaussian noise.
+    See `estimators.adaptations.robust`. Huber's k = 1.345 keeps 95 % of the efficiency for each component, which costs a
+    filter more than 5 % of RMSE on some clean data.
     """
 
-    def __init__(self, k: float = 1.345):
+    def __init__(self, k: float = 2.0):
         if not k > 0.0:
             raise ValueError(f"k = {k:g}: it must be above 0")
         super().__init__(EquivalentWeights(lambda u: huber(u, k)))
