@@ -236,8 +236,8 @@ class Igg3(_Adaptive):
 class HuberKf(_Adaptive):
     """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
 
-    See `estimators.adaptations.robust`. Huber's k = 1.345 keeps 95 % of the efficiency for each component, which costs a
-    filter more than 5 % of RMSE on some clean data.
+    See `estimators.adaptations.robust`. Huber's k = 1.345 keeps 95 % of the efficiency for each component; it
+    cost up to 8 % of RMSE on clean data.
     """
 
     def __init__(self, k: float = 2.0):
