@@ -12,6 +12,10 @@ _OPEN_LOOP = (
     "a linear KF in open loop lets free inertial navigation run on; with gyros of 3 deg/h it is so far off after 100 "
     "minutes that its linear model no longer holds, so that the paper's KF must have been fed back"
 )
+_STATES = (
+    "ours has 15 states with the biases of the IMU; the paper's filters have nine and no biases, like our nine-state EKF, "
+    "which comes to the paper's figure"
+)
 _DISTURBED = "the sea trial is not public: how far GNSS is off near the shore is our choice of faults"
 
 PAPER = Paper(
@@ -22,8 +26,8 @@ PAPER = Paper(
     full=50,
     methods=(
         Method("KF", ("kf",)),
-        Method("EKF", ("ekf",)),
-        Method("EKF, 9 states", ("ekf-9",)),
+        Method("EKF", ("ekf-9",)),
+        Method("EKF, 15 states", ("ekf",)),
         Method("UKF", ("ukf",)),
         Method("SW-FGO", ("sw-fgo", "sliding-window")),
         Method("GA-FGO", ("ga-fgo",)),
@@ -34,8 +38,8 @@ PAPER = Paper(
             (
                 Value(_SCENARIO, "KF", "position_rmse", 3.84, lower=_DISTURBED, higher=_OPEN_LOOP),
                 Value(_SCENARIO, "EKF", "position_rmse", 3.86, lower=_DISTURBED, higher=_DISTURBED),
-                Value(_SCENARIO, "EKF, 9 states", "position_rmse"),
-                Value(_SCENARIO, "UKF", "position_rmse", 3.70, derived=True, lower=_DISTURBED, higher=_DISTURBED),
+                Value(_SCENARIO, "EKF, 15 states", "position_rmse"),
+                Value(_SCENARIO, "UKF", "position_rmse", 3.70, derived=True, lower=_STATES, higher=_DISTURBED),
                 Value(_SCENARIO, "SW-FGO", "position_rmse", 3.33, derived=True, lower=_DISTURBED, higher=_DISTURBED),
                 Value(_SCENARIO, "GA-FGO", "position_rmse", 3.26, lower=_DISTURBED, higher=_DISTURBED),
             ),
@@ -45,7 +49,7 @@ PAPER = Paper(
             (
                 Gain(_SCENARIO, "KF", "EKF", "position_rmse", 0.005, derived=True, lower=_OPEN_LOOP),
                 Gain(
-                    _SCENARIO, "UKF", "EKF", "position_rmse", 0.0415, derived=True,
+                    _SCENARIO, "UKF", "EKF, 15 states", "position_rmse", 0.0415, derived=True,
                     lower="both filters carry the same states on the same scale of errors, where the model is all but "
                     "linear: sigma points have nothing to gain",
                 ),
@@ -61,11 +65,11 @@ PAPER = Paper(
         Table(
             "Cost (Table 3)",
             (
-                Value(_SCENARIO, "EKF", "update_mean", 8.2, rule="at-most", higher=_COST),
+                Value(_SCENARIO, "EKF, 15 states", "update_mean", 8.2, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "UKF", "update_mean", 15.6, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "SW-FGO", "update_mean", 11.8, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "GA-FGO", "update_mean", 12.3, rule="at-most", higher=_COST),
-                Value(_SCENARIO, "EKF", "peak_memory", 12.0, rule="at-most", higher=_COST),
+                Value(_SCENARIO, "EKF, 15 states", "peak_memory", 12.0, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "UKF", "peak_memory", 18.0, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "SW-FGO", "peak_memory", 42.0, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "GA-FGO", "peak_memory", 45.0, rule="at-most", higher=_COST),
@@ -74,13 +78,14 @@ PAPER = Paper(
     ),
     curves=(
         Curves(
-            "figure-8", "Errors over the voyage", _SCENARIO, ("KF", "EKF", "UKF", "SW-FGO", "GA-FGO"),
+            "figure-8", "Errors over the voyage", _SCENARIO, ("EKF", "EKF, 15 states", "UKF", "SW-FGO", "GA-FGO"),
             {"Horizontal error [m]": "horizontal", "Velocity error [m/s]": "velocity"},
         ),
     ),
     notes=(
         "The paper's figures are of one sea trial that is not public; ours are of a simulated voyage of the same "
         "length, instruments and times of degradation.",
+        "The paper's filters have nine states, so that ekf-9 stands for its EKF; there is no UKF of nine states.",
         "Memory is what an estimator takes beyond the recording, the interpreter's share left out.",
     ),
 )  # fmt: skip

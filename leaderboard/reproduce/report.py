@@ -88,6 +88,8 @@ def _ours(f: Finding) -> str:
         return tables.MISSING
     if not isinstance(f.row, Gain):
         return tables.interval(f.ours.value, f.ours.low, f.ours.high)
+    if f.ours.value > 2.0:  # no gain of a few per cent any more
+        return f"worse by a factor of {tables.interval(f.ours.value, f.ours.low, f.ours.high)}"
     value, low, high = (1.0 - x for x in (f.ours.value, f.ours.high, f.ours.low))
     if low != low or high != high:
         return tables.percent(value)
