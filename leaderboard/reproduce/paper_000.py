@@ -13,8 +13,8 @@ _OPEN_LOOP = (
     "minutes that its linear model no longer holds, so that the paper's KF must have been fed back"
 )
 _STATES = (
-    "ours has 15 states with the biases of the IMU; the paper's filters have nine and no biases, like our nine-state EKF, "
-    "which comes to the paper's figure"
+    "ours has 15 states with the biases of the IMU; the paper's filters have nine and no biases, like our nine-state "
+    "EKF, which comes to the paper's figure"
 )
 _DISTURBED = "the sea trial is not public: how far GNSS is off near the shore is our choice of faults"
 
