@@ -16,6 +16,7 @@ _STATES = (
     "ours has 15 states with the biases of the IMU; the paper's filters have nine and no biases, like our nine-state "
     "EKF, which comes to the paper's figure"
 )
+_MEMORY = "the process's own share (libraries, the record of the run) is in it, the same for EKF and UKF"
 _DISTURBED = "the sea trial is not public: how far GNSS is off near the shore is our choice of faults"
 
 PAPER = Paper(
@@ -69,10 +70,10 @@ PAPER = Paper(
                 Value(_SCENARIO, "UKF", "update_mean", 15.6, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "SW-FGO", "update_mean", 11.8, rule="at-most", higher=_COST),
                 Value(_SCENARIO, "GA-FGO", "update_mean", 12.3, rule="at-most", higher=_COST),
-                Value(_SCENARIO, "EKF, 15 states", "peak_memory", 12.0, rule="at-most", higher=_COST),
-                Value(_SCENARIO, "UKF", "peak_memory", 18.0, rule="at-most", higher=_COST),
-                Value(_SCENARIO, "SW-FGO", "peak_memory", 42.0, rule="at-most", higher=_COST),
-                Value(_SCENARIO, "GA-FGO", "peak_memory", 45.0, rule="at-most", higher=_COST),
+                Value(_SCENARIO, "EKF, 15 states", "peak_memory", 12.0, rule="at-most", higher=_MEMORY),
+                Value(_SCENARIO, "UKF", "peak_memory", 18.0, rule="at-most", higher=_MEMORY),
+                Value(_SCENARIO, "SW-FGO", "peak_memory", 42.0, rule="at-most", higher=_MEMORY),
+                Value(_SCENARIO, "GA-FGO", "peak_memory", 45.0, rule="at-most", higher=_MEMORY),
             ),
         ),
     ),
@@ -86,6 +87,6 @@ PAPER = Paper(
         "The paper's figures are of one sea trial that is not public; ours are of a simulated voyage of the same "
         "length, instruments and times of degradation.",
         "The paper's filters have nine states, so that ekf-9 stands for its EKF; there is no UKF of nine states.",
-        "Memory is what an estimator takes beyond the recording, the interpreter's share left out.",
+        "Memory is the most that the estimator's process takes beyond what it began with.",
     ),
 )  # fmt: skip
