@@ -260,9 +260,7 @@ class ImuSamples:
         return len(self.time)
 
     def __getitem__(self, index: slice) -> ImuSamples:
-        return ImuSamples(
-            self.time[index], self.interval[index], self.angular_rate[index], self.specific_force[index]
-        )
+        return ImuSamples(self.time[index], self.interval[index], self.angular_rate[index], self.specific_force[index])
 
 
 class Measurement(NamedTuple):
@@ -391,9 +389,7 @@ class NavigationStates:
         return len(self.time)
 
     def __getitem__(self, index: slice) -> NavigationStates:
-        return NavigationStates(
-            self.time[index], self.position[index], self.velocity[index], self.attitude[index]
-        )
+        return NavigationStates(self.time[index], self.position[index], self.velocity[index], self.attitude[index])
 
 
 @dataclass(frozen=True, eq=False)
