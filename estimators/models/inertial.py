@@ -75,7 +75,7 @@ class InertialModel(ErrorModel):
     noise : dict of str to (d, d) array
         White noise of an instrument.
     raw_rate, raw_force : (3,) array
-        Angular rate and specific force of the last IMU sample used, as measured.
+        Angular rate at the time of the state (extrapolated) and specific force of the last IMU sample, as measured.
     transition, process_noise : (15, 15) array
         Of the last propagation.
     """
@@ -96,9 +96,9 @@ class InertialModel(ErrorModel):
         self.velocity = np.array(start.velocity, dtype=np.float64)
         self.dcm = np.ascontiguousarray(dcm_from_rpy(start.attitude))
         self.bias, self._memory, self._turn = np.zeros(6), np.zeros(6), np.zeros(3)
-        self._clock = np.zeros(9)
+        self._clock = np.zeros(15)
         self._clock[0], self._clock[1] = start.time, -1e9
-        self.raw_rate, self.raw_force = self._clock[3:6], self._clock[6:9]
+        self.raw_rate, self.raw_force = self._clock[12:15], self._clock[6:9]
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.load(None)
         gyro, level, vertical = self._sensors(imu)
@@ -126,7 +126,7 @@ class InertialModel(ErrorModel):
             g.scale**2 * TURN_TIME, g.misalignment**2 * TURN_TIME,
             dt,
         ])  # fmt: skip
-        self._rate_variance = gyro_white / dt
+        self._rate_variance = 2.5 * gyro_white / dt  # of 3/2 of a sample less 1/2 of the one before
         return gyro.variance, level.variance, vertical.variance
 
     def _aids(self) -> None:

@@ -212,8 +212,10 @@ def advance_inertial(  # type: ignore[no-untyped-def]
         Gyroscope and accelerometer bias; it decays.
     turn : (3,) array
         Averaged body rate [rad/s].
-    clock : (9,) array
-        Time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force.
+    clock : (15,) array
+        Time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force; the mean
+        rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
+        old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
     time, interval : (k,) arrays
     rate, force : (k, 3) arrays
         The samples at hand.
@@ -253,8 +255,15 @@ def advance_inertial(  # type: ignore[no-untyped-def]
             hold, whole, stop = False, 0.0, end
             if i < n and time[i] - interval[i] <= t + 0.5 * nominal:
                 stop = min(time[i], end)
+                started = time[i] - interval[i]
+                if t <= started + eps or clock[1] < started - 0.5 * nominal:
+                    adjacent = clock[1] >= started - 0.5 * nominal
+                    for r in range(3):
+                        clock[9 + r] = clock[3 + r] if adjacent else rate[i, r]
+                ahead = (stop - started) / interval[i] - 0.5
                 for r in range(3):
                     clock[3 + r], clock[6 + r] = rate[i, r], force[i, r]
+                    clock[12 + r] = rate[i, r] + ahead * (rate[i, r] - clock[9 + r])
                 clock[1] = stop
                 if stop >= time[i] - eps:
                     whole = interval[i]

@@ -133,7 +133,7 @@ class ShipModel(ErrorModel):
         elapsed = until - self.time
         if elapsed <= 0.0:
             return
-        steps = ceil(elapsed / STEP - 1e-9)
+        steps = max(1, ceil(elapsed / STEP - 1e-9))
         self._transition = np.eye(self.size)
         for _ in range(steps):
             self._step(covariance, elapsed / steps)

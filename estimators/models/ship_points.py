@@ -28,7 +28,7 @@ class ShipPoints(ShipModel, PointModel):
         """Advance (k, n) states by the model's motion, in place, in its own steps (`ShipModel`)."""
         if elapsed <= 0.0:
             return
-        steps = ceil(elapsed / STEP - 1e-9)
+        steps = max(1, ceil(elapsed / STEP - 1e-9))
         dt = elapsed / steps
         turning = self.turn_time * (1.0 - exp(-dt / self.turn_time))
         decay = np.exp(-self._decay * dt)

@@ -7,10 +7,13 @@ import pytest
 from scipy.stats import chi2
 
 from estimators.models.ship import ShipModel
+from estimators.models.ship_points import ShipPoints
 from estimators.ship_ekf import ShipEkf
 from simnav import earth, rotation
 from simnav.estimator import UnsuitableScenario
 from simnav.recording import AidStream, Block, Recording
+from simnav.scenario import load
+from simnav.source import record
 from simnav.types import Datasheet, InitialState, Instruments, Measurement, NavigationStates
 
 DEG = np.pi / 180.0
@@ -197,3 +200,16 @@ def test_what_it_needs(kinds: tuple[str, ...], needs: str):
     start = InitialState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), np.eye(9))
     with pytest.raises(UnsuitableScenario, match=needs):
         ShipEkf().reset(start, Instruments([s for s in SHEETS if s.name in kinds]))
+
+
+def test_a_step_of_rounding_is_a_step():
+    """Times that differ in their last bits are not divided by."""
+    recording = record(load("ship-straight").model_copy(update={"duration": 5.0}), 1)
+    for model in (ShipModel(), ShipPoints()):
+        P = model.begin(recording.start, recording.instruments)
+        model.propagate(P, 1e-12)
+        assert model.time == 1e-12
+        assert np.isfinite(P).all()
+    states = model.states(np.zeros((2, model.size)))
+    model.move(states, 1e-12)
+    assert np.isfinite(states).all()
