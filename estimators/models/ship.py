@@ -181,13 +181,13 @@ class ShipModel(ErrorModel):
         if sheet.kind in HEADING_KINDS or sheet.kind == "speed_log":
             H = np.zeros((1, self.size))
             if sheet.kind == "speed_log":
-                speed = u - r * ly
-                H[0, U], H[0, R] = 1.0, -ly
-                predicted = speed
+                predicted, factor = u - r * ly, 1.0
                 scale = self.scale_at.get(sheet.name)
                 if scale is not None:
-                    H[0, scale] = speed
-                    predicted += speed * float(x[scale])
+                    factor += float(x[scale])
+                    H[0, scale] = predicted
+                H[0, U], H[0, R] = factor, -factor * ly
+                predicted *= factor
             else:
                 H[0, PSI], predicted = 1.0, psi
             if at is not None:
