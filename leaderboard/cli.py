@@ -202,10 +202,10 @@ def evaluate(
 def campaign(
     scenario: Scenarios = None,
     estimator: Estimators = None,
-    runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 4]")] = None,
+    runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 3]")] = None,
     seed: FirstSeed = 0,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("results"),
-    quick: Annotated[bool, typer.Option("--quick", help="Ends within minutes: 4 seeds, no long scenarios.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Ends within minutes: 3 seeds, no long scenarios.")] = False,
     set_: Set = None,
     workers: Workers = 2,
     time_limit: TimeLimit = None,
