@@ -54,7 +54,7 @@ MemoryLimit = Annotated[
 ]
 
 
-_RUNS, _QUICK_RUNS = 50, 4
+_RUNS, _QUICK_RUNS = 50, 3
 
 
 class Topic(StrEnum):
