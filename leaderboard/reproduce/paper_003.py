@@ -145,8 +145,8 @@ PAPER = Paper(
         "The paper's filters are compared on one recorded run; its raw data are not used here.",
         "Tables 2 and 3 are run on uuv-lake: fixes that drift, the DVL of 0.1 m/s that the text names, and no "
         "disturbance of the accelerometers, all of which those tables imply. How far fixes drift and how often gross "
-        "errors strike was chosen so that the KF's position comes out, with ADKF's figures in view: that the KF agrees is "
-        "by construction, and that ADKF does is a partial test, not a blind one. With white "
+        "errors strike was chosen so that the KF's position comes out, with ADKF's figures in view: that the KF agrees "
+        "is by construction, and that ADKF does is a partial test, not a blind one. With white "
         "errors of the datasheets' size (uuv-surface without its disturbance) gross errors are all that is left, and "
         "ADKF gains about 94 %.",
         "The paper's ADKF has the 23 states of its KF; ours adapts the 15-state filter with the DVL's scale and "
