@@ -89,7 +89,7 @@ def _log_digest(scenario: Scenario) -> str:
     try:
         for recording in channel.list_recordings(scenario.log):
             for file in scenario.log.files.values():
-                path = channel._locate(scenario.log, file, recording)
+                path = channel.locate(scenario.log, file, recording)
                 files.append((f"{recording}/{file.path}", path))
     except (ValueError, OSError):  # absent data: every run says so
         return "absent"

@@ -24,6 +24,8 @@ class Source(Protocol):
     faults : tuple of FaultLabel
     duration, step : float
         [s]
+    note : str
+        What is to be known of the run; empty for a simulated one.
     """
 
     instruments: Instruments
@@ -32,6 +34,7 @@ class Source(Protocol):
     faults: tuple[FaultLabel, ...]
     duration: float
     step: float
+    note: str
 
     def advance(self, until: float) -> Block:
         """The next stretch of the run, up to a time [s]."""
@@ -82,5 +85,5 @@ def record(scenario: Scenario, seed: int) -> Recording:
         source.start,
         source.faults,
         source.advance(source.duration),
-        getattr(source, "note", ""),
+        source.note,
     )

@@ -19,7 +19,7 @@ from simnav.log.table import LogError, LogWarning, Table, check_ascending, read_
 from simnav.rotation import wrap_angle
 from simnav.types import KINDS, Array
 
-__all__ = ["ImuSeries", "Series", "geodetic_from_local", "list_recordings", "read_channel", "read_imu"]
+__all__ = ["ImuSeries", "Series", "geodetic_from_local", "list_recordings", "locate", "read_channel", "read_imu"]
 
 #: Names of the components of the parts of the reference; those of the instruments are in `KINDS`.
 _REFERENCE = {
@@ -87,7 +87,7 @@ def _root(folder: str) -> Path:
     return path
 
 
-def _locate(spec: RecordedSpec, file: FileSpec, recording: str) -> Path:
+def locate(spec: RecordedSpec, file: FileSpec, recording: str) -> Path:
     name = file.path.replace("{recording}", recording)
     if not spec.folder.startswith(_GTSAM):
         return _root(spec.folder) / name
@@ -152,7 +152,7 @@ def _open(
 ) -> tuple[Table, Array, NDArray[np.int64]]:
     """Table, times of its rows, and the rows that ``skip_rows`` leaves."""
     file = spec.files[key]
-    path = _locate(spec, file, recording)
+    path = locate(spec, file, recording)
     if file.format == "nmea":
         table = read_nmea(path).table(sentence or "", talker)
         column: str = file.clock

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -232,7 +234,21 @@ def test_closed_loop_steers_by_the_position_it_is_given():
     assert relative_position(shifted.position, plain.position)[0, 0] > 50.0
 
 
-def test_memory_does_not_grow_and_time_does_not_go_back():
+def test_memory_does_not_grow_with_the_run():
+    world = World(START, Vessel(), [ZigZag(angle=0.3, duration=1e6)], SEA, rate=100.0, seed=1)
+    held = []
+    tracemalloc.start()
+    try:
+        for second in range(1, 2001):
+            world.advance(float(second), {"a": np.array([float(second)])})
+            if second % 1000 == 0:
+                held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert held[1] - held[0] < 2000  # one float a step would be 8000 bytes
+
+
+def test_time_does_not_go_back():
     world = World(START, Vessel(), [], SEA, rate=100.0, seed=1)
     world.advance(10.0, {})
     with pytest.raises(ValueError, match="does not go back"):
