@@ -1,0 +1,280 @@
+"""What a model is to a graph: the nodes of a window and the factors that link them, around a state that runs ahead.
+
+The model itself, the *front*, runs from measurement to measurement as it does in a filter. At each time of a measurement
+its state becomes a node, and what lies between two nodes a motion factor: the transition matrix F and the noise Q that
+the model accumulated, on the trajectory that it predicted. A factor knows how far its two ends have moved since
+(``begin_shift``, ``end_shift``), which is all that is needed to linearise it anew: with x the nodes now, the error is
+``e = x_k+1 - f(x_k)``, f being the exact motion. So the IMU is integrated once, whatever happens to the nodes
+(preintegration: C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", IEEE Trans.
+Robotics 33(1), 2017; here about the predicted trajectory and on the rotating Earth).
+
+A subclass compiles three loops over a window: `linearise_motion`, `linearise_aids`, `retract`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from estimators.models.base import ErrorModel, Linearised
+from simnav.compiled import kernel
+from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
+
+__all__ = ["Chain", "Columns", "whitening"]
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1])")
+def whitening(covariance, whitener):  # type: ignore[no-untyped-def]
+    """The inverse Cholesky factor of a covariance, so that ``whitener`` times an error has unit covariance.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        Positive semi-definite; what is zero or depends on the components before it is left out.
+    whitener : (n, n) array
+        Overwritten: lower triangular, with rows of zeros for components left out.
+    """
+    n = covariance.shape[0]
+    L = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            x = covariance[i, j]
+            for k in range(j):
+                x -= L[i, k] * L[j, k]
+            if j < i:
+                L[i, j] = x / L[j, j] if L[j, j] > 0.0 else 0.0
+            elif x > 1e-13 * covariance[i, i]:
+                L[i, i] = sqrt(x)
+    for i in range(n):
+        for j in range(n):
+            whitener[i, j] = 0.0
+        if L[i, i] == 0.0:
+            continue
+        for j in range(i):
+            x = 0.0
+            for k in range(j, i):
+                x += L[i, k] * whitener[k, j]
+            whitener[i, j] = -x / L[i, i]
+        whitener[i, i] = 1.0 / L[i, i]
+
+
+class Columns:
+    """Named columns of equal length; rows are appended at the end and dropped at the front.
+
+    Parameters
+    ----------
+    **columns : tuple of int, or dtype
+        Shape of a row's float64 entry, or the type of a scalar.
+
+    Examples
+    --------
+    >>> c = Columns(time=(), value=(2,))
+    >>> for t in range(3):
+    ...     c.append(time=t, value=(t, -t))
+    >>> c.drop(1)
+    >>> c["time"].tolist(), c["value"][0].tolist()
+    ([1.0, 2.0], [1.0, -1.0])
+    """
+
+    def __init__(self, **columns: Any):
+        self._capacity = 64
+        self._columns: dict[str, Any] = {
+            name: np.zeros((self._capacity, *what)) if isinstance(what, tuple) else np.zeros(self._capacity, what)
+            for name, what in columns.items()
+        }
+        self._first = self._last = 0
+
+    def __len__(self) -> int:
+        return self._last - self._first
+
+    def __getitem__(self, name: str) -> Any:
+        """A view of a column, (rows, ...)."""
+        return self._columns[name][self._first : self._last]
+
+    def append(self, **values: Any) -> None:
+        """Add a row; what is not given keeps any value."""
+        if self._last == self._capacity:
+            self._make_room()
+        for name, value in values.items():
+            self._columns[name][self._last] = value
+        self._last += 1
+
+    def drop(self, count: int) -> None:
+        """Take ``count`` rows off the front."""
+        self._first += count
+
+    def _make_room(self) -> None:
+        """Move the rows to the front; twice the space where they fill more than half of it."""
+        rows = len(self)
+        grown = 2 * self._capacity if 2 * rows > self._capacity else self._capacity
+        for name, column in self._columns.items():
+            if grown > self._capacity:
+                new = np.zeros((grown, *column.shape[1:]), column.dtype)
+                new[:rows] = column[self._first : self._last]
+                self._columns[name] = new
+            else:
+                column[:rows] = column[self._first : self._last].copy()
+        self._capacity, self._first, self._last = grown, 0, rows
+
+
+class Chain(ABC):
+    """The nodes and factors of a window over a model.
+
+    Parameters
+    ----------
+    front : ErrorModel
+        With `carry`.
+
+    Attributes
+    ----------
+    size : int
+        n, of the model's error.
+    nodes : Columns
+        ``time`` and the arrays of the model that `node_arrays` names.
+    motions : Columns
+        Of the factor that leads to a node from the one before: ``transition``, ``noise``, ``whitener`` (n, n);
+        ``begin_shift``, ``end_shift`` (n,); as linearised last, ``jacobian`` (n, n) and ``residual`` (n,); ``weight``.
+    aids : Columns
+        ``node`` (number since the start of the run), ``instrument`` (index into ``names``), ``components``, ``time``,
+        ``value`` (3,), ``noise`` and ``whitener`` (3, 3); as linearised last ``residual`` (3,), ``jacobian`` (3, n);
+        ``weight``. In ascending order of their nodes.
+    names : tuple of str
+        Of the instruments.
+    base : int
+        Number of the first node of the window since the start of the run.
+    """
+
+    def __init__(self, front: ErrorModel):
+        self.front = front
+
+    #: Arrays of the model that a node keeps beside those of its ``state``.
+    node_arrays: tuple[str, ...] = ()
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """One node, at the start; its (n, n) covariance. Raises UnsuitableScenario."""
+        front = self.front
+        covariance = front.begin(start, instruments)
+        self.size = n = front.size
+        self.names = tuple(instruments)
+        self._index = {name: i for i, name in enumerate(self.names)}
+        self._kept = (*front.state, *self.node_arrays)
+        self.nodes = Columns(time=(), **{name: getattr(front, name).shape for name in self._kept})
+        self.motions = Columns(
+            transition=(n, n), noise=(n, n), whitener=(n, n), begin_shift=(n,), end_shift=(n,), time=(),
+            residual=(n,), jacobian=(n, n), whitened=(n,), norm=(), weight=(),
+        )  # fmt: skip
+        self.aids = Columns(
+            node=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,), noise=(3, 3),
+            whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
+        )  # fmt: skip
+        self.base = 0
+        self._append_node()
+        self._pending()
+        return covariance
+
+    def _append_node(self) -> None:
+        front = self.front
+        self.nodes.append(time=front.time, **{name: getattr(front, name) for name in self._kept})
+
+    def _pending(self) -> None:
+        """Motion since the newest node: none."""
+        self._transition, self._noise = np.eye(self.size), np.zeros((self.size, self.size))
+
+    def observes(self, instrument: Datasheet) -> bool:
+        """Whether measurements of an instrument can be factors."""
+        return self.front.observes(instrument)
+
+    def load(self, imu: ImuSamples | None) -> None:
+        """Take the IMU samples of the step that follows."""
+        self.front.load(imu)
+
+    @property
+    def time(self) -> float:
+        """Of the front [s]."""
+        return self.front.time
+
+    def propagate(self, until: float) -> None:
+        """Advance the front."""
+        begin = self.front.time
+        if until <= begin:
+            return
+        self.front.propagate(self._noise, until)
+        self.front.carry(self._transition, until - begin)
+
+    def extend(self) -> None:
+        """Make the front a node, with the motion since the newest one as its factor."""
+        whitener = np.empty((self.size, self.size))
+        whitening(self._noise, whitener)
+        self.motions.append(
+            transition=self._transition, noise=self._noise, whitener=whitener, begin_shift=0.0, end_shift=0.0,
+            time=self.front.time, weight=1.0,
+        )  # fmt: skip
+        self._append_node()
+        self._pending()
+
+    def predicted_covariance(self, newest: Array) -> Array:
+        """Covariance of the front from that of the newest node."""
+        covariance = self._transition @ newest @ self._transition.T
+        covariance += self._noise
+        return covariance
+
+    def linearise(self, measurement: Measurement) -> Linearised | None:
+        """A measurement at the front, not attached yet."""
+        return self.front.measure(measurement)
+
+    def attach(self, measurement: Measurement, noise: Array) -> None:
+        """Make a measurement with the (m, m) noise a factor on the newest node."""
+        m = len(noise)
+        full, whitener, value = np.eye(3), np.zeros((3, 3)), np.zeros(3)
+        full[:m, :m] = noise
+        whitening(full, whitener)
+        value[: len(measurement.value)] = measurement.value
+        self.aids.append(
+            node=self.base + len(self.nodes) - 1, instrument=self._index[measurement.instrument], components=m,
+            time=measurement.time, value=value, noise=full, whitener=whitener, weight=1.0,
+        )  # fmt: skip
+
+    def settle(self) -> None:
+        """Set the front to the newest node; there must be no motion since."""
+        self.front.restore([self.nodes[name][-1] for name in self.front.state])
+
+    def drop(self, count: int) -> None:
+        """Take the oldest nodes off the window, with their factors."""
+        self.base += count
+        self.nodes.drop(count)
+        self.motions.drop(count)
+        self.aids.drop(int(np.searchsorted(self.aids["node"], self.base)))
+
+    def copy_states(self) -> list[Array]:
+        """What `retract` changes, for `restore_states`."""
+        changed = [self.nodes[name].copy() for name in self.front.state]
+        return [*changed, self.motions["begin_shift"].copy(), self.motions["end_shift"].copy()]
+
+    def restore_states(self, states: list[Array]) -> None:
+        """Take a `retract` back."""
+        for name, value in zip(self.front.state, states[:-2], strict=True):
+            self.nodes[name][...] = value
+        self.motions["begin_shift"][...], self.motions["end_shift"][...] = states[-2:]
+
+    def estimate(self, covariance: Array) -> Estimate:
+        """The front as an estimate."""
+        return self.front.estimate(covariance)
+
+    @abstractmethod
+    def linearise_motion(self) -> None:
+        """Fill ``residual`` and ``jacobian`` of all motion factors, for the nodes as they are.
+
+        With x the state after a motion, ``residual`` is the newer node less x, ``jacobian`` the derivative of x with
+        respect to the older node.
+        """
+
+    @abstractmethod
+    def linearise_aids(self) -> None:
+        """Fill ``residual`` (measured less predicted) and ``jacobian`` (of the prediction) of all aiding factors."""
+
+    @abstractmethod
+    def retract(self, step: Array) -> None:
+        """Add a (K, n) step to the nodes, and to the shifts of the motion factors."""

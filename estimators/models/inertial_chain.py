@@ -1,0 +1,193 @@
+"""The chain of the inertial model: preintegrated IMU factors, and all aids of a window linearised at once.
+
+Between two nodes the front integrated the IMU samples from x' to y' and made F on the way. From another node x, with the
+shift ``s = x - x'`` (rotation phi, biases b), the same samples lead to ``f(x) = y' + F s + c``, where c is what rotating
+the increments adds beyond the first order: with ``E = exp(phi x)`` and the vectors u_p, u_v of the specific force's double
+and single integral in north-east-down, which stand in F (its block of the attitude is ``-[u x]``),
+
+- ``c_p = (E - 1 - phi x) u_p + (E - 1) F_pb b``, and c_v likewise with u_v and F_vb
+- attitude: ``E_F exp(E F_phi,b b)`` with ``E_F = exp(F_phi,phi phi)``, to second order in the product of both
+
+F and its bias columns turn with the node (``F_pb = C B`` with B in body axes): these are the body-frame increments and
+bias Jacobians of preintegration (Forster et al. 2017, eqs. 38-44; paper 001's eqs. 8-10 with its slip settled: gravity
+is outside of the integral). Curvature and rotation of the Earth are in y' and in F, to first order in the shift.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimators.models.chain import Chain
+from estimators.models.inertial import InertialModel
+from estimators.models.measurements import observe_inertial
+from estimators.models.propagation import correct_inertial
+from simnav.compiled import kernel
+from simnav.rotation import cross, rotation_coefficients
+from simnav.types import Array, InitialState, Instruments
+
+__all__ = ["InertialChain"]
+
+
+@kernel()
+def _turn(r0, r1, r2, v0, v1, v2):  # type: ignore[no-untyped-def]
+    """``exp(r x) v``."""
+    a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
+    x0, x1, x2 = cross(r0, r1, r2, v0, v1, v2)
+    y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
+    return v0 + a * x0 + b * y0, v1 + a * x1 + b * y1, v2 + a * x2 + b * y2
+
+
+@kernel()
+def _compose(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+    """Rotation vector of ``exp(a x) exp(b x)``, to third order (Baker, Campbell, Hausdorff)."""
+    x0, x1, x2 = cross(a0, a1, a2, b0, b1, b2)
+    y0, y1, y2 = cross(a0 - b0, a1 - b1, a2 - b2, x0, x1, x2)
+    t = 1.0 / 12.0
+    return a0 + b0 + 0.5 * x0 + t * y0, a1 + b1 + 0.5 * x1 + t * y1, a2 + b2 + 0.5 * x2 + t * y2
+
+
+@kernel("void(f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+def _linearise_motion(transition, begin_shift, end_shift, residual, jacobian):  # type: ignore[no-untyped-def]
+    count, n = begin_shift.shape
+    moved = np.empty(n)
+    for k in range(count):
+        F, J, s, e = transition[k], jacobian[k], begin_shift[k], end_shift[k]
+        for i in range(n):
+            x = 0.0
+            for j in range(n):
+                J[i, j] = F[i, j]
+                x += F[i, j] * s[j]
+            moved[i] = x
+        p0, p1, p2 = s[6], s[7], s[8]
+        if p0 * p0 + p1 * p1 + p2 * p2 > 1e-24:
+            # The bias columns turn with the attitude.
+            if n >= 15:
+                for j in range(9, 15):
+                    for i in range(0, 9, 3):
+                        J[i, j], J[i + 1, j], J[i + 2, j] = _turn(p0, p1, p2, F[i, j], F[i + 1, j], F[i + 2, j])
+            for i in range(0, 6, 3):
+                u0 = 0.5 * (F[i + 1, 8] - F[i + 2, 7])
+                u1 = 0.5 * (F[i + 2, 6] - F[i, 8])
+                u2 = 0.5 * (F[i, 7] - F[i + 1, 6])
+                w0, w1, w2 = _turn(p0, p1, p2, u0, u1, u2)
+                x0, x1, x2 = cross(p0, p1, p2, u0, u1, u2)
+                moved[i] += w0 - u0 - x0
+                moved[i + 1] += w1 - u1 - x1
+                moved[i + 2] += w2 - u2 - x2
+                w0, w1, w2 = w0 - u0, w1 - u1, w2 - u2
+                J[i, 7] += w2
+                J[i, 8] -= w1
+                J[i + 1, 6] -= w2
+                J[i + 1, 8] += w0
+                J[i + 2, 6] += w1
+                J[i + 2, 7] -= w0
+                if n >= 15:
+                    for j in range(9, 15):
+                        for r in range(3):
+                            moved[i + r] += (J[i + r, j] - F[i + r, j]) * s[j]
+            a0, a1, a2 = moved[6], moved[7], moved[8]
+            b0, b1, b2 = 0.0, 0.0, 0.0
+            if n >= 15:
+                for j in range(9, 15):
+                    a0 -= F[6, j] * s[j]
+                    a1 -= F[7, j] * s[j]
+                    a2 -= F[8, j] * s[j]
+                    b0 += J[6, j] * s[j]
+                    b1 += J[7, j] * s[j]
+                    b2 += J[8, j] * s[j]
+            moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
+        for i in range(n):
+            residual[k, i] = e[i] - moved[i]
+        residual[k, 6], residual[k, 7], residual[k, 8] = _compose(e[6], e[7], e[8], -moved[6], -moved[7], -moved[8])
+
+
+@kernel(
+    "void(i8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8[:, ::1], "
+    "f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], i8[::1])"
+)
+def _linearise_aids(  # type: ignore[no-untyped-def]
+    node, base, instrument, value, codes, arms, bias_at, scale_at,
+    position, velocity, dcm, rate, bias, calibration, residual, jacobian, components,
+):  # fmt: skip
+    innovation = np.empty(3)
+    for i in range(node.size):
+        k, s = node[i] - base, instrument[i]
+        components[i] = observe_inertial(
+            codes[s], arms[s], bias_at[s], scale_at[s], value[i],
+            position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k], innovation, jacobian[i],
+        )  # fmt: skip
+        for r in range(3):
+            residual[i, r] = innovation[r] if r < components[i] else 0.0
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _retract(step, position, velocity, dcm, bias, calibration, begin_shift, end_shift):  # type: ignore[no-untyped-def]
+    count, n = step.shape
+    dx = np.zeros(max(n, 15))
+    for k in range(count):
+        for j in range(n):
+            dx[j] = step[k, j]
+        correct_inertial(position[k], velocity[k], dcm[k], bias[k], calibration[k], dx)
+        for side in range(2):
+            if (side == 0 and k == count - 1) or (side == 1 and k == 0):
+                continue
+            shift = begin_shift[k] if side == 0 else end_shift[k - 1]
+            r0, r1, r2 = _compose(dx[6], dx[7], dx[8], shift[6], shift[7], shift[8])
+            for j in range(n):
+                shift[j] += dx[j]
+            shift[6], shift[7], shift[8] = r0, r1, r2
+
+
+class InertialChain(Chain):
+    """The chain of an inertial model.
+
+    Parameters
+    ----------
+    front : InertialModel
+        Of 15 states, with or without calibration states, or the 9-state model.
+    """
+
+    node_arrays = ("raw_rate",)
+    front: InertialModel
+
+    def __init__(self, front: InertialModel):
+        super().__init__(front)
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """One node, at the start; its covariance. UnsuitableScenario without an IMU."""
+        covariance = super().begin(start, instruments)
+        front = self.front
+        nothing = (0, np.zeros(3), -1, -1)
+        known = [front.aid_parameters.get(name, nothing) for name in self.names]
+        self._codes = np.array([code for code, *_ in known], dtype=np.int64)
+        self._arms = np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3)
+        self._bias_at = np.array([at for *_, at, _ in known], dtype=np.int64)
+        self._scale_at = np.array([at for *_, at in known], dtype=np.int64)
+        return covariance
+
+    def linearise_motion(self) -> None:
+        """As `Chain.linearise_motion` (equations in the module)."""
+        m = self.motions
+        _linearise_motion(m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"])
+
+    def linearise_aids(self) -> None:
+        """As `Chain.linearise_aids`."""
+        nodes, aids = self.nodes, self.aids
+        jacobian = aids["jacobian"]
+        wide = jacobian if self.size >= 15 else np.empty((len(aids), 3, 15))
+        _linearise_aids(
+            aids["node"], self.base, aids["instrument"], aids["value"],
+            self._codes, self._arms, self._bias_at, self._scale_at,
+            nodes["position"], nodes["velocity"], nodes["dcm"], nodes["raw_rate"], nodes["bias"], nodes["calibration"],
+            aids["residual"], wide, aids["components"],
+        )  # fmt: skip
+        if wide is not jacobian:
+            jacobian[...] = wide[..., : self.size]
+
+    def retract(self, step: Array) -> None:
+        """As `Chain.retract`."""
+        nodes, m = self.nodes, self.motions
+        _retract(
+            step, nodes["position"], nodes["velocity"], nodes["dcm"], nodes["bias"], nodes["calibration"],
+            m["begin_shift"], m["end_shift"],
+        )  # fmt: skip
