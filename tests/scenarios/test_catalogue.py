@@ -12,6 +12,7 @@ import pytest
 
 from simnav.catalogue import Header, headers
 from simnav.scenario import Scenario, load
+from simnav.source import record
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
 CATALOGUE = [h for h in headers() if h.path.parent == FOLDER]
@@ -126,13 +127,38 @@ def test_paper_001():
 
 
 def test_paper_002():
-    for name in ("ship-dead-reckoning", "ship-straight", "ship-turn"):
+    for name in ("ship-dead-reckoning", "ship-straight", "ship-turn", "ship-field"):
         sheets = load(name).instruments_sheet()
         assert sheets.imu is None
         assert {s.kind for s in sheets.values()} == {"gnss_position", "gyrocompass", "speed_log"}
         assert all(s.rate == 1.0 for s in sheets.values())
     faults = load("ship-dead-reckoning").faults
     assert [(f.kind, f.start, f.end) for f in faults] == [("outage", 500.0, 560.0), ("outage", 1100.0, 1160.0)]
+
+
+def test_paper_002_field():
+    """An hour, about 6.5 m/s, -3.4e-4 m/s^2, heading from 294 to 280 deg, 60 s without GNSS at 400 and 900 s."""
+    scenario = load("ship-field")
+    assert [(f.kind, f.start, f.end) for f in scenario.faults] == [("outage", 400.0, 460.0), ("outage", 900.0, 960.0)]
+    assert scenario.duration == 3600.0
+    truth = record(scenario, 0).data.truth
+    heading = np.degrees(truth.attitude[:, 2]) % 360.0
+    assert (heading[0], heading[-1]) == pytest.approx((294.0, 280.0), abs=0.1)
+    water = load("ship-field").current.speed * np.array([math.cos(math.radians(40.0)), math.sin(math.radians(40.0))])
+    speed = np.hypot(*(truth.velocity[:, :2] - water).T)
+    slope, level = np.polyfit(truth.time - 1800.0, speed, 1)
+    assert slope == pytest.approx(-3.4e-4, rel=0.05)
+    assert level == pytest.approx(6.5, abs=0.05)
+
+
+def test_paper_001_road():
+    """The real drive of car-kitti, on which the noise of the fixes changes twice."""
+    road, drive = load("car-road"), load("car-kitti")
+    assert road.recorded
+    assert road.log is not None
+    assert drive.log is not None
+    assert (road.log.imu, road.log.files, road.log.origin) == (drive.log.imu, drive.log.files, drive.log.origin)
+    assert [f.kind for f in road.faults] == ["noise_step", "gross_error"]
 
 
 def test_paper_003():
