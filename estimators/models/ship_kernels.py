@@ -1,0 +1,343 @@
+"""Kernels of the ship model: each of its equations once, for one state or for many.
+
+The state is a position (latitude, longitude, height) and a vector x of n numbers: those at the indices `U` to `CE`, then
+biases and scale factors; x[0] and x[1] are zero, or metres north and east of the position where many states share it.
+Equations and sources are those of `estimators.models.ship`.
+
+An instrument is a row of three integers (one of the kinds `POSITION` to `BODY_VELOCITY`; index of its first bias and of
+its scale factor, or -1) and a row of seven numbers: forward and starboard lever arm; variance of its two components;
+variance of the sideways velocity; squared scale factor and squared yaw misalignment that count as noise.
+"""
+
+from __future__ import annotations
+
+from math import atan2, ceil, cos, exp, sin
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.earth import radii_scalar
+
+__all__ = [
+    "BODY_VELOCITY",
+    "CE",
+    "CN",
+    "HEADING",
+    "LOG",
+    "POSITION",
+    "PSI",
+    "VELOCITY",
+    "E",
+    "N",
+    "R",
+    "U",
+    "advance_ship",
+    "correct_ship",
+    "describe_ship",
+    "move_ships",
+    "observe_ship",
+    "read_ships",
+]
+
+N, E, U, PSI, R, CN, CE = range(7)
+POSITION, HEADING, LOG, VELOCITY, BODY_VELOCITY = range(5)
+#: Longest step of the integration [s].
+STEP = 1.0
+
+
+@kernel()
+def steps_of(elapsed, turn_time):  # type: ignore[no-untyped-def]
+    """Number of integration steps of a stretch, their length, and the integral of the decaying turn rate over one."""
+    steps = max(1, ceil(elapsed / STEP - 1e-9))
+    dt = elapsed / steps
+    return steps, dt, turn_time * (1.0 - exp(-dt / turn_time))
+
+
+@kernel()
+def sail(x, decay, turning, dt):  # type: ignore[no-untyped-def]
+    """Move x on by a step; return metres north and east, the speed, and cosine and sine of the mean heading."""
+    u, turn = x[U], turning * x[R]
+    middle = x[PSI] + 0.5 * turn
+    c, s = cos(middle), sin(middle)
+    north, east = dt * (u * c + x[CN]), dt * (u * s + x[CE])
+    for i in range(2, x.size):
+        x[i] *= decay[i]
+    x[PSI] += turn
+    return north, east, u, c, s
+
+
+@kernel()
+def displace_ship(position, north, east):  # type: ignore[no-untyped-def]
+    """Move a position by metres, with the radii where it was."""
+    meridian, prime = radii_scalar(sin(position[0]))
+    position[1] += east / ((prime + position[2]) * cos(position[0]))
+    position[0] += north / (meridian + position[2])
+
+
+@kernel()
+def carry_rows(M, decay, turning, dt, u, c, s):  # type: ignore[no-untyped-def]
+    """``M = F M`` in place, F the transition matrix of `sail`'s step."""
+    n = M.shape[1]
+    for j in range(n):
+        turned = turning * M[R, j]
+        aside = u * (M[PSI, j] + 0.5 * turned)
+        M[N, j] += dt * (c * M[U, j] - s * aside + M[CN, j])
+        M[E, j] += dt * (s * M[U, j] + c * aside + M[CE, j])
+        M[PSI, j] += turned
+    for i in range(2, M.shape[0]):
+        if decay[i] != 1.0:
+            for j in range(n):
+                M[i, j] *= decay[i]
+
+
+@kernel()
+def sail_step(position, x, transition, decay, turning, dt):  # type: ignore[no-untyped-def]
+    """Move a state on by a step, and a transition matrix with it; return what `carry_rows` takes."""
+    north, east, u, c, s = sail(x, decay, turning, dt)
+    displace_ship(position, north, east)
+    carry_rows(transition, decay, turning, dt, u, c, s)
+    return u, c, s
+
+
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8)")
+def advance_ship(  # type: ignore[no-untyped-def]
+    position, x, covariance, transition, rate, density, turn_time, elapsed
+):
+    """Advance a state and its covariance, in place.
+
+    Half of a step's noise enters before it and half after: second order in its length.
+
+    Parameters
+    ----------
+    position : (3,) array
+    x : (n,) array
+    covariance : (n, n) array
+    transition : (n, n) array
+        Overwritten.
+    rate, density : (n,) arrays
+        Inverse correlation times [1/s] and noise densities.
+    turn_time : float
+        Correlation time of the turn rate [s].
+    elapsed : float
+        [s].
+    """
+    n = x.size
+    steps, dt, turning = steps_of(elapsed, turn_time)
+    decay = np.exp(-rate * dt)
+    transition[:] = 0.0
+    for i in range(n):
+        transition[i, i] = 1.0
+    for _ in range(steps):
+        u, c, s = sail_step(position, x, transition, decay, turning, dt)
+        for i in range(n):
+            covariance[i, i] += 0.5 * dt * density[i]
+        for half in range(2):
+            if half == 1:  # (F P)' to the left of which F makes F P F'
+                for i in range(n):
+                    for j in range(i):
+                        covariance[i, j], covariance[j, i] = covariance[j, i], covariance[i, j]
+            carry_rows(covariance, decay, turning, dt, u, c, s)
+        for i in range(n):
+            for j in range(i):
+                covariance[j, i] = covariance[i, j]
+            covariance[i, i] += 0.5 * dt * density[i]
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8, f8)")
+def move_ships(states, rate, turn_time, elapsed):  # type: ignore[no-untyped-def]
+    """Advance (k, n) states by the same motion; their positions are metres."""
+    steps, dt, turning = steps_of(elapsed, turn_time)
+    decay = np.exp(-rate * dt)
+    for k in range(states.shape[0]):
+        for _ in range(steps):
+            north, east, _u, _c, _s = sail(states[k], decay, turning, dt)
+            states[k, N] += north
+            states[k, E] += east
+
+
+@kernel()
+def reading(code, aid, x):  # type: ignore[no-untyped-def]
+    """What an instrument should read, up to two components; a position in metres from that of the state."""
+    kind, at, scale = code[0], code[1], code[2]
+    u, psi, r = x[U], x[PSI], x[R]
+    a, b = 0.0, 0.0
+    if kind == HEADING:
+        a = psi
+    elif kind == LOG:
+        a = u - r * aid[1]
+        if scale >= 0:
+            a *= 1.0 + x[scale]
+    else:
+        c, s = cos(psi), sin(psi)
+        if kind == POSITION:
+            a, b = x[N] + c * aid[0] - s * aid[1], x[E] + s * aid[0] + c * aid[1]
+        else:
+            ahead, across = u - r * aid[1], r * aid[0]
+            if kind == VELOCITY:
+                a, b = c * ahead - s * across + x[CN], s * ahead + c * across + x[CE]
+            else:
+                a, b = ahead + c * x[CN] + s * x[CE], across - s * x[CN] + c * x[CE]
+    if at >= 0:
+        a += x[at]
+        if kind == POSITION:
+            b += x[at + 1]
+    return a, b
+
+
+@kernel()
+def fill_jacobian(code, aid, x, jacobian):  # type: ignore[no-untyped-def]
+    """The derivative of `reading`, into a matrix of zeros (or of the same instrument's last one)."""
+    kind, at, scale = code[0], code[1], code[2]
+    u, psi, r, lx, ly = x[U], x[PSI], x[R], aid[0], aid[1]
+    if kind == HEADING:
+        jacobian[0, PSI] = 1.0
+    elif kind == LOG:
+        factor = 1.0
+        if scale >= 0:
+            factor += x[scale]
+            jacobian[0, scale] = u - r * ly
+        jacobian[0, U], jacobian[0, R] = factor, -factor * ly
+    else:
+        c, s = cos(psi), sin(psi)
+        if kind == POSITION:
+            jacobian[0, N], jacobian[1, E] = 1.0, 1.0
+            jacobian[0, PSI], jacobian[1, PSI] = -s * lx - c * ly, c * lx - s * ly
+        elif kind == VELOCITY:
+            ahead, across = u - r * ly, r * lx
+            jacobian[0, U], jacobian[1, U] = c, s
+            jacobian[0, R], jacobian[1, R] = -c * ly - s * lx, -s * ly + c * lx
+            jacobian[0, PSI], jacobian[1, PSI] = -s * ahead - c * across, c * ahead - s * across
+            jacobian[0, CN], jacobian[1, CE] = 1.0, 1.0
+        else:
+            jacobian[0, U] = 1.0
+            jacobian[0, R], jacobian[1, R] = -ly, lx
+            jacobian[0, PSI], jacobian[1, PSI] = c * x[CE] - s * x[CN], -c * x[CN] - s * x[CE]
+            jacobian[0, CN], jacobian[0, CE] = c, s
+            jacobian[1, CN], jacobian[1, CE] = -s, c
+    if at >= 0:
+        jacobian[0, at] = 1.0
+        if kind == POSITION:
+            jacobian[1, at + 1] = 1.0
+
+
+@kernel()
+def residual_of(code, aid, position, x, first, second):  # type: ignore[no-untyped-def]
+    """Measured minus predicted: metres, radians or metres per second; the second is 0 of a single component."""
+    a, b = reading(code, aid, x)
+    if code[0] == POSITION:
+        meridian, prime = radii_scalar(sin(position[0]))
+        east = second - position[1]
+        first = (first - position[0]) * (meridian + position[2])
+        second = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0])
+    elif code[0] == HEADING:
+        return atan2(sin(first - a), cos(first - a)), 0.0
+    elif code[0] == LOG:
+        return first - a, 0.0
+    return first - a, second - b
+
+
+@kernel("void(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8[::1], f8[:, ::1], f8[:, ::1])")
+def observe_ship(  # type: ignore[no-untyped-def]
+    code, aid, position, x, first, second, residual, jacobian, noise
+):
+    """One measurement, linearised.
+
+    Parameters
+    ----------
+    code : (3,) array of int
+    aid : (7,) array
+        The instrument (see the module).
+    position : (3,) array
+    x : (n,) array
+    first, second : float
+        The value measured; the second is not looked at where there is one component.
+    residual : (m,) array
+        Of one or two components; overwritten with measured minus predicted.
+    jacobian : (m, n) array
+        Zeros on entry; filled.
+    noise : (m, m) array
+        Overwritten.
+    """
+    a, b = residual_of(code, aid, position, x, first, second)
+    residual[0] = a
+    noise[0, 0] = aid[2]
+    fill_jacobian(code, aid, x, jacobian)
+    if residual.size == 1:
+        return
+    residual[1] = b
+    noise[0, 1], noise[1, 0], noise[1, 1] = 0.0, 0.0, aid[3]
+    if code[0] == VELOCITY:
+        c, s = cos(x[PSI]), sin(x[PSI])
+        noise[0, 0] += s * s * aid[4]
+        noise[0, 1] -= s * c * aid[4]
+        noise[1, 0] -= s * c * aid[4]
+        noise[1, 1] += c * c * aid[4]
+    elif code[0] == BODY_VELOCITY:
+        v, w = reading(code, aid, x)
+        noise[0, 0] += aid[5] * v * v + aid[6] * w * w
+        noise[1, 1] += aid[5] * w * w + aid[6] * v * v + aid[4]
+
+
+@kernel("void(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def read_ships(code, aid, states, readings):  # type: ignore[no-untyped-def]
+    """Fill in (k, m) what an instrument should read at (k, n) states; a position in metres."""
+    for k in range(states.shape[0]):
+        a, b = reading(code, aid, states[k])
+        readings[k, 0] = a
+        if readings.shape[1] > 1:
+            readings[k, 1] = b
+
+
+@kernel()
+def shift_ship(position, x, dx):  # type: ignore[no-untyped-def]
+    """Add an error to a state, in place."""
+    displace_ship(position, dx[N], dx[E])
+    for i in range(2, x.size):
+        x[i] += dx[i]
+
+
+@kernel("void(f8[::1], f8[::1], f8[::1])")
+def correct_ship(position, x, dx):  # type: ignore[no-untyped-def]
+    """Add the correction ``dx`` (n,) to a state, in place."""
+    shift_ship(position, x, dx)
+
+
+@kernel("void(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1])")
+def describe_ship(x, covariance, sway, velocity, out):  # type: ignore[no-untyped-def]
+    """Ground velocity of a state, and the covariance of what it says of position, velocity and heading.
+
+    Parameters
+    ----------
+    x : (n,) array
+    covariance : (n, n) array
+    sway : float
+        Sigma of the sideways velocity [m/s].
+    velocity : (3,) array
+        North and east are overwritten.
+    out : (9, 9) array
+        Rows and columns 0, 1, 3, 4 and 8 are overwritten.
+    """
+    n = x.size
+    code, aid = np.array([VELOCITY, -1, -1]), np.zeros(7)
+    velocity[0], velocity[1] = reading(code, aid, x)
+    G = np.zeros((2, n))
+    fill_jacobian(code, aid, x, G)
+    rows = np.zeros((5, n))  # of G P, G being of position, velocity, heading
+    for j in range(n):
+        rows[0, j], rows[1, j], rows[4, j] = covariance[N, j], covariance[E, j], covariance[PSI, j]
+        for k in range(n):
+            rows[2, j] += G[0, k] * covariance[k, j]
+            rows[3, j] += G[1, k] * covariance[k, j]
+    at = (0, 1, 3, 4, 8)
+    for i in range(5):
+        x0, x1 = 0.0, 0.0
+        for k in range(n):
+            x0 += rows[i, k] * G[0, k]
+            x1 += rows[i, k] * G[1, k]
+        out[at[i], 0], out[at[i], 1], out[at[i], 8] = rows[i, N], rows[i, E], rows[i, PSI]
+        out[at[i], 3], out[at[i], 4] = x0, x1
+    c, s = cos(x[PSI]), sin(x[PSI])
+    out[3, 3] += s * s * sway * sway
+    out[3, 4] -= s * c * sway * sway
+    out[4, 3] -= s * c * sway * sway
+    out[4, 4] += c * c * sway * sway
