@@ -38,7 +38,7 @@ import numpy as np
 
 from estimators.models.base import Linearised
 from estimators.models.inertial import InertialModel
-from estimators.models.measurements import velocity_of_arm
+from estimators.models.measurements import DVL, observe
 from simnav.earth import ROTATION_RATE, gravity
 from simnav.estimator import UnsuitableScenario
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
@@ -87,7 +87,6 @@ class DvlCalibrationModel(InertialModel):
             raise UnsuitableScenario("the 23-state model needs a DVL; there is none")
         self._dvl = dvls[0]
         self._gravity = np.array([0.0, 0.0, float(gravity(start.position[0], start.position[2]))])
-        self._raw = np.zeros((3, 12))
         covariance = super().begin(start, instruments)
         if self.preset == "paper":
             for sheet in instruments.of_kind(*_PRINTED):
@@ -107,10 +106,12 @@ class DvlCalibrationModel(InertialModel):
     def _measure_dvl(self, sheet: Datasheet, value: Array) -> Linearised:
         eta, dl = self.calibration[0:3], self.calibration[3:6]
         k, tau = float(self.calibration[6]), float(self.calibration[7])
-        u, raw, to_body = np.empty(3), self._raw, self.dcm.T
-        velocity_of_arm(
-            True, self.position[0], self.dcm, self.velocity, self.raw_rate, self.bias, sheet.lever_arm + dl, raw, u
+        u, raw, to_body = np.empty(3), np.empty((3, 12)), self.dcm.T
+        observe(
+            DVL, sheet.lever_arm + dl, -1, -1, np.zeros(3), self.position, self.velocity, self.dcm, self.raw_rate,
+            self.bias, self.calibration, u, raw,
         )  # fmt: skip
+        u *= -1.0  # measured minus predicted
         latitude = float(self.position[0])
         earth = np.array([ROTATION_RATE * cos(latitude), 0.0, -ROTATION_RATE * sin(latitude)])
         turn = _across(self.raw_rate - self.bias[:3] - to_body @ earth)

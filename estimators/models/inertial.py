@@ -29,8 +29,8 @@ from math import atan2, hypot
 
 import numpy as np
 
-from estimators.models import measurements
 from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov, triad_bias
+from estimators.models.measurements import CODES, observe, uncalibrated_noise, white_noise
 from estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
 from simnav.estimator import UnsuitableScenario
 from simnav.rotation import dcm_from_rpy
@@ -72,8 +72,13 @@ class InertialModel(ErrorModel):
         Of the aiding instruments.
     bias_at, scale_at : dict of str to int
         Index in the error state of an instrument's first bias, and of its scale factor.
+    aid_parameters : dict of str to (int, (3,) array, int, int)
+        What `estimators.models.measurements.observe_inertial` is told of an instrument: its code, its lever arm, and
+        its places in ``bias_at`` and ``scale_at``, -1 for none.
     noise : dict of str to (d, d) array
         White noise of an instrument.
+    uncalibrated : set of str
+        Instruments whose noise grows with the velocity (`estimators.models.measurements.uncalibrated_noise`).
     raw_rate, raw_force : (3,) array
         Angular rate at the time of the state (extrapolated) and specific force of the last IMU sample, as measured.
     transition, process_noise : (15, 15) array
@@ -134,7 +139,8 @@ class InertialModel(ErrorModel):
         self.bias_at: dict[str, int] = {}
         self.scale_at: dict[str, int] = {}
         self.noise: dict[str, Array] = {}
-        self._jacobians: dict[str, Array] = {}
+        self.uncalibrated: set[str] = set()
+        self.aid_parameters: dict[str, tuple[int, Array, int, int]] = {}
         self._states: list[tuple[float, float, float]] = []  # initial variance, decay, noise density
         for sheet in self.instruments.values():
             if not self.observes(sheet):
@@ -153,13 +159,21 @@ class InertialModel(ErrorModel):
             elif any(s.variance or s.noise for s in states):
                 self.bias_at[sheet.name] = _NAV + len(self._states)
                 self._states += [(s.variance, s.decay, s.noise) for s in states]
-            if self.calibrate and sheet.kind in ("dvl", "speed_log") and (sheet.scale or np.any(sheet.misalignment)):
-                self.scale_at[sheet.name] = _NAV + len(self._states)
-                extra = sheet.misalignment if sheet.kind == "dvl" else ()
-                self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
-            self.noise[sheet.name] = measurements.white_noise(sheet, white, self._rate_variance)
+            if sheet.kind in ("dvl", "speed_log") and (sheet.scale or np.any(sheet.misalignment)):
+                if self.calibrate:
+                    self.scale_at[sheet.name] = _NAV + len(self._states)
+                    extra = sheet.misalignment if sheet.kind == "dvl" else ()
+                    self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
+                else:
+                    self.uncalibrated.add(sheet.name)
+            self.noise[sheet.name] = white_noise(sheet, white, self._rate_variance)
+            self.aid_parameters[sheet.name] = (
+                CODES[sheet.kind], np.array(sheet.lever_arm, dtype=np.float64),
+                self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
+            )  # fmt: skip
         self._states += self._more_states()
         self.size = _NAV + len(self._states)
+        self._jacobians = {name: np.empty((len(noise), self.size)) for name, noise in self.noise.items()}
         self.calibration = np.zeros(len(self._states))
         self._decay = np.array([d for _, d, _ in self._states])
         self._density = np.array([q for _, _, q in self._states])
@@ -170,7 +184,7 @@ class InertialModel(ErrorModel):
 
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument."""
-        return instrument.kind in measurements.MODELS
+        return instrument.kind in CODES
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
@@ -211,11 +225,18 @@ class InertialModel(ErrorModel):
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement (`estimators.models.measurements`)."""
-        sheet = self.instruments[measurement.instrument]
-        jacobian = self._jacobians.get(sheet.name)
-        if jacobian is None:
-            jacobian = self._jacobians[sheet.name] = np.zeros((len(sheet.sigma), self.size))
-        return measurements.MODELS[sheet.kind](self, sheet, measurement.value, jacobian)
+        name = measurement.instrument
+        code, arm, bias_at, scale_at = self.aid_parameters[name]
+        jacobian, noise = self._jacobians[name], self.noise[name]
+        innovation, value = np.empty(len(noise)), np.array(measurement.value, dtype=np.float64)
+        if not observe(
+            code, arm, bias_at, scale_at, value, self.position, self.velocity, self.dcm, self.raw_rate, self.bias,
+            self.calibration, innovation, jacobian,
+        ):  # fmt: skip
+            return None
+        if name in self.uncalibrated:
+            noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
+        return Linearised(innovation, jacobian, noise)
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

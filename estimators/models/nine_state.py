@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.models import measurements
 from estimators.models.base import Linearised
 from estimators.models.inertial import InertialModel
 from simnav.types import Array, InitialState, Instruments, Measurement
@@ -56,7 +55,6 @@ class NineStateModel(InertialModel):
         self._unused = super().begin(start, instruments)
         self.size = 9
         self._full = np.zeros(15)
-        self._wide: dict[str, Array] = {}
         self._noise[:8] = 0.0
         for sheet in instruments.values():
             if sheet.kind == "gnss_position" and np.all(self._gnss > 0.0):
@@ -84,14 +82,10 @@ class NineStateModel(InertialModel):
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement (`estimators.models.measurements`)."""
-        sheet = self.instruments[measurement.instrument]
-        wide = self._wide.get(sheet.name)
-        if wide is None:
-            wide = self._wide[sheet.name] = np.zeros((len(sheet.sigma), 15))
-        linearised = measurements.MODELS[sheet.kind](self, sheet, measurement.value, wide)
+        linearised = super().measure(measurement)
         if linearised is None:
             return None
-        return Linearised(linearised.innovation, np.ascontiguousarray(wide[:, :9]), linearised.noise)
+        return linearised._replace(jacobian=np.ascontiguousarray(linearised.jacobian[:, :9]))
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

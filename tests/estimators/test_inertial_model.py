@@ -45,7 +45,7 @@ def perturbed(model: InertialModel, e: np.ndarray) -> InertialModel:
     other.dcm = np.ascontiguousarray(rotation.dcm_from_rotation_vector(e[6:9]) @ model.dcm)
     other.bias = model.bias + e[9:15]
     other.calibration = model.calibration + e[15:]
-    other._jacobians = {}
+    other._jacobians = {k: v.copy() for k, v in model._jacobians.items()}
     return other
 
 
