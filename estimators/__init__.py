@@ -33,7 +33,8 @@ from estimators.oracle import Oracle
 from estimators.references import OracleClairvoyant, OracleMixture, OracleRts
 from estimators.ship_ekf import ShipEkf
 from estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
-from estimators.smoothers import EkfRts, ShipEkfRts
+from estimators.sliding_window import SwFgo
+from estimators.smoothers import EkfRts, EkfTwoFilter, ShipEkfRts
 
 __all__ = [
     "Adkf",
@@ -44,6 +45,7 @@ __all__ = [
     "Ekf9",
     "Ekf23",
     "EkfRts",
+    "EkfTwoFilter",
     "FadingEkf",
     "Federated",
     "FederatedNoReset",
@@ -72,6 +74,7 @@ __all__ = [
     "ShipEkf",
     "ShipEkfRts",
     "ShipUkf",
+    "SwFgo",
     "Ukf",
     "VbAkf",
 ]

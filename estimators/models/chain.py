@@ -106,6 +106,10 @@ class Columns:
         """Take ``count`` rows off the front."""
         self._first += count
 
+    def pop(self, count: int) -> None:
+        """Take ``count`` rows off the end."""
+        self._last -= count
+
     def _make_room(self) -> None:
         """Move the rows to the front; twice the space where they fill more than half of it."""
         rows = len(self)
@@ -145,6 +149,11 @@ class Chain(ABC):
         Of the instruments.
     base : int
         Number of the first node of the window since the start of the run.
+    ahead : float
+        Time from the newest node to the front [s].
+    prior : (n, n) array
+    prior_shift : (n,) array
+        Of the first node without its measurements: covariance, and mean less the node.
     """
 
     def __init__(self, front: ErrorModel):
@@ -173,6 +182,7 @@ class Chain(ABC):
         self.base = 0
         self._append_node()
         self._pending()
+        self.set_prior(covariance, np.zeros(n))
         return covariance
 
     def _append_node(self) -> None:
@@ -182,6 +192,13 @@ class Chain(ABC):
     def _pending(self) -> None:
         """Motion since the newest node: none."""
         self._transition, self._noise = np.eye(self.size), np.zeros((self.size, self.size))
+        self.ahead = 0.0
+
+    def set_prior(self, covariance: Array, shift: Array) -> None:
+        """What is believed of the first node: its covariance, and the mean less the node."""
+        self.prior, self.prior_shift = covariance.copy(), shift.copy()
+        self.prior_whitener = np.empty_like(self.prior)
+        whitening(self.prior, self.prior_whitener)
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether measurements of an instrument can be factors."""
@@ -203,6 +220,7 @@ class Chain(ABC):
             return
         self.front.propagate(self._noise, until)
         self.front.carry(self._transition, until - begin)
+        self.ahead += until - begin
 
     def extend(self) -> None:
         """Make the front a node, with the motion since the newest one as its factor."""
@@ -217,7 +235,9 @@ class Chain(ABC):
 
     def predicted_covariance(self, newest: Array) -> Array:
         """Covariance of the front from that of the newest node."""
-        covariance = self._transition @ newest @ self._transition.T
+        if self.ahead == 0.0:
+            return newest
+        covariance: Array = self._transition @ newest @ self._transition.T
         covariance += self._noise
         return covariance
 
@@ -237,9 +257,16 @@ class Chain(ABC):
             time=measurement.time, value=value, noise=full, whitener=whitener, weight=1.0,
         )  # fmt: skip
 
-    def settle(self) -> None:
-        """Set the front to the newest node; there must be no motion since."""
-        self.front.restore([self.nodes[name][-1] for name in self.front.state])
+    def settle(self, moved: Array) -> None:
+        """Set the front to the newest node, or, where it has run ahead of it, by how much that was ``moved``."""
+        if self.ahead == 0.0:
+            self.front.restore([self.nodes[name][-1] for name in self.front.state])
+        else:
+            self.front.correct(self._transition @ moved)
+
+    def detach(self, count: int) -> None:
+        """Take the newest aiding factors off again."""
+        self.aids.pop(count)
 
     def drop(self, count: int) -> None:
         """Take the oldest nodes off the window, with their factors."""
@@ -251,13 +278,13 @@ class Chain(ABC):
     def copy_states(self) -> list[Array]:
         """What `retract` changes, for `restore_states`."""
         changed = [self.nodes[name].copy() for name in self.front.state]
-        return [*changed, self.motions["begin_shift"].copy(), self.motions["end_shift"].copy()]
+        return [*changed, self.motions["begin_shift"].copy(), self.motions["end_shift"].copy(), self.prior_shift.copy()]
 
     def restore_states(self, states: list[Array]) -> None:
         """Take a `retract` back."""
-        for name, value in zip(self.front.state, states[:-2], strict=True):
+        for name, value in zip(self.front.state, states[:-3], strict=True):
             self.nodes[name][...] = value
-        self.motions["begin_shift"][...], self.motions["end_shift"][...] = states[-2:]
+        self.motions["begin_shift"][...], self.motions["end_shift"][...], self.prior_shift = states[-3:]
 
     def estimate(self, covariance: Array) -> Estimate:
         """The front as an estimate."""
@@ -277,4 +304,8 @@ class Chain(ABC):
 
     @abstractmethod
     def retract(self, step: Array) -> None:
-        """Add a (K, n) step to the nodes, and to the shifts of the motion factors."""
+        """Add a (K, n) step to the nodes and to the shifts of the motion factors; take it off the prior's."""
+
+    def less(self, shift: Array, step: Array) -> Array:
+        """A (n,) shift as seen from where a step leads; a hook for those whose errors do not simply subtract."""
+        return shift - step

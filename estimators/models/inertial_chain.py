@@ -46,6 +46,14 @@ def _compose(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
     return a0 + b0 + 0.5 * x0 + t * y0, a1 + b1 + 0.5 * x1 + t * y1, a2 + b2 + 0.5 * x2 + t * y2
 
 
+def _composed(a: Array, b: Array) -> Array:
+    """`_compose` of arrays."""
+    x = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    d = a - b
+    y = np.array([d[1] * x[2] - d[2] * x[1], d[2] * x[0] - d[0] * x[2], d[0] * x[1] - d[1] * x[0]])
+    return a + b + 0.5 * x + y / 12.0
+
+
 @kernel("void(f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
 def _linearise_motion(transition, begin_shift, end_shift, residual, jacobian):  # type: ignore[no-untyped-def]
     count, n = begin_shift.shape
@@ -191,3 +199,10 @@ class InertialChain(Chain):
             step, nodes["position"], nodes["velocity"], nodes["dcm"], nodes["bias"], nodes["calibration"],
             m["begin_shift"], m["end_shift"],
         )  # fmt: skip
+        self.prior_shift = self.less(self.prior_shift, step[0])
+
+    def less(self, shift: Array, step: Array) -> Array:
+        """Rotations compose."""
+        rest = shift - step
+        rest[6:9] = _composed(shift[6:9], -step[6:9])
+        return rest

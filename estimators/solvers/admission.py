@@ -1,0 +1,57 @@
+"""Which measurements of a step a solver takes, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+
+from estimators.models.measurements import plausible
+from simnav.types import Instruments, Measurement, Measurements
+
+__all__ = ["LATE", "Admission"]
+
+#: A measurement this much older than the state [s] still counts as of its time.
+LATE = 1e-4
+
+
+class Admission:
+    """Lets pass what can be used: of known instruments, plausible, in order, not older than the state, each once.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    observed : iterable of str
+        Names of the instruments that are used at all; others are passed over without a word.
+
+    Attributes
+    ----------
+    skipped : int
+        Measurements that were left out so far.
+    """
+
+    def __init__(self, instruments: Instruments, observed: Iterable[str]):
+        self._used = dict.fromkeys(observed, float("-inf"))
+        self._kinds = {name: instruments[name].kind for name in self._used}
+        self.skipped = 0
+
+    def admit(self, measurements: Measurements, since: float) -> list[Measurement]:
+        """The measurements of a step to be used by a state of time ``since`` [s], in order of their times."""
+        aids = measurements.aids
+        if any(before.time > after.time for before, after in pairwise(aids)):
+            aids = sorted(aids, key=_time)
+        admitted = []
+        end = measurements.time + LATE
+        for m in aids:
+            used = self._used.get(m.instrument)
+            if used is None:
+                continue
+            if not since - LATE <= m.time <= end or m.time <= used or not plausible(self._kinds[m.instrument], m.value):
+                self.skipped += 1
+                continue
+            self._used[m.instrument] = m.time
+            admitted.append(m)
+        return admitted
+
+
+def _time(m: Measurement) -> float:
+    return m.time

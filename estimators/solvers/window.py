@@ -1,0 +1,287 @@
+"""A sliding window: the newest states are estimated together, again at every step, by Gauss-Newton.
+
+Every time of a measurement is a node of the graph (`estimators.models.chain`), every measurement and every stretch of
+motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares: linearise,
+weigh, solve (`estimators.solvers.block_tridiagonal`), retract, until a step is small. A step that raises the cost is
+taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what they say of the node that is
+the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L. Matthies, G. Sukhatme, "Sliding window
+filter with application to planetary landing", J. Field Robotics 27(5), 2010). So nothing is lost but the freedom to
+linearise or weigh it anew, and a window of one epoch is an iterated EKF.
+
+What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
+innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
+
+Sources: paper 000, section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); paper 001, section 2.
+Eq. 15 of paper 001 takes the inverse of the window's prior for the newest covariance; it is that of the oldest state.
+The newest one is the last block of the elimination.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import hypot, isfinite
+
+import numpy as np
+
+from estimators.adaptations.base import Adaptation, Innovation
+from estimators.adaptations.weighting import Factors, Weighting
+from estimators.models.chain import Chain
+from estimators.solvers.admission import Admission
+from estimators.solvers.block_tridiagonal import chain_cost, solve_chain
+from simnav.estimator import Estimator
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
+
+__all__ = ["WindowEstimator"]
+
+#: A step of more than this, in sigmas, is checked against the cost.
+CHECKED_STEP = 1.0
+#: Damping that a rejected step starts with, and by how much it changes.
+FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
+#: A measurement whose weight is less than this is reported as faulty.
+FAULTY_WEIGHT = 0.5
+
+
+class WindowEstimator(Estimator):
+    """The solver of the module.
+
+    Parameters
+    ----------
+    chain : Chain
+    adaptation : Adaptation, optional
+        None: every measurement counts with its nominal noise. Its ``inflation`` is not for graphs.
+    weighting : Weighting, optional
+        None: every factor counts in full.
+    window : int or None
+        Epochs (steps that bring measurements) in the window; None: all of them.
+    tolerance : float
+        Largest component of a step, in its sigmas, at which the nodes have converged.
+    iterations : int
+        Most steps an epoch.
+    every_sample : bool
+        A node for every IMU sample, instead of one preintegrated factor between measurements (paper 004's un-simplified
+        graph).
+
+    Attributes
+    ----------
+    covariance : (n, n) array
+        Of the newest node.
+    """
+
+    def __init__(
+        self,
+        chain: Chain,
+        adaptation: Adaptation | None = None,
+        weighting: Weighting | None = None,
+        window: int | None = 20,
+        tolerance: float = 1e-3,
+        iterations: int = 10,
+        every_sample: bool = False,
+    ):
+        if window is not None and window < 1:
+            raise ValueError(f"window is {window}; it must hold at least 1 epoch")
+        if not tolerance > 0.0:
+            raise ValueError(f"tolerance is {tolerance}; it must be positive")
+        if iterations < 1:
+            raise ValueError(f"iterations is {iterations}; at least 1 is needed")
+        self.chain = chain
+        self.adaptation = adaptation
+        self.weighting = weighting
+        self.window, self.tolerance, self.iterations = window, tolerance, iterations
+        self.every_sample = every_sample
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        self.covariance = self.chain.begin(start, instruments)
+        observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
+        self._admission = Admission(instruments, observed)
+        for what in (self.adaptation, self.weighting):
+            if what is not None:
+                what.reset(instruments)
+        self._epochs: deque[int] = deque()  # nodes of each epoch in the window
+        self._capacity = self._counted = 0
+        quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
+        names = [*observed, "motion"]
+        self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
+        self._blank |= {"iterations": 0.0, "cost": np.nan}
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step's measurements, each at its own time."""
+        chain = self.chain
+        chain.load(measurements.imu)
+        diagnostics: dict[str, float | Array] = dict(self._blank)
+        flagged: list[tuple[str, float]] = []
+        attached = 0
+        samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
+        for m in self._admission.admit(measurements, chain.time):
+            self._advance(min(m.time, measurements.time), samples)
+            attached += self._take(m, diagnostics, flagged)
+        if attached:
+            self._optimise(attached, diagnostics, flagged)
+            self._marginalise()
+        self._advance(measurements.time, samples)
+        diagnostics["skipped"] = float(self._admission.skipped)
+        for what in (self.adaptation, self.weighting):
+            if what is not None:
+                diagnostics.update(what.diagnostics())
+        estimate = chain.estimate(chain.predicted_covariance(self.covariance))
+        estimate.diagnostics, estimate.flagged = diagnostics, flagged
+        return estimate
+
+    def _advance(self, until: float, samples: Array) -> None:
+        """Advance the front, leaving a node at each of the samples on the way."""
+        chain = self.chain
+        if len(samples):
+            first, last = np.searchsorted(samples, (chain.time + 1e-6, until - 1e-6))
+            for time in samples[first:last].tolist():
+                chain.propagate(time)
+                self._extend()
+        chain.propagate(until)
+
+    def _extend(self) -> None:
+        """Make the front the newest node."""
+        self.covariance = self.chain.predicted_covariance(self.covariance)
+        self.chain.extend()
+
+    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> bool:
+        """Make a measurement a factor; False if it is not used."""
+        chain = self.chain
+        linearised = chain.linearise(m)
+        if linearised is None:
+            self._admission.skipped += 1
+            return False
+        residual, jacobian, noise = linearised
+        if self.adaptation is not None:
+            covariance = chain.predicted_covariance(self.covariance)
+            cross = covariance @ jacobian.T
+            predicted = jacobian @ cross
+            chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, covariance, cross))
+            total = predicted + (noise if chosen is None else chosen)
+            diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
+            diagnostics[f"nis.{m.instrument}"] = float(residual @ np.linalg.pinv(total) @ residual)
+            if chosen is None:
+                flagged.append((m.instrument, m.time))
+                return False
+            noise = chosen
+        if chain.ahead > 0.0:
+            self._extend()
+        chain.attach(m, noise)
+        return True
+
+    def _optimise(self, attached: int, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
+        """Move the nodes to the least cost."""
+        chain = self.chain
+        self._make_room(len(chain.nodes))
+        count = len(chain.nodes)
+        predicted, predicted_shift, filtered, filtered_shift, step = (a[:count] for a in self._work)
+        motions, aids = chain.motions, chain.aids
+        moved = np.zeros(chain.size)
+        damping, cost, saved = 0.0, np.inf, None
+        settled, solved = True, 0
+        cost = self._linearise()
+        for iteration in range(self.iterations):
+            if saved is None and self.weighting is not None:
+                settled = self.weighting.weigh(self._factors(iteration))
+                cost = self._cost()
+            size = self._solve(damping)
+            solved += 1
+            if not isfinite(size):
+                chain.detach(attached)
+                self._admission.skipped += attached
+                attached = 0
+                cost, size = self._linearise(), self._solve(0.0)
+                if not isfinite(size):
+                    raise FloatingPointError(f"the window at {chain.time:g} s has no finite solution")
+            saved = chain.copy_states() if size > CHECKED_STEP else None
+            chain.retract(step)
+            moved += step[-1]
+            if (size < self.tolerance and settled) or iteration == self.iterations - 1:
+                break
+            now = self._linearise()
+            if saved is not None and now > cost * (1.0 + 1e-9):
+                chain.restore_states(saved)
+                moved -= step[-1]
+                damping = max(FIRST_DAMPING, DAMPING_FACTOR * damping)
+                cost = self._linearise()
+            else:
+                saved, cost = None, now
+                damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
+        if damping > 0.0:  # the covariances and the prior are those without it
+            cost = self._linearise()
+            self._solve(0.0)
+            step[:] = 0.0
+        self.covariance = filtered[-1].copy()
+        chain.settle(moved)
+        diagnostics["iterations"] = float(solved)
+        diagnostics["cost"] = cost
+        names = chain.names
+        for name, time, norm, weight in zip(
+            aids["instrument"][-attached:].tolist() if attached else (),
+            aids["time"][-attached:].tolist(), aids["norm"][-attached:].tolist(), aids["weight"][-attached:].tolist(),
+        ):  # fmt: skip
+            diagnostics[f"residual.{names[name]}"] = norm
+            diagnostics[f"weight.{names[name]}"] = weight
+            if weight < FAULTY_WEIGHT:
+                flagged.append((names[name], time))
+        if len(motions):
+            diagnostics["residual.motion"] = float(motions["norm"][-1])
+            diagnostics["weight.motion"] = float(motions["weight"][-1])
+
+    def _linearise(self) -> float:
+        """Linearise all factors; their cost with the weights that they have."""
+        self.chain.linearise_motion()
+        self.chain.linearise_aids()
+        motions, aids = self.chain.motions, self.chain.aids
+        chain_cost(motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
+        chain_cost(aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
+        return self._cost()
+
+    def _cost(self) -> float:
+        """Half the weighted sum of squares."""
+        chain = self.chain
+        total = 0.0
+        for factors in (chain.motions, chain.aids):
+            norm = factors["norm"]
+            total += float(np.dot(factors["weight"], norm * norm))
+        prior = chain.prior_whitener @ chain.prior_shift
+        return 0.5 * (total + float(prior @ prior))
+
+    def _solve(self, damping: float) -> float:
+        """One step of all nodes; its largest component in sigmas."""
+        chain = self.chain
+        motions, aids = chain.motions, chain.aids
+        count = len(chain.nodes)
+        size: float = solve_chain(
+            chain.prior, chain.prior_shift, motions["jacobian"], motions["noise"], motions["residual"],
+            motions["weight"], aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"],
+            aids["noise"], aids["weight"], damping, *(a[:count] for a in self._work),
+        )  # fmt: skip
+        return size
+
+    def _factors(self, iteration: int) -> Factors:
+        motions, aids = self.chain.motions, self.chain.aids
+        return Factors(
+            self.chain.names, aids["instrument"], aids["components"], aids["time"], aids["residual"], aids["noise"],
+            aids["whitened"], aids["norm"], motions["time"], motions["residual"], motions["norm"],
+            aids["weight"], motions["weight"], iteration,
+        )  # fmt: skip
+
+    def _marginalise(self) -> None:
+        """Let the oldest epochs leave the window."""
+        chain, leaving = self.chain, 0
+        new = chain.base + len(chain.nodes) - self._counted
+        if new:
+            self._epochs.append(new)
+            self._counted += new
+        while self.window is not None and len(self._epochs) > self.window:
+            leaving += self._epochs.popleft()
+        if leaving:
+            predicted, predicted_shift, _, _, step = self._work
+            chain.set_prior(predicted[leaving], chain.less(predicted_shift[leaving], step[leaving]))
+            chain.drop(leaving)
+
+    def _make_room(self, count: int) -> None:
+        """Work space for ``count`` nodes."""
+        if count > self._capacity:
+            self._capacity = n = max(32, 2 * count)
+            m = self.chain.size
+            self._work = tuple(np.empty(shape) for shape in ((n, m, m), (n, m), (n, m, m), (n, m), (n, m)))
