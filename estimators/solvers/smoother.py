@@ -17,21 +17,30 @@ state like any correction. In the bracket both terms are positive semi-definite,
 The gain is solved for in units of the predicted sigmas, which keeps metres and radians per second apart.
 
 Source: H. E. Rauch, F. Tung and C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal
-3(8), 1965; the forward-backward smoothing of paper 004 (eqs. 24-25) is the same estimate in two-filter form, which is
-its test here: as printed it would use every measurement twice.
+3(8), 1965. The forward-backward smoothing of paper 004 (eqs. 24-25) is the same estimate in two-filter form
+(`estimators.solvers.two_filter`), which is its test.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
-__all__ = ["SmoothingEstimator", "smoother_gains"]
+__all__ = ["SmoothingEstimator", "Stretches", "scale_of", "smoother_gains"]
 
-#: Gains are solved for this many at a time.
+#: Stretches are stored, and gains are solved for, this many at a time.
 _BATCH = 512
+
+
+def scale_of(covariance: Array) -> Array:
+    """(k, n) sigmas of (k, n, n) covariances; 1 for a state that is known without error."""
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+    sigma[sigma == 0.0] = 1.0
+    return sigma
 
 
 def smoother_gains(covariance: Array, transition: Array, predicted: Array) -> Array:
@@ -47,9 +56,8 @@ def smoother_gains(covariance: Array, transition: Array, predicted: Array) -> Ar
     (k, n, n) array
         States that are known without error get none.
     """
-    sigma = np.sqrt(np.maximum(np.diagonal(predicted, axis1=1, axis2=2), 0.0))
-    known = sigma == 0.0
-    sigma[known] = 1.0
+    sigma = scale_of(predicted)
+    known = np.diagonal(predicted, axis1=1, axis2=2) <= 0.0
     correlation = predicted / sigma[:, :, None] / sigma[:, None, :]
     correlation[known, :] = 0.0
     correlation.swapaxes(1, 2)[known, :] = 0.0
@@ -62,6 +70,35 @@ def smoother_gains(covariance: Array, transition: Array, predicted: Array) -> Ar
         solved = np.linalg.pinv(correlation, rcond=1e-13, hermitian=True) @ right
     gains: Array = (solved / sigma[:, :, None]).swapaxes(1, 2)
     return gains
+
+
+class Stretches:
+    """What the forward pass leaves of some successive stretches between stops.
+
+    Attributes
+    ----------
+    count : int
+        Of stretches, at most `_BATCH`.
+    states : list
+        Snapshots of the model at their beginnings.
+    covariance, transition, predicted : (k, n, n) array
+        P at the beginning, Phi, and M at the end.
+    correction : (k, n) array
+        Sum of the corrections at the beginning.
+    """
+
+    __slots__ = ("correction", "count", "covariance", "predicted", "states", "transition")
+
+    def __init__(self, size: int):
+        self.count = 0
+        self.states: list[list[Array]] = []
+        self.covariance = np.empty((_BATCH, size, size))
+        self.transition, self.predicted = np.empty_like(self.covariance), np.empty_like(self.covariance)
+        self.correction = np.empty((_BATCH, size))
+
+    def matrices(self) -> tuple[Array, Array, Array]:
+        """P, Phi and M of the stretches recorded so far."""
+        return self.covariance[: self.count], self.transition[: self.count], self.predicted[: self.count]
 
 
 class SmoothingEstimator(KalmanEstimator):
@@ -80,82 +117,83 @@ class SmoothingEstimator(KalmanEstimator):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(start, instruments)
-        self._states: list[list[Array]] = []
-        self._covariances: list[Array] = []
-        self._transitions: list[Array] = []
-        self._predicted: list[Array] = []
-        self._corrections: list[Array] = []
+        self._stretches = [Stretches(self.model.size)]
         self._here = np.zeros(self.model.size)
+        self._identity = np.eye(self.model.size)
         self._ends: list[tuple[int, float]] = []
+
+    @property
+    def stops(self) -> int:
+        """How many stretches have been recorded: the index of the present stop."""
+        return (len(self._stretches) - 1) * _BATCH + self._stretches[-1].count
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements; the filter's own estimate."""
         estimate = super().update(measurements)
-        self._ends.append((len(self._states), measurements.time))
+        self._ends.append((self.stops, measurements.time))
         return estimate
 
     def _propagate(self, until: float) -> None:
-        model = self.model
+        model, into = self.model, self._stretches[-1]
         begin = model.time
         if until <= begin:
             return
-        self._states.append(model.snapshot())
-        self._covariances.append(self.covariance.copy())
+        k = into.count
+        if k == _BATCH:
+            into, k = Stretches(model.size), 0
+            self._stretches.append(into)
+        into.states.append(model.snapshot())
+        into.covariance[k] = self.covariance
         super()._propagate(until)
-        transition = np.eye(model.size)
-        model.carry(transition, until - begin)
-        self._transitions.append(transition)
-        self._predicted.append(self.covariance.copy())
-        self._corrections.append(self._here)
-        self._here = np.zeros(model.size)
+        into.transition[k] = self._identity
+        model.carry(into.transition[k], until - begin)
+        into.predicted[k] = self.covariance
+        into.correction[k] = self._here
+        into.count = k + 1
+        self._here[:] = 0.0
 
     def _correct(self, dx: Array) -> None:
         super()._correct(dx)
         self._here += dx
 
+    def _backward(self) -> Iterator[tuple[int, list[Array], Array, Array]]:
+        """From the last stop to the first: its index, the filter's state there, c and S; a hook."""
+        c, s = np.zeros(self.model.size), self.covariance
+        yield self.stops, self.model.snapshot(), c, s
+        ahead, stop = self._here, self.stops
+        for stretches in reversed(self._stretches):
+            p, phi, m = stretches.matrices()
+            gains = smoother_gains(p, phi, m)
+            lost = p - gains @ m @ gains.swapaxes(1, 2)
+            for k in range(stretches.count - 1, -1, -1):
+                gain = gains[k]
+                c = gain @ (ahead + c)
+                s = lost[k] + gain @ s @ gain.T
+                s = 0.5 * (s + s.T)
+                ahead = stretches.correction[k]
+                stop -= 1
+                yield stop, stretches.states[k], c, s
+
     def smooth(self) -> NavigationStates | None:
         """The smoothed trajectory at the ends of all steps; None before the first."""
         if not self._ends:
             return None
-        model, last = self.model, len(self._states)
-        now = model.snapshot()
-        count = len(self._ends)
-        times = np.array([t for _, t in self._ends])
-        position, velocity, attitude = (
-            np.full((count, 3), np.nan),
-            np.full((count, 3), np.nan),
-            np.full((count, 3), np.nan),
-        )
+        model, count = self.model, len(self._ends)
+        position, velocity, attitude = np.full((3, count, 3), np.nan)
         self.smoothed_covariance = np.full((count, 9, 9), np.nan)
-        row = count - 1
-
-        def keep(stop: int, state: list[Array], correction: Array, covariance: Array) -> None:
-            nonlocal row
-            while row >= 0 and self._ends[row][0] == stop:
-                model.restore(state)
-                model.correct(correction)
-                out = model.estimate(covariance)
+        now, row = model.snapshot(), count - 1
+        for stop, state, correction, covariance in self._backward():
+            if row < 0 or self._ends[row][0] != stop:
+                continue
+            model.restore(state)
+            model.correct(correction)
+            out = model.estimate(covariance)
+            while row >= 0 and self._ends[row][0] == stop:  # a step may hold no time at all
                 for series, vector in ((position, out.position), (velocity, out.velocity), (attitude, out.attitude)):
                     if vector is not None:
                         series[row] = vector
                 if out.covariance is not None:
                     self.smoothed_covariance[row] = out.covariance
                 row -= 1
-
-        c, s = np.zeros(model.size), self.covariance
-        keep(last, now, c, s)
-        ahead = self._here
-        for end in range(last, 0, -_BATCH):
-            begin = max(0, end - _BATCH)
-            p, m = np.array(self._covariances[begin:end]), np.array(self._predicted[begin:end])
-            gains = smoother_gains(p, np.array(self._transitions[begin:end]), m)
-            p -= gains @ m @ gains.swapaxes(1, 2)
-            for k in range(end - 1, begin - 1, -1):
-                gain = gains[k - begin]
-                c = gain @ (ahead + c)
-                s = p[k - begin] + gain @ s @ gain.T
-                s = 0.5 * (s + s.T)
-                ahead = self._corrections[k]
-                keep(k, self._states[k], c, s)
         model.restore(now)
-        return NavigationStates(times, position, velocity, attitude)
+        return NavigationStates(np.array([t for _, t in self._ends]), position, velocity, attitude)

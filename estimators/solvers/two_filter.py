@@ -1,0 +1,172 @@
+"""The two-filter smoother: a filter forward, a filter backward, both combined; behind any Kalman filter.
+
+At each time the forward filter's posterior (covariance Pf) and the backward filter's prediction (Pb), which has seen
+the measurements after that time and no other, are independent, and so
+
+- ``P^-1 = Pf^-1 + Pb^-1``
+- ``P^-1 x = Pf^-1 xf + Pb^-1 xb``
+
+which are eqs. 24-25 of paper 004. The backward filter begins without information, so Pb^-1 is singular until enough
+has been measured; it is never inverted. As printed, the paper's step 3 starts the backward pass with the forward
+result instead: every measurement then counts twice, and the smoother promises up to sqrt(2) more than it holds.
+``seed_backward`` does that.
+
+Both filters share one linearisation, the forward filter's: what it saw of each measurement (innovation, H, R) and of
+each stretch (Phi, and Q as what M has beyond Phi P Phi'). So the result equals the Rauch-Tung-Striebel smoother's
+(`estimators.solvers.smoother`) to rounding. The backward filter's state is delta, truth minus the forward filter's
+estimate, known as ``U delta = z + noise`` of unit covariance: the square root of its information, which need not be
+regular and loses no digits. Backward,
+
+- over a correction d of the forward filter, ``z += U d``: the estimate before it differs by d
+- a measurement adds the rows ``L^-1 H delta = L^-1 r``, with R = L L'
+- over a stretch, ``delta_{k+1} = Phi delta_k + G w`` with Q = G G' and w of unit covariance is put in, and w taken
+  out by an orthogonal triangularisation of ``[I, 0 | 0; U G, U Phi | z]``. In terms of the information Y = U'U that is
+  ``Phi' (Y - Y G (I + G'Y G)^-1 G'Y) Phi``, which is ``Phi' (Y^-1 + Q)^-1 Phi`` where there is an inverse.
+
+Combining is using ``U delta = z`` as one more measurement of the forward posterior.
+
+Sources: D. C. Fraser and J. E. Potter, "The optimum linear smoother as a combination of two optimum linear filters",
+IEEE Trans. Automatic Control 14(4), 1969; G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*,
+1977, chapters V and X, for the square roots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from estimators.adaptations.base import Adaptation, Innovation
+from estimators.models.base import Linearised
+from estimators.solvers.kalman import joseph_update
+from estimators.solvers.smoother import SmoothingEstimator, Stretches, scale_of
+from simnav.estimator import UnsuitableScenario
+from simnav.types import Array, InitialState, Instruments, Measurement
+
+__all__ = ["TwoFilterEstimator"]
+
+
+class _Used(NamedTuple):
+    """A measurement that the forward filter used: L^-1 r, L^-1 H, and the correction it made."""
+
+    residual: Array
+    jacobian: Array
+    correction: Array
+
+
+class _Witness(Adaptation):
+    """Lets another adaptation decide, and remembers the noise that it chose."""
+
+    def __init__(self, inner: Adaptation):
+        self.inner = inner
+        self.noise = np.empty((0, 0))
+
+    @property
+    def inflation(self) -> float:  # type: ignore[override]
+        return self.inner.inflation
+
+    def reset(self, instruments: Instruments) -> None:
+        self.inner.reset(instruments)
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        chosen = self.inner.adapt(innovation)
+        if chosen is not None:
+            self.noise = chosen
+        return chosen
+
+    def diagnostics(self) -> dict[str, float | Array]:
+        return self.inner.diagnostics()
+
+
+class TwoFilterEstimator(SmoothingEstimator):
+    """A Kalman filter that smooths after the last update, in two-filter form; put it before the filter's class.
+
+    It costs more than `SmoothingEstimator`, and stores the measurements beside; it is there to check that one.
+
+    Attributes
+    ----------
+    seed_backward : bool
+        Start the backward filter with the forward result, as paper 004 prints it, instead of with nothing. Uses all
+        data twice: over-confident.
+    """
+
+    seed_backward = False
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario where an instrument is said to be without noise."""
+        exact = [s.name for s in instruments.values() if self.model.observes(s) and not np.all(s.sigma > 0.0)]
+        if exact:
+            raise UnsuitableScenario(f"a filter that runs backward needs sigmas above 0; {exact[0]}'s are not")
+        if not isinstance(self.adaptation, _Witness):
+            self.adaptation = _Witness(self.adaptation)
+        super().reset(start, instruments)
+        self._seen: dict[int, list[_Used]] = {}
+        self._linearised: Linearised | None = None
+
+    def _linearise(self, m: Measurement) -> Linearised | None:
+        self._linearised = super()._linearise(m)
+        return self._linearised
+
+    def _correct(self, dx: Array) -> None:
+        super()._correct(dx)
+        assert self._linearised is not None
+        assert isinstance(self.adaptation, _Witness)
+        residual, jacobian, _ = self._linearised
+        white = np.linalg.solve(np.linalg.cholesky(self.adaptation.noise), np.column_stack([jacobian, residual]))
+        self._seen.setdefault(self.stops, []).append(_Used(white[:, -1], white[:, :-1], dx.copy()))
+
+    def _backward(self) -> Iterator[tuple[int, list[Array], Array, Array]]:
+        n, stop = self.model.size, self.stops
+        root, known = np.zeros((0, n)), np.zeros(0)  # U and z, just after the measurements of the stop
+        if self.seed_backward:
+            root, known = _information_root(self.covariance), np.zeros(n)
+        yield (stop, self.model.snapshot(), *_combine(self.covariance, root, known))
+        array = np.zeros((0, 0))
+        for stretches in reversed(self._stretches):
+            noise = _noise_roots(stretches)
+            for k in range(stretches.count - 1, -1, -1):
+                for used in reversed(self._seen.get(stop, ())):
+                    known = np.concatenate([known + root @ used.correction, used.residual])
+                    root = np.vstack([root, used.jacobian])
+                rows = n + len(root)
+                if array.shape[0] != rows:
+                    array = np.zeros((rows, 2 * n + 1))
+                array[:n] = 0.0
+                array[range(n), range(n)] = 1.0
+                array[n:, :n] = root @ noise[k]
+                array[n:, n : 2 * n] = root @ stretches.transition[k]
+                array[n:, 2 * n] = known
+                triangle = np.asarray(np.linalg.qr(array, mode="r"))
+                root, known = triangle[n : 2 * n, n : 2 * n], triangle[n : 2 * n, 2 * n]
+                stop -= 1
+                yield (stop, stretches.states[k], *_combine(stretches.covariance[k], root, known))
+
+
+def _noise_roots(stretches: Stretches) -> Array:
+    """(k, n, n) array: G with Q = M - Phi P Phi' = G G', each in units of the predicted sigmas."""
+    p, phi, m = stretches.matrices()
+    scale = scale_of(m)
+    noise = (m - phi @ p @ phi.swapaxes(1, 2)) / scale[:, :, None] / scale[:, None, :]
+    values, vectors = np.linalg.eigh(0.5 * (noise + noise.swapaxes(1, 2)))
+    roots: Array = scale[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    return roots
+
+
+def _information_root(covariance: Array) -> Array:
+    """(n, n) array: U with P^-1 = U'U; nothing for what is known without error."""
+    scale = scale_of(covariance[None])[0]
+    values, vectors = np.linalg.eigh(covariance / scale[:, None] / scale)
+    inverse = np.zeros_like(values)
+    inverse[values > 1e-15] = values[values > 1e-15] ** -0.5
+    root: Array = inverse[:, None] * vectors.T / scale
+    return root
+
+
+def _combine(covariance: Array, root: Array, known: Array) -> tuple[Array, Array]:
+    """What the smoother adds to the forward state, and its covariance: ``U delta = z`` used as a measurement."""
+    combined, correction = covariance.copy(), np.zeros(len(covariance))
+    if len(root):
+        cross = np.ascontiguousarray(covariance @ root.T)
+        joseph_update(combined, cross, root @ cross + np.eye(len(root)), np.ascontiguousarray(known), correction)
+    return correction, combined
