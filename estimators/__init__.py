@@ -32,8 +32,9 @@ from estimators.kf import Kf, Kf23
 from estimators.oracle import Oracle
 from estimators.references import OracleClairvoyant, OracleMixture, OracleRts
 from estimators.ship_ekf import ShipEkf
+from estimators.ship_graphs import ShipFgo, ShipFgoFull
 from estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
-from estimators.sliding_window import SwFgo
+from estimators.sliding_window import FgoFull, FgoUnsimplified, IaeFgo, IaeFgoFixed, SwFgo
 from estimators.smoothers import EkfRts, EkfTwoFilter, ShipEkfRts
 
 __all__ = [
@@ -49,11 +50,15 @@ __all__ = [
     "FadingEkf",
     "Federated",
     "FederatedNoReset",
+    "FgoFull",
+    "FgoUnsimplified",
     "FilterpyUkf",
     "GatedEkf",
     "GnssOnly",
     "HuberKf",
     "Iae",
+    "IaeFgo",
+    "IaeFgoFixed",
     "IaeFixed",
     "Igg3",
     "Imm",
@@ -73,6 +78,8 @@ __all__ = [
     "ShipCkf",
     "ShipEkf",
     "ShipEkfRts",
+    "ShipFgo",
+    "ShipFgoFull",
     "ShipUkf",
     "SwFgo",
     "Ukf",

@@ -22,11 +22,11 @@ import numpy as np
 
 from estimators.filterpy_adapter import FilterpyEstimator
 from estimators.models.measurements import radii, wrap
-from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, E, N
+from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, E, N, require_ship_aids
 from estimators.models.ship_points import ShipPoints
 from estimators.solvers.sigma_point import draw_points
 from simnav.earth import displace
-from simnav.estimator import UnsuitableScenario, register
+from simnav.estimator import register
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["FilterpyUkf"]
@@ -65,10 +65,7 @@ class FilterpyUkf(FilterpyEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs a heading, and a position or a speed."""
-        if not instruments.of_kind(*HEADING_KINDS):
-            raise UnsuitableScenario("filterpy-ukf needs a compass (gyrocompass or magnetic_compass); there is none")
-        if not instruments.of_kind(*POSITION_KINDS, "gnss_velocity", "dvl", "speed_log"):
-            raise UnsuitableScenario("filterpy-ukf needs GNSS, a terrain fix, a speed log or a DVL; there is none")
+        require_ship_aids(instruments, self.name)
         super().reset(start, instruments)
 
     def build(self, start: InitialState, instruments: Instruments) -> Any:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import radians
 
-from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, ShipModel
+from estimators.models.ship import ShipModel, require_ship_aids
 from estimators.solvers.kalman import KalmanEstimator
-from simnav.estimator import UnsuitableScenario, register
+from simnav.estimator import register
 from simnav.types import InitialState, Instruments
 
 __all__ = ["ShipEkf"]
@@ -43,8 +43,5 @@ class ShipEkf(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs a heading, and a position or a speed."""
-        if not instruments.of_kind(*HEADING_KINDS):
-            raise UnsuitableScenario("the ship EKF needs a compass (gyrocompass or magnetic_compass); there is none")
-        if not instruments.of_kind(*POSITION_KINDS, "gnss_velocity", "dvl", "speed_log"):
-            raise UnsuitableScenario("the ship EKF needs GNSS, a terrain fix, a speed log or a DVL; there is none")
+        require_ship_aids(instruments, self.name)
         super().reset(start, instruments)

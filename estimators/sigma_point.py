@@ -6,10 +6,10 @@ from math import radians
 
 from estimators.ekf import AidedInertial
 from estimators.models.inertial_points import InertialPoints
-from estimators.models.ship import HEADING_KINDS, POSITION_KINDS
+from estimators.models.ship import require_ship_aids
 from estimators.models.ship_points import ShipPoints
 from estimators.solvers.sigma_point import SigmaPointEstimator
-from simnav.estimator import UnsuitableScenario, register
+from simnav.estimator import register
 from simnav.types import InitialState, Instruments
 
 __all__ = ["Ckf", "ShipCkf", "ShipUkf", "Ukf"]
@@ -18,10 +18,7 @@ __all__ = ["Ckf", "ShipCkf", "ShipUkf", "Ukf"]
 class _Ship(SigmaPointEstimator):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs a heading, and a position or a speed."""
-        if not instruments.of_kind(*HEADING_KINDS):
-            raise UnsuitableScenario(f"{self.name} needs a compass (gyrocompass or magnetic_compass); there is none")
-        if not instruments.of_kind(*POSITION_KINDS, "gnss_velocity", "dvl", "speed_log"):
-            raise UnsuitableScenario(f"{self.name} needs GNSS, a terrain fix, a speed log or a DVL; there is none")
+        require_ship_aids(instruments, self.name)
         super().reset(start, instruments)
 
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 from math import cos, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov
 from estimators.models.measurements import wrap
@@ -41,12 +42,20 @@ from estimators.models.ship_kernels import (
 from simnav.estimator import UnsuitableScenario
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
-__all__ = ["HEADING_KINDS", "POSITION_KINDS", "E", "N", "ShipModel"]
+__all__ = ["HEADING_KINDS", "POSITION_KINDS", "E", "N", "ShipModel", "require_ship_aids"]
 
 POSITION_KINDS = ("gnss_position", "terrain_fix")
 HEADING_KINDS = ("magnetic_compass", "gyrocompass")
 #: Roll and pitch that a lever arm is not corrected for, one sigma [rad].
 HEEL = 0.03
+
+
+def require_ship_aids(instruments: Instruments, name: str) -> None:
+    """UnsuitableScenario, in the name of an estimator, without a heading, or a position or speed."""
+    if not instruments.of_kind(*HEADING_KINDS):
+        raise UnsuitableScenario(f"{name} needs a compass (gyrocompass or magnetic_compass); there is none")
+    if not instruments.of_kind(*POSITION_KINDS, "gnss_velocity", "dvl", "speed_log"):
+        raise UnsuitableScenario(f"{name} needs GNSS, a terrain fix, a speed log or a DVL; there is none")
 
 
 class ShipModel(ErrorModel):
@@ -71,9 +80,10 @@ class ShipModel(ErrorModel):
         The other states; the first two numbers are zero.
     transition : (n, n) array
         Of the last propagation.
-    codes : (k, 3) array of int
-    aids : (k, 7) array
-        The instruments observed, in their order, as `estimators.models.ship_kernels` has them.
+    decay, density : (n,) array
+        Inverse of the correlation times [1/s], and noise densities.
+    aids : dict of str to (3,) array of int, (7,) array, int
+        The instruments observed, as `estimators.models.ship_kernels` has them, and their number of components.
     bias_at, scale_at : dict of str to int
         Index in the state of an instrument's first bias, and of its scale factor.
     """
@@ -129,8 +139,8 @@ class ShipModel(ErrorModel):
                 self.scale_at[sheet.name] = 2 + len(states)
                 states.append(GaussMarkov(sheet.scale**2, 0.0, 0.0, 0.0))
         self.size = n = 2 + len(states)
-        self._decay = np.array([0.0, 0.0, *(s.decay for s in states)])
-        self._density = np.array([0.0, 0.0, *(s.noise for s in states)])
+        self.decay = np.array([0.0, 0.0, *(s.decay for s in states)])
+        self.density = np.array([0.0, 0.0, *(s.noise for s in states)])
         self.transition = np.eye(n)
         self._tabulate()
         psi = float(start.attitude[2])
@@ -157,24 +167,19 @@ class ShipModel(ErrorModel):
 
     def _tabulate(self) -> None:
         """The instruments, for the kernels."""
-        sheets = [sheet for sheet in self.instruments.values() if self.observes(sheet)]
-        kinds, numbers = zip(*(_aid(sheet, self.sway) for sheet in sheets), strict=True)
-        self.codes = np.array([
-            (kind, self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1))
-            for kind, sheet in zip(kinds, sheets, strict=True)
-        ])  # fmt: skip
-        self.aids = np.array(numbers)
-        self._rows = {
-            sheet.name: (self.codes[k], self.aids[k], 1 if kinds[k] in (HEADING, LOG) else 2)
-            for k, sheet in enumerate(sheets)
-        }
+        self.aids: dict[str, tuple[NDArray[np.int64], Array, int]] = {}
+        for name, sheet in self.instruments.items():
+            if self.observes(sheet):
+                kind, numbers = _aid(sheet, self.sway)
+                code = np.array([kind, self.bias_at.get(name, -1), self.scale_at.get(name, -1)], dtype=np.int64)
+                self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance."""
         elapsed = until - self.time
         if elapsed > 0.0:
             advance_ship(
-                self.position, self.x, covariance, self.transition, self._decay, self._density, self.turn_time, elapsed
+                self.position, self.x, covariance, self.transition, self.decay, self.density, self.turn_time, elapsed
             )
             self.time = until
 
@@ -184,7 +189,7 @@ class ShipModel(ErrorModel):
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement."""
-        code, aid, m = self._rows[measurement.instrument]
+        code, aid, m = self.aids[measurement.instrument]
         residual, jacobian, noise = np.empty(m), np.zeros((m, self.size)), np.empty((m, m))
         first, second = float(measurement.value[0]), float(measurement.value[m - 1])
         observe_ship(code, aid, self.position, self.x, first, second, residual, jacobian, noise)

@@ -1,7 +1,8 @@
 """Kernels of the ship model: each of its equations once, for one state or for many.
 
-The state is a position (latitude, longitude, height) and a vector x of n numbers: those at the indices `U` to `CE`, then
-biases and scale factors; x[0] and x[1] are zero, or metres north and east of the position where many states share it.
+The state is a position (latitude, longitude, height) and a vector x of n numbers: those at the indices `U` to `CE`,
+then biases and scale factors; x[0] and x[1] are zero, or metres north and east of the position where many states share
+it.
 Equations and sources are those of `estimators.models.ship`.
 
 An instrument is a row of three integers (one of the kinds `POSITION` to `BODY_VELOCITY`; index of its first bias and of

@@ -26,7 +26,7 @@ class ShipPoints(ShipModel, PointModel):
     def move(self, states: Array, elapsed: float) -> None:
         """Advance (k, n) states by the model's motion, in place, in its own steps (`ShipModel`)."""
         if elapsed > 0.0:
-            move_ships(states, self._decay, self.turn_time, elapsed)
+            move_ships(states, self.decay, self.turn_time, elapsed)
 
     def propagate_points(self, errors: Array, until: float) -> Array:
         """Advance the state and the points; return the process noise."""
@@ -40,7 +40,7 @@ class ShipPoints(ShipModel, PointModel):
 
     def read(self, measurement: Measurement, states: Array) -> Array:
         """(k, m) what an instrument should read at k states; positions in metres from the model's own."""
-        code, aid, m = self._rows[measurement.instrument]
+        code, aid, m = self.aids[measurement.instrument]
         readings = np.empty((len(states), m))
         read_ships(code, aid, states, readings)
         return readings

@@ -1,0 +1,113 @@
+"""The chain of the ship model: dead-reckoning factors between the nodes, and all aids of a window linearised at once.
+
+There is nothing to preintegrate. The motion is a closed form, and a motion factor is the model's own step over its
+time, taken again from wherever the older node is now: exact at any distance, without a shift. Its noise is the one with
+which the front ran ahead.
+
+In the terms of paper 002 (section 2): the part of a motion factor that moves position and heading is its DR factor, the
+Gauss-Markov transition of log and compass biases its DR error factor (eqs. 4-6, a random walk), and the prior of the
+first node its marginalization factor (eqs. 12-17).
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, sin
+
+import numpy as np
+
+from estimators.models.chain import Chain
+from estimators.models.ship import ShipModel
+from estimators.models.ship_kernels import E, N, fill_jacobian, residual_of, sail_step, shift_ship, steps_of
+from simnav.compiled import kernel
+from simnav.earth import radii_scalar
+from simnav.types import Array, InitialState, Instruments
+
+__all__ = ["ShipChain"]
+
+
+@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1])")
+def _linearise_motion(time, position, x, rate, turn_time, residual, jacobian):  # type: ignore[no-untyped-def]
+    count, n = residual.shape
+    p, y = np.empty(3), np.empty(n)
+    for k in range(count):
+        p[:] = position[k]
+        y[:] = x[k]
+        F = jacobian[k]
+        F[:] = 0.0
+        for i in range(n):
+            F[i, i] = 1.0
+        steps, dt, turning = steps_of(time[k + 1] - time[k], turn_time)
+        decay = np.exp(-rate * dt)
+        for _ in range(steps):
+            sail_step(p, y, F, decay, turning, dt)
+        meridian, prime = radii_scalar(sin(p[0]))
+        east = position[k + 1, 1] - p[1]
+        residual[k, N] = (position[k + 1, 0] - p[0]) * (meridian + p[2])
+        residual[k, E] = atan2(sin(east), cos(east)) * (prime + p[2]) * cos(p[0])
+        for i in range(2, n):
+            residual[k, i] = x[k + 1, i] - y[i]
+
+
+@kernel(
+    "void(i8[::1], i8, i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
+)
+def _linearise_aids(  # type: ignore[no-untyped-def]
+    node, base, instrument, value, codes, aids, position, x, residual, jacobian
+):
+    for i in range(node.size):
+        k, s = node[i] - base, instrument[i]
+        a, b = residual_of(codes[s], aids[s], position[k], x[k], value[i, 0], value[i, 1])
+        residual[i, 0], residual[i, 1], residual[i, 2] = a, b, 0.0
+        jacobian[i] = 0.0
+        fill_jacobian(codes[s], aids[s], x[k], jacobian[i])
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _retract(step, position, x):  # type: ignore[no-untyped-def]
+    for k in range(step.shape[0]):
+        shift_ship(position[k], x[k], step[k])
+
+
+class ShipChain(Chain):
+    """The chain of a ship model.
+
+    Parameters
+    ----------
+    front : ShipModel
+    """
+
+    front: ShipModel
+
+    def __init__(self, front: ShipModel):
+        super().__init__(front)
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """One node, at the start; its covariance. UnsuitableScenario without any aid."""
+        covariance = super().begin(start, instruments)
+        known = self.front.aids
+        self._codes = np.zeros((len(self.names), 3), dtype=np.int64)
+        self._aids = np.zeros((len(self.names), 7))
+        for i, name in enumerate(self.names):
+            if name in known:
+                self._codes[i], self._aids[i], _ = known[name]
+        return covariance
+
+    def linearise_motion(self) -> None:
+        """As `Chain.linearise_motion`, by the model's own step."""
+        nodes, m, front = self.nodes, self.motions, self.front
+        _linearise_motion(
+            nodes["time"], nodes["position"], nodes["x"], front.decay, front.turn_time, m["residual"], m["jacobian"]
+        )
+
+    def linearise_aids(self) -> None:
+        """As `Chain.linearise_aids`."""
+        nodes, aids = self.nodes, self.aids
+        _linearise_aids(
+            aids["node"], self.base, aids["instrument"], aids["value"], self._codes, self._aids,
+            nodes["position"], nodes["x"], aids["residual"], aids["jacobian"],
+        )  # fmt: skip
+
+    def retract(self, step: Array) -> None:
+        """As `Chain.retract`; the motion factors need no shifts."""
+        _retract(step, self.nodes["position"], self.nodes["x"])
+        self.prior_shift = self.less(self.prior_shift, step[0])
