@@ -1,16 +1,18 @@
-"""The rows of the sliding window over the inertial model: plain, and with a noise estimated from the innovations."""
+"""Rows of the graph over the inertial model: sliding and full, and with a noise estimated from the innovations."""
 
 from __future__ import annotations
 
 from estimators.adaptations.base import Adaptation
+from estimators.adaptations.innovation_based import InnovationBased
 from estimators.adaptations.weighting import Weighting
 from estimators.models.inertial import InertialModel
 from estimators.models.inertial_chain import InertialChain
+from estimators.solvers.full_graph import FullGraph
 from estimators.solvers.window import WindowEstimator
 from simnav.estimator import UnsuitableScenario, register
 from simnav.types import InitialState, Instruments
 
-__all__ = ["InertialWindow", "SwFgo"]
+__all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "InertialWindow", "SwFgo"]
 
 
 class InertialWindow(WindowEstimator):
@@ -64,3 +66,97 @@ class SwFgo(InertialWindow):
 
     def __init__(self, window: int = 20, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
         super().__init__(InertialModel(calibrate), window=window, tolerance=tolerance, iterations=iterations)
+
+
+@register("fgo-unsimplified")
+class FgoUnsimplified(InertialWindow):
+    """The sliding window with a node for every IMU sample: paper 004's graph without the equivalent IMU factor.
+
+    The same estimate as ``sw-fgo`` at many times its cost, which is what it is for. A shorter window keeps that
+    bearable: 5 epochs are 500 nodes and more.
+
+    Parameters
+    ----------
+    window, tolerance, iterations, calibrate
+        As for `SwFgo`.
+    """
+
+    def __init__(self, window: int = 5, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
+        super().__init__(
+            InertialModel(calibrate), window=window, tolerance=tolerance, iterations=iterations, every_sample=True
+        )
+
+
+@register("fgo-full")
+class FgoFull(FullGraph, InertialWindow):
+    """The full graph: every step estimates the whole trajectory; after the run, the batch solution is its smoother.
+
+    Parameters
+    ----------
+    tolerance, iterations, calibrate
+        As for `SwFgo`.
+    """
+
+    def __init__(self, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
+        super().__init__(InertialModel(calibrate), window=None, tolerance=tolerance, iterations=iterations)
+
+
+@register("iae-fgo")
+class IaeFgo(InertialWindow):
+    """The sliding window with innovation-based estimation of the measurement noise, window after paper 001, eqs. 16-20.
+
+    Parameters
+    ----------
+    shortest, longest, low, high, forgetting, lowest, highest
+        Of the estimation (`estimators.adaptations.innovation_based`).
+    window, tolerance, iterations
+        As for `SwFgo`.
+    """
+
+    def __init__(
+        self,
+        shortest: int = 10,
+        longest: int = 20,
+        low: float = 2.0,
+        high: float = 5.0,
+        forgetting: float = 0.9,
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        window: int = 20,
+        tolerance: float = 1e-3,
+        iterations: int = 10,
+    ):
+        noise = InnovationBased("innovation", shortest, longest, low, high, forgetting, lowest=lowest, highest=highest)
+        super().__init__(InertialModel(), noise, window=window, tolerance=tolerance, iterations=iterations)
+
+
+@register("iae-fgo-fixed")
+class IaeFgoFixed(InertialWindow):
+    """The sliding window with innovation-based estimation of the measurement noise over a fixed number of innovations.
+
+    IAE-FGO-Fix of paper 001.
+
+    Parameters
+    ----------
+    innovations : int
+        M of eq. 17.
+    forgetting, lowest, highest
+        Of the estimation (`estimators.adaptations.innovation_based`).
+    window, tolerance, iterations
+        As for `SwFgo`.
+    """
+
+    def __init__(
+        self,
+        innovations: int = 20,
+        forgetting: float = 0.9,
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        window: int = 20,
+        tolerance: float = 1e-3,
+        iterations: int = 10,
+    ):
+        noise = InnovationBased(
+            "innovation", innovations, innovations, forgetting=forgetting, lowest=lowest, highest=highest
+        )
+        super().__init__(InertialModel(), noise, window=window, tolerance=tolerance, iterations=iterations)

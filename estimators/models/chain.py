@@ -1,9 +1,9 @@
 """What a model is to a graph: the nodes of a window and the factors that link them, around a state that runs ahead.
 
-The model itself, the *front*, runs from measurement to measurement as it does in a filter. At each time of a measurement
-its state becomes a node, and what lies between two nodes a motion factor: the transition matrix F and the noise Q that
-the model accumulated, on the trajectory that it predicted. A factor knows how far its two ends have moved since
-(``begin_shift``, ``end_shift``), which is all that is needed to linearise it anew: with x the nodes now, the error is
+The model itself, the *front*, runs from measurement to measurement as it does in a filter. At each time of a
+measurement its state becomes a node, and what lies between two nodes a motion factor: the transition matrix F and the
+noise Q that the model accumulated, on the trajectory that it predicted. A factor knows how far its two ends have moved
+since (``begin_shift``, ``end_shift``), which is all it takes to linearise it anew: with x the nodes now, the error is
 ``e = x_k+1 - f(x_k)``, f being the exact motion. So the IMU is integrated once, whatever happens to the nodes
 (preintegration: C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", IEEE Trans.
 Robotics 33(1), 2017; here about the predicted trajectory and on the rotating Earth).

@@ -1,9 +1,9 @@
 """The chain of the inertial model: preintegrated IMU factors, and all aids of a window linearised at once.
 
-Between two nodes the front integrated the IMU samples from x' to y' and made F on the way. From another node x, with the
-shift ``s = x - x'`` (rotation phi, biases b), the same samples lead to ``f(x) = y' + F s + c``, where c is what rotating
-the increments adds beyond the first order: with ``E = exp(phi x)`` and the vectors u_p, u_v of the specific force's double
-and single integral in north-east-down, which stand in F (its block of the attitude is ``-[u x]``),
+Between two nodes the front integrated the IMU samples from x' to y' and made F on the way. From another node x, with
+the shift ``s = x - x'`` (rotation phi, biases b), the same samples lead to ``f(x) = y' + F s + c``, where c is what
+rotating the increments adds beyond the first order: with ``E = exp(phi x)`` and the vectors u_p, u_v of the specific
+force's double and single integral in north-east-down, which stand in F (its block of the attitude is ``-[u x]``),
 
 - ``c_p = (E - 1 - phi x) u_p + (E - 1) F_pb b``, and c_v likewise with u_v and F_vb
 - attitude: ``E_F exp(E F_phi,b b)`` with ``E_F = exp(F_phi,phi phi)``, to second order in the product of both

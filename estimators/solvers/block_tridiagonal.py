@@ -70,7 +70,7 @@ def _predict(P, F, Q, weight, work, turned, out):  # type: ignore[no-untyped-def
 
 @kernel()
 def _damp(P, damping, gains):  # type: ignore[no-untyped-def]
-    """Measure each component of a step as zero, one after the other; gains[i] is ``P e_i / s``, gains[n + i] ``P e_i``."""
+    """Measure each component of a step as zero, one by one; gains[i] is ``P e_i / s``, gains[n + i] ``P e_i``."""
     n = P.shape[0]
     variance = np.empty(n)
     for i in range(n):

@@ -1,12 +1,12 @@
-"""A sliding window: the newest states are estimated together, again at every step, by Gauss-Newton.
+"""A sliding window: the newest states are estimated together, anew at every step, by Gauss-Newton.
 
 Every time of a measurement is a node of the graph (`estimators.models.chain`), every measurement and every stretch of
 motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares: linearise,
 weigh, solve (`estimators.solvers.block_tridiagonal`), retract, until a step is small. A step that raises the cost is
-taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what they say of the node that is
-the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L. Matthies, G. Sukhatme, "Sliding window
-filter with application to planetary landing", J. Field Robotics 27(5), 2010). So nothing is lost but the freedom to
-linearise or weigh it anew, and a window of one epoch is an iterated EKF.
+taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what they say of the node that
+is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L. Matthies, G. Sukhatme, "Sliding
+window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So nothing is lost but the freedom
+to linearise or weigh it anew, and a window of one epoch is an iterated EKF.
 
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
 innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
@@ -168,19 +168,50 @@ class WindowEstimator(Estimator):
         return True
 
     def _optimise(self, attached: int, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Move the nodes to the least cost."""
+        """Estimate all nodes, the newest of which hold new factors, and report."""
+        chain = self.chain
+        solved, cost, moved, attached = self._converge(attached)
+        chain.settle(moved)
+        diagnostics["iterations"], diagnostics["cost"] = float(solved), cost
+        if attached:
+            newest = [chain.aids[column][-attached:].tolist() for column in ("instrument", "time", "norm", "weight")]
+            for index, time, norm, weight in zip(*newest):
+                name = chain.names[index]
+                diagnostics[f"residual.{name}"], diagnostics[f"weight.{name}"] = norm, weight
+                if weight < FAULTY_WEIGHT:
+                    flagged.append((name, time))
+        if len(chain.motions):
+            diagnostics["residual.motion"] = float(chain.motions["norm"][-1])
+            diagnostics["weight.motion"] = float(chain.motions["weight"][-1])
+
+    def _converge(self, attached: int) -> tuple[int, float, Array, int]:
+        """Move the nodes to the least cost.
+
+        Parameters
+        ----------
+        attached : int
+            New aiding factors: they are taken off again if there is no finite solution with them.
+
+        Returns
+        -------
+        solved : int
+            Linear systems.
+        cost : float
+        moved : (n,) array
+            By how much the newest node was moved.
+        attached : int
+            New factors that are left.
+        """
         chain = self.chain
         self._make_room(len(chain.nodes))
-        count = len(chain.nodes)
-        predicted, predicted_shift, filtered, filtered_shift, step = (a[:count] for a in self._work)
-        motions, aids = chain.motions, chain.aids
+        filtered, step = self._work[2][: len(chain.nodes)], self._work[4][: len(chain.nodes)]
         moved = np.zeros(chain.size)
-        damping, cost, saved = 0.0, np.inf, None
-        settled, solved = True, 0
+        damping, settled, solved = 0.0, True, 0
+        saved: list[Array] | None = None
         cost = self._linearise()
-        for iteration in range(self.iterations):
+        while solved < self.iterations:
             if saved is None and self.weighting is not None:
-                settled = self.weighting.weigh(self._factors(iteration))
+                settled = self.weighting.weigh(self._factors(solved))
                 cost = self._cost()
             size = self._solve(damping)
             solved += 1
@@ -194,7 +225,7 @@ class WindowEstimator(Estimator):
             saved = chain.copy_states() if size > CHECKED_STEP else None
             chain.retract(step)
             moved += step[-1]
-            if (size < self.tolerance and settled) or iteration == self.iterations - 1:
+            if size < self.tolerance and settled:
                 break
             now = self._linearise()
             if saved is not None and now > cost * (1.0 + 1e-9):
@@ -206,25 +237,10 @@ class WindowEstimator(Estimator):
                 saved, cost = None, now
                 damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
         if damping > 0.0:  # the covariances and the prior are those without it
-            cost = self._linearise()
             self._solve(0.0)
             step[:] = 0.0
         self.covariance = filtered[-1].copy()
-        chain.settle(moved)
-        diagnostics["iterations"] = float(solved)
-        diagnostics["cost"] = cost
-        names = chain.names
-        for name, time, norm, weight in zip(
-            aids["instrument"][-attached:].tolist() if attached else (),
-            aids["time"][-attached:].tolist(), aids["norm"][-attached:].tolist(), aids["weight"][-attached:].tolist(),
-        ):  # fmt: skip
-            diagnostics[f"residual.{names[name]}"] = norm
-            diagnostics[f"weight.{names[name]}"] = weight
-            if weight < FAULTY_WEIGHT:
-                flagged.append((names[name], time))
-        if len(motions):
-            diagnostics["residual.motion"] = float(motions["norm"][-1])
-            diagnostics["weight.motion"] = float(motions["weight"][-1])
+        return solved, cost, moved, attached
 
     def _linearise(self) -> float:
         """Linearise all factors; their cost with the weights that they have."""

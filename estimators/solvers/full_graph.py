@@ -1,0 +1,76 @@
+"""The full graph: nothing leaves the window, every step estimates the whole trajectory again.
+
+In real time it costs the square of the length of the run, and differs from a sliding window only where measurements
+long past are linearised or weighed anew. At the end it is the batch solution: the maximum a posteriori trajectory.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimators.solvers.smoother import smoother_gains
+from estimators.solvers.window import WindowEstimator
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
+
+__all__ = ["FullGraph"]
+
+
+class FullGraph(WindowEstimator):
+    """A graph that keeps all its nodes, and smooths; put it before the window's class, with ``window=None``::
+
+        class FgoFull(FullGraph, InertialWindow): ...
+
+    Attributes
+    ----------
+    smoothed_covariance : (T, 9, 9) array
+        Of the trajectory that `smooth` returned.
+    """
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(start, instruments)
+        self._ends: list[int] = []
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step's measurements; the estimate at its end, which becomes a node."""
+        estimate = super().update(measurements)
+        if self.chain.ahead > 0.0:
+            self._extend()
+        self._ends.append(len(self.chain.nodes) - 1)
+        return estimate
+
+    def smooth(self) -> NavigationStates | None:
+        """The whole trajectory at the ends of all steps; None before the first."""
+        if not self._ends:
+            return None
+        chain, front = self.chain, self.chain.front
+        self._converge(0)
+        covariances = self._smoothed_covariances()
+        now, time = front.snapshot(), front.time
+        series = np.full((3, len(self._ends), 3), np.nan)
+        self.smoothed_covariance = np.full((len(self._ends), 9, 9), np.nan)
+        for row, node in enumerate(self._ends):
+            front.restore([chain.nodes[name][node] for name in front.state])
+            front.time = float(chain.nodes["time"][node])
+            out = front.estimate(covariances[node])
+            for kind, vector in enumerate((out.position, out.velocity, out.attitude)):
+                if vector is not None:
+                    series[kind, row] = vector
+            if out.covariance is not None:
+                self.smoothed_covariance[row] = out.covariance
+        times = chain.nodes["time"][self._ends].copy()
+        front.restore(now)
+        front.time = time
+        return NavigationStates(times, *series)
+
+    def _smoothed_covariances(self) -> Array:
+        """Of all nodes, from all measurements (`estimators.solvers.smoother`)."""
+        motions = self.chain.motions
+        count = len(self.chain.nodes)
+        predicted, filtered = self._work[0][:count], self._work[2][:count]
+        smoothed = filtered.copy()
+        gains = smoother_gains(filtered[:-1], motions["jacobian"], predicted[1:])
+        for k in range(count - 2, -1, -1):
+            s = filtered[k] + gains[k] @ (smoothed[k + 1] - predicted[k + 1]) @ gains[k].T
+            smoothed[k] = 0.5 * (s + s.T)
+        return smoothed
