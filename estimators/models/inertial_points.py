@@ -18,20 +18,20 @@ where a disturbance has driven a scale factor to an absurd value (a constant 0.5
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from math import atan2, ceil, cos, sin, sqrt
 
 import numpy as np
 
 from estimators.models.inertial import InertialModel
+from estimators.models.measurements import HEADING, observe_inertial
 from estimators.models.points import PointModel
 from simnav.compiled import kernel
-from simnav.earth import ROTATION_RATE, radii_scalar
+from simnav.earth import radii_scalar
 from simnav.rotation import cross, rotation_coefficients
 from simnav.strapdown import mechanize_step, sample_from_motion
-from simnav.types import Array, Datasheet, Measurement
+from simnav.types import Array, Measurement
 
-__all__ = ["PIECE", "InertialPoints", "propagate_points", "turn_points"]
+__all__ = ["PIECE", "InertialPoints", "observe_points", "propagate_points"]
 
 #: Longest piece of the motion that one equivalent sample stands for [s].
 PIECE = 0.5
@@ -46,13 +46,6 @@ def _turn(dcm, r0, r1, r2, turned):  # type: ignore[no-untyped-def]
         x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
         y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
         turned[0, j], turned[1, j], turned[2, j] = c0 + a * x0 + b * y0, c1 + a * x1 + b * y1, c2 + a * x2 + b * y2
-
-
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
-def turn_points(dcm, errors, dcms):  # type: ignore[no-untyped-def]
-    """DCMs of k points: ``dcms[k] = exp(errors[k, 6:9] x) dcm``."""
-    for k in range(errors.shape[0]):
-        _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], dcms[k])
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8[:, ::1])")
@@ -135,6 +128,59 @@ def propagate_points(  # type: ignore[no-untyped-def]
             errors[k, 12 + j] *= keep_a
 
 
+@kernel("void(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def observe_points(  # type: ignore[no-untyped-def]
+    code, arm, bias_at, scale_at, position, velocity, dcm, rate, bias, calibration, errors, differences
+):
+    """What an instrument should read at points, minus what it should read at the state.
+
+    In position and calibration the readings are linear (see the module), and so computed; the rest is the instrument's
+    own function at the point.
+
+    Parameters
+    ----------
+    code, arm, bias_at, scale_at, position, velocity, dcm, rate, bias, calibration
+        As of `estimators.models.measurements.observe_inertial`.
+    errors : (k, n) array
+        Of the points.
+    differences : (k, d) array
+        Filled.
+    """
+    n, d = errors.shape[1], differences.shape[1]
+    linear, scratch = np.zeros((3, n)), np.zeros((3, 12))
+    at_state, reading = np.zeros(3), np.zeros(3)
+    value = position  # any will do; for a fix, one nearby is the more accurate
+    v, b, m = velocity.copy(), bias[:3].copy(), dcm.copy()
+    # First the state, for the Jacobian; then the state as if calibrated, and the points likewise.
+    for k in range(-2, errors.shape[0]):
+        if k >= 0:
+            for j in range(3):
+                v[j], b[j] = velocity[j] + errors[k, 3 + j], bias[j] + errors[k, 9 + j]
+            _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
+        full = k == -2
+        known = observe_inertial(
+            code, arm, bias_at if full else -1, scale_at if full else -1, value, position, v, m, rate, b, calibration,
+            reading, linear if full else scratch,
+        )  # fmt: skip
+        if k == -1:
+            at_state[:] = reading
+        if k < 0:
+            continue
+        for i in range(d):
+            x = at_state[i] - reading[i]
+            if code == HEADING:
+                x = atan2(sin(x), cos(x))
+            if known == 0:  # a point near the vertical
+                x = 0.0
+                for j in range(3, 15):
+                    x += linear[i, j] * errors[k, j]
+            for j in range(3):
+                x += linear[i, j] * errors[k, j]
+            for j in range(15, n):
+                x += linear[i, j] * errors[k, j]
+            differences[k, i] = x
+
+
 class InertialPoints(InertialModel, PointModel):
     """`InertialModel` with points.
 
@@ -161,75 +207,10 @@ class InertialPoints(InertialModel, PointModel):
 
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
         """What the instrument should read at the points, minus what it should read at the state."""
-        sheet = self.instruments[measurement.instrument]
-        with_state = np.zeros((len(errors) + 1, self.size))
-        with_state[1:] = errors
-        dcm = np.empty((len(with_state), 3, 3))
-        turn_points(self.dcm, with_state, dcm)
-        predicted = _FUNCTIONS[sheet.kind](self, sheet, with_state, dcm)
-        at = self.bias_at.get(sheet.name)
-        if at is not None:
-            predicted = predicted + with_state[:, at : at + predicted.shape[1]]
-        difference = predicted[1:] - predicted[0]
-        if sheet.kind in ("magnetic_compass", "gyrocompass"):
-            difference = np.arctan2(np.sin(difference), np.cos(difference))
-        return np.asarray(difference)
-
-    def arm_velocity(self, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-        """(k, 3) velocity of an instrument due to its lever arm, body axes: w x l, w relative to the Earth."""
-        latitude = float(self.position[0])
-        earth = np.array([ROTATION_RATE * cos(latitude), 0.0, -ROTATION_RATE * sin(latitude)])
-        rate = self.raw_rate - self.bias[:3] - errors[:, 9:12] - earth @ dcm
-        l0, l1, l2 = sheet.lever_arm.tolist()
-        return np.asarray(rate @ np.array([[0.0, -l2, l1], [l2, 0.0, -l0], [-l1, l0, 0.0]]))
-
-    def body_velocity(self, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-        """(k, 3) velocity over the ground of an instrument, body axes: C' v + w x l."""
-        velocity = (self.velocity + errors[:, 3:6])[:, None, :] @ dcm
-        return np.asarray(velocity[:, 0] + self.arm_velocity(sheet, errors, dcm))
-
-
-def _position(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-    return np.asarray((errors[:, :3] + dcm @ sheet.lever_arm)[:, : len(sheet.sigma)])
-
-
-def _velocity(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-    turned = dcm @ model.arm_velocity(sheet, errors, dcm)[:, :, None]
-    return np.asarray(errors[:, 3:6] + turned[:, :, 0])
-
-
-def _dvl(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-    u = model.body_velocity(sheet, errors, dcm)
-    at = model.scale_at.get(sheet.name)
-    if at is None:
-        return u
-    s, (a0, a1, a2), (u0, u1, u2) = errors[:, at : at + 1], errors[:, at + 1 : at + 4].T, u[0].tolist()
-    turned = np.stack([u1 * a2 - u2 * a1, u2 * a0 - u0 * a2, u0 * a1 - u1 * a0], axis=1)
-    return np.asarray(u + s * u[0] + turned)
-
-
-def _speed_log(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-    u = model.body_velocity(sheet, errors, dcm)[:, :1]
-    at = model.scale_at.get(sheet.name)
-    return u if at is None else np.asarray(u + errors[:, at : at + 1] * u[0])
-
-
-def _heading(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-    return np.arctan2(dcm[:, 1, 0], dcm[:, 0, 0])[:, None]
-
-
-def _depth(model: InertialPoints, sheet: Datasheet, errors: Array, dcm: Array) -> Array:
-    return np.asarray(errors[:, 2:3] + dcm[:, 2:] @ sheet.lever_arm)
-
-
-#: Readings at the points, up to what is the same for all (equations in `estimators.models.measurements`).
-_FUNCTIONS: Mapping[str, Callable[[InertialPoints, Datasheet, Array, Array], Array]] = {
-    "gnss_position": _position,
-    "terrain_fix": _position,
-    "gnss_velocity": _velocity,
-    "dvl": _dvl,
-    "magnetic_compass": _heading,
-    "gyrocompass": _heading,
-    "depth": _depth,
-    "speed_log": _speed_log,
-}
+        name = measurement.instrument
+        differences = np.empty((len(errors), len(self.noise[name])))
+        observe_points(
+            *self.aid_parameters[name], self.position, self.velocity, self.dcm, self.raw_rate, self.bias,
+            self.calibration, errors, differences,
+        )  # fmt: skip
+        return differences
