@@ -6,7 +6,7 @@ rotating the increments adds beyond the first order: with ``E = exp(phi x)`` and
 force's double and single integral in north-east-down, which stand in F (its block of the attitude is ``-[u x]``),
 
 - ``c_p = (E - 1 - phi x) u_p + (E - 1) F_pb b``, and c_v likewise with u_v and F_vb
-- attitude: ``E_F exp(E F_phi,b b)`` with ``E_F = exp(F_phi,phi phi)``, to second order in the product of both
+- attitude: the rotation vector of ``exp(F_phi,phi phi) exp(F_phi,b b)``
 
 F and its bias columns turn with the node (``F_pb = C B`` with B in body axes): these are the body-frame increments and
 bias Jacobians of preintegration (Forster et al. 2017, eqs. 38-44; paper 001's eqs. 8-10 with its slip settled: gravity
@@ -100,9 +100,9 @@ def _linearise_motion(transition, begin_shift, end_shift, residual, jacobian):  
                     a0 -= F[6, j] * s[j]
                     a1 -= F[7, j] * s[j]
                     a2 -= F[8, j] * s[j]
-                    b0 += J[6, j] * s[j]
-                    b1 += J[7, j] * s[j]
-                    b2 += J[8, j] * s[j]
+                    b0 += F[6, j] * s[j]
+                    b1 += F[7, j] * s[j]
+                    b2 += F[8, j] * s[j]
             moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
         for i in range(n):
             residual[k, i] = e[i] - moved[i]

@@ -1,0 +1,169 @@
+"""One step of a chain of nodes against the dense normal equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimators.models.chain import whitening
+from estimators.solvers.block_tridiagonal import chain_cost, solve_chain
+
+N, COUNT = 5, 6
+
+
+class Problem:
+    """A random chain; every node but one has measurements of one to three components."""
+
+    def __init__(self, seed: int):
+        rng = np.random.default_rng(seed)
+        self.prior = covariance(rng, N)
+        self.shift = rng.normal(size=N)
+        self.F = np.eye(N) + 0.3 * rng.normal(size=(COUNT - 1, N, N))
+        self.Q = np.array([0.1 * covariance(rng, N) for _ in range(COUNT - 1)])
+        self.e = rng.normal(size=(COUNT - 1, N))
+        self.w = rng.uniform(0.2, 1.0, COUNT - 1)
+        self.node = np.array([0, 0, 1, 3, 4, 4, 5], dtype=np.int64)
+        self.m = np.array([3, 1, 2, 3, 1, 2, 3], dtype=np.int64)
+        total = len(self.node)
+        self.H = rng.normal(size=(total, 3, N))
+        self.r = rng.normal(size=(total, 3))
+        self.R = np.array([covariance(rng, 3) for _ in range(total)])
+        self.v = rng.uniform(0.2, 1.0, total)
+
+    def solve(self, damping: float = 0.0):
+        out = (
+            np.empty((COUNT, N, N)), np.empty((COUNT, N)), np.empty((COUNT, N, N)), np.empty((COUNT, N)),
+            np.empty((COUNT, N)),
+        )  # fmt: skip
+        size = solve_chain(
+            self.prior, self.shift, self.F, self.Q, self.e, self.w, self.node + 7, 7, self.m, self.H, self.r, self.R,
+            self.v, damping, *out,
+        )  # fmt: skip
+        return size, out
+
+    def dense(self, last: int = COUNT, own: bool = True, damping: np.ndarray | None = None):
+        """Normal matrix and right side of the first ``last`` nodes, the last with its own measurements or without."""
+        A, b = np.zeros((last * N, last * N)), np.zeros(last * N)
+
+        def add(J: np.ndarray, residual: np.ndarray, information: np.ndarray) -> None:
+            A[...] += J.T @ information @ J
+            b[...] += J.T @ information @ residual
+
+        J = np.zeros((N, last * N))
+        J[:, :N] = np.eye(N)
+        add(J, self.shift, np.linalg.inv(self.prior))
+        for k in range(last - 1):
+            J = np.zeros((N, last * N))
+            J[:, k * N : (k + 1) * N] = -self.F[k]
+            J[:, (k + 1) * N : (k + 2) * N] = np.eye(N)
+            add(J, -self.e[k], self.w[k] * np.linalg.inv(self.Q[k]))
+        for i, k in enumerate(self.node):
+            if k >= last or (k == last - 1 and not own):
+                continue
+            m = self.m[i]
+            J = np.zeros((m, last * N))
+            J[:, k * N : (k + 1) * N] = self.H[i, :m]
+            add(J, self.r[i, :m], self.v[i] * np.linalg.inv(self.R[i, :m, :m]))
+        if damping is not None:
+            A += np.diag(damping)
+        return A, b
+
+
+def covariance(rng: np.random.Generator, n: int) -> np.ndarray:
+    a = rng.normal(size=(n, n))
+    return a @ a.T + 0.1 * np.eye(n)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_is_the_solution_of_the_normal_equations(seed: int):
+    p = Problem(seed)
+    size, (_, _, filtered, _, step) = p.solve()
+    A, b = p.dense()
+    np.testing.assert_allclose(step.ravel(), np.linalg.solve(A, b), rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(filtered[-1], np.linalg.inv(A)[-N:, -N:], rtol=1e-9)
+    sigma = np.sqrt(np.diagonal(filtered, axis1=1, axis2=2))
+    assert size == pytest.approx(np.max(np.abs(step) / sigma))
+
+
+@pytest.mark.parametrize("node", range(1, COUNT))
+def test_what_is_predicted_is_the_schur_complement_of_all_older_nodes(node: int):
+    """Marginalising them out of the dense system leaves this prior."""
+    p = Problem(4)
+    _, (predicted, predicted_shift, _, _, _) = p.solve()
+    A, b = p.dense(node + 1, own=False)
+    old, new = slice(0, node * N), slice(node * N, None)
+    schur = A[new, new] - A[new, old] @ np.linalg.solve(A[old, old], A[old, new])
+    rest = b[new] - A[new, old] @ np.linalg.solve(A[old, old], b[old])
+    np.testing.assert_allclose(np.linalg.inv(predicted[node]), schur, rtol=1e-7)
+    np.testing.assert_allclose(predicted_shift[node], np.linalg.solve(schur, rest), rtol=1e-7)
+
+
+def test_damping_is_levenberg_and_marquardts():
+    p, damping = Problem(5), 0.7
+    _, (predicted, _, filtered, _, step) = p.solve(damping)
+    scale = damping / np.diagonal(predicted, axis1=1, axis2=2).ravel()
+    A, b = p.dense(damping=scale)
+    np.testing.assert_allclose(step.ravel(), np.linalg.solve(A, b), rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(filtered[-1], np.linalg.inv(A)[-N:, -N:], rtol=1e-9)
+    _, (*_, free) = p.solve()
+    assert np.linalg.norm(step) < np.linalg.norm(free)
+
+
+def test_a_factor_without_weight_counts_for_nothing():
+    p = Problem(6)
+    p.v[3] = 0.0
+    _, (*_, step) = p.solve()
+    p.m[3], p.v[3] = 0, 1.0
+    _, (*_, same) = p.solve()
+    np.testing.assert_array_equal(step, same)
+
+
+def test_states_without_noise_are_solved_for_too():
+    """Constants, and a process noise twelve orders of magnitude below the covariance, as between two IMU samples."""
+    p = Problem(7)
+    p.Q[:] *= 1e-12
+    p.Q[:, 2] = p.Q[:, :, 2] = 0.0
+    p.F[:, 2] = np.eye(N)[2]
+    p.e[:, 2] = 0.0
+    _, (*_, step) = p.solve()
+    np.testing.assert_allclose(step[:, 2], step[0, 2], rtol=1e-9)
+    # The limit of no noise at all: everything is a function of the first node.
+    map_, shift = np.eye(N), np.zeros(N)
+    A, b = np.linalg.inv(p.prior), np.linalg.solve(p.prior, p.shift)
+    for k in range(COUNT):
+        if k:
+            map_, shift = p.F[k - 1] @ map_, p.F[k - 1] @ shift - p.e[k - 1]
+        for i in np.flatnonzero(p.node == k):
+            m = p.m[i]
+            J, W = p.H[i, :m] @ map_, p.v[i] * np.linalg.inv(p.R[i, :m, :m])
+            A, b = A + J.T @ W @ J, b + J.T @ W @ (p.r[i, :m] - p.H[i, :m] @ shift)
+    np.testing.assert_allclose(step[0], np.linalg.solve(A, b), rtol=1e-6)
+
+
+def test_a_whitener_is_the_inverse_cholesky_factor():
+    rng = np.random.default_rng(1)
+    P, W = covariance(rng, 4), np.empty((4, 4))
+    whitening(P, W)
+    np.testing.assert_allclose(W, np.linalg.inv(np.linalg.cholesky(P)), rtol=1e-9, atol=1e-12)
+    P[2] = P[:, 2] = 0.0
+    whitening(P, W)
+    assert not W[2].any()
+    assert not W[:, 2].any()
+    rest = [0, 1, 3]
+    np.testing.assert_allclose(
+        W[np.ix_(rest, rest)], np.linalg.inv(np.linalg.cholesky(P[np.ix_(rest, rest)])), rtol=1e-9, atol=1e-12
+    )
+
+
+def test_cost_is_the_sum_of_squares_of_whitened_errors():
+    rng = np.random.default_rng(2)
+    e = rng.normal(size=(3, 4))
+    P = np.array([covariance(rng, 4) for _ in range(3)])
+    W, white, norm = np.empty_like(P), np.empty_like(e), np.empty(3)
+    for p, w in zip(P, W):
+        whitening(p, w)
+    total = chain_cost(e, W, white, norm)
+    squares = [x @ np.linalg.solve(p, x) for x, p in zip(e, P)]
+    np.testing.assert_allclose(norm**2, squares)
+    assert total == pytest.approx(sum(squares))
+    np.testing.assert_allclose(np.linalg.norm(white, axis=1), norm)
