@@ -23,7 +23,10 @@ covariance; a single run may be better.
 What it is not: a bound beyond the model. Where the model stands for the simulator's errors by something simpler (one
 Gauss-Markov state for a turn-on and an in-run bias, noise for an IMU's scale factor, in `estimators.models.inertial`;
 all of the motion, in `estimators.models.ship`), it is the bound of an estimator with that model. A disturbance of the
-IMU counts as known. Outages of random times count as known too. Smoothed output has a bound of its own.
+IMU counts as known. Outages of random times count as known too.
+
+Smoothed output, which has seen what comes after, has a bound of its own (``smoothed``): the covariance that a
+Rauch-Tung-Striebel smoother behind the same filter ends with (``oracle-rts`` for ``flags``).
 
 Source: P. Tichavsky, C. H. Muravchik and A. Nehorai, "Posterior Cramer-Rao bounds for discrete-time nonlinear
 filtering", IEEE Trans. Signal Processing 46(5), 1998.
@@ -40,6 +43,7 @@ from numpy.typing import NDArray
 
 from estimators.adaptations.truth import FisherNoise, NominalNoise, TrueNoise
 from estimators.oracle import Oracle
+from estimators.solvers.smoother import SmoothingEstimator
 from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.simulator import ideal
@@ -67,6 +71,8 @@ class Bound:
         Ends of the steps [s].
     covariance : (T, 9, 9) array
         Over `simnav.types.COMPONENTS`; NaN for what the model does not estimate.
+    smoothed : bool
+        Of smoothed output; False: of output in real time.
     """
 
     scenario: str
@@ -74,6 +80,7 @@ class Bound:
     runs: int
     time: Array
     covariance: Array
+    smoothed: bool = False
 
     @property
     def sigma(self) -> Array:
@@ -100,6 +107,7 @@ class Bound:
         return {
             "scenario": self.scenario,
             "kind": self.kind,
+            "smoothed": self.smoothed,
             "runs": self.runs,
             "duration_s": float(self.time[-1]),
             "horizontal_rms_m": self.horizontal_rms,
@@ -117,10 +125,23 @@ class _Mix(Oracle):
     knowledge: ClassVar[type[TrueNoise]] = FisherNoise
 
 
+class _Rts(SmoothingEstimator, Oracle):
+    pass
+
+
+class _CleanRts(_Rts):
+    knowledge: ClassVar[type[TrueNoise]] = NominalNoise
+
+
+class _MixRts(_Rts):
+    knowledge: ClassVar[type[TrueNoise]] = FisherNoise
+
+
 _ESTIMATORS: dict[str, type[Oracle]] = {"clean": _Clean, "flags": Oracle, "mix": _Mix}
+_SMOOTHERS: dict[str, type[_Rts]] = {"clean": _CleanRts, "flags": _Rts, "mix": _MixRts}
 
 
-def information(recording: Recording, kind: Kind = "flags") -> tuple[Array, NDArray[np.bool_]]:
+def information(recording: Recording, kind: Kind = "flags", smoothed: bool = False) -> tuple[Array, NDArray[np.bool_]]:
     """Information of one run on its navigation errors.
 
     Parameters
@@ -128,6 +149,8 @@ def information(recording: Recording, kind: Kind = "flags") -> tuple[Array, NDAr
     recording : Recording
         From `simnav.simulator.ideal`.
     kind : str
+    smoothed : bool
+        What all measurements say, not only those so far.
 
     Returns
     -------
@@ -141,15 +164,17 @@ def information(recording: Recording, kind: Kind = "flags") -> tuple[Array, NDAr
     SpecError
         If no model fits the instruments.
     """
-    trial = run_trial(_ESTIMATORS[kind](), recording)
+    estimator = (_SMOOTHERS if smoothed else _ESTIMATORS)[kind]()
+    trial = run_trial(estimator, recording)
     if trial.status != "ok" or trial.covariance is None:
         raise SpecError(f"{recording.scenario}, seed {recording.seed}: there is no bound: {trial.reason}")
     estimated: NDArray[np.bool_] = np.all(trial.estimated, axis=0)
-    covariance = trial.covariance[:, estimated][:, :, estimated]
+    every = estimator.smoothed_covariance if isinstance(estimator, _Rts) else trial.covariance
+    covariance = every[:, estimated][:, :, estimated]
     return _inverse(covariance), estimated
 
 
-def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags") -> Bound:
+def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags", smoothed: bool = False) -> Bound:
     """The posterior Cramer-Rao bound of a scenario, by epoch.
 
     Parameters
@@ -160,6 +185,8 @@ def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags") -> Bou
         Of the runs over which it is averaged; a dozen will do.
     kind : str
         ``clean``, ``flags`` or ``mix``, as the module says.
+    smoothed : bool
+        True: the bound of smoothed output.
 
     Returns
     -------
@@ -186,14 +213,14 @@ def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags") -> Bou
     total, runs = np.zeros(0), 0
     for seed in seeds:
         recording = ideal(scenario, seed)
-        j, estimated = information(recording, kind)
+        j, estimated = information(recording, kind, smoothed)
         total = j if runs == 0 else total + j
         runs += 1
     if runs == 0:
         raise ValueError("a bound needs at least one seed")
     covariance = np.full((len(total), 9, 9), np.nan)
     covariance[:, np.outer(estimated, estimated)] = _inverse(total / runs).reshape(len(total), -1)
-    return Bound(scenario.id, kind, runs, recording.data.truth.time.copy(), covariance)
+    return Bound(scenario.id, kind, runs, recording.data.truth.time.copy(), covariance, smoothed)
 
 
 def _inverse(matrices: Array) -> Array:

@@ -28,16 +28,17 @@ def register(app: typer.Typer) -> None:
 def _command(
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file; a simulated one.")],
     runs: Annotated[int, typer.Option("--runs", "-n", min=1, help="Seeds over which it is averaged.")] = 12,
+    smoothed: Annotated[bool, typer.Option("--smoothed", help="The bound of smoothed output.")] = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="Write every epoch to this file.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> None:
     """Show the posterior Cramer-Rao bound of a scenario by epoch: clean, flags known, flags unknown (mix)."""
     with session(json, debug) as out:
-        run(out, scenario, runs, csv)
+        run(out, scenario, runs, csv, smoothed)
 
 
-def run(out: Output, name: str, runs: int, csv: Path | None) -> None:
+def run(out: Output, name: str, runs: int, csv: Path | None, smoothed: bool = False) -> None:
     """Compute the three bounds and show them."""
     from estimators.bound import KINDS, bound
     from simnav.scenario import load
@@ -48,13 +49,14 @@ def run(out: Output, name: str, runs: int, csv: Path | None) -> None:
         with out.progress(f"{scenario.id}, {runs} seeds", len(KINDS)) as progress:
             for k, kind in enumerate(KINDS):
                 progress(k, note=kind)
-                bounds.append(bound(scenario, range(runs), kind))
+                bounds.append(bound(scenario, range(runs), kind, smoothed))
             progress(len(KINDS))
     written = None if csv is None else _write(bounds, absolute(csv))
     out.document(
         {
             "scenario": scenario.id,
             "runs": runs,
+            "smoothed": smoothed,
             "bounds": [{**b.summary(), "time": b.time.tolist(), "horizontal": b.horizontal.tolist()} for b in bounds],
             "csv": None if written is None else str(written),
         }
@@ -65,9 +67,10 @@ def run(out: Output, name: str, runs: int, csv: Path | None) -> None:
         for i in np.unique(np.linspace(0, len(time) - 1, _ROWS).astype(int))
     ]
     rows.append(["whole run", *(tables.number(b.horizontal_rms) for b in bounds)])
+    error = "horizontal error of smoothed output" if smoothed else "horizontal error"
     out.print(
         tables.table(
-            f"{scenario.id}: bound on the RMS horizontal error [m], {runs} seeds",
+            f"{scenario.id}: bound on the RMS {error} [m], {runs} seeds",
             ["time [s]", "clean", "flags", "mix"],
             rows,
         )

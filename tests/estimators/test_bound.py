@@ -9,7 +9,7 @@ from scipy.linalg import expm, solve_discrete_are
 from estimators.bound import KINDS, Bound, bound, information
 from simnav.estimator import make
 from simnav.scenario import Scenario, load
-from simnav.scoring import errors
+from simnav.scoring import errors, smoothed_errors
 from simnav.scoring.consistency import GROUPS, nees, nees_band
 from simnav.sensors.faults import GrossError, Multipath, NoiseStep, Outage
 from simnav.sensors.imu import AccelerometerSpec, GyroscopeSpec, ImuSpec
@@ -97,20 +97,40 @@ def test_an_outage_is_no_information_and_multipath_is_a_state():
 
 @pytest.mark.parametrize(("name", "duration"), [("open-sea", 240.0), ("window-bias", 300.0)])
 def test_the_oracle_attains_the_bound_over_50_seeds(name: str, duration: float):
-    """Below 0.97 of the bound something leaks the truth; above 1.08 the oracle wastes what it knows."""
+    """Below 0.97 of the bound something leaks the truth; above 1.08 the oracle wastes what it knows.
+
+    In real time, and smoothed. Smoothed errors last longer, so that 50 runs hold fewer independent ones (150 more runs
+    of ``window-bias`` came to 1.012 of the bound, where the first 50 are at 1.09).
+    """
     scenario = shortened(name, duration)
-    limit = bound(scenario, range(3))
-    error, means = [], []
+    error, means = {False: [], True: []}, {False: [], True: []}
     for seed in range(50):
         recording = simulate(scenario, seed)
-        trial = run_trial(make("oracle"), recording)
-        error.append(errors(trial, recording))
-        means.append([nees(error[-1], trial.covariance, index)[0].mean() / len(index) for index in GROUPS.values()])
-    horizontal = np.sqrt(np.mean(np.sum(np.square(error)[..., :2], axis=-1)))
-    assert 0.97 < horizontal / limit.horizontal_rms < 1.08
-    for index, mean in zip(GROUPS.values(), np.mean(means, axis=0), strict=True):
-        low, high = nees_band(len(index), 50)
-        assert low < mean < high
+        oracle = make("oracle-rts")
+        trial = run_trial(oracle, recording)
+        found = [(errors(trial, recording), trial.covariance)]
+        found.append((smoothed_errors(trial, recording), oracle.smoothed_covariance))
+        for smoothed, (e, covariance) in enumerate(found):
+            error[smoothed].append(e)
+            means[smoothed].append([nees(e, covariance, i)[0].mean() / len(i) for i in GROUPS.values()])
+    for smoothed in (False, True):
+        limit = bound(scenario, range(3), smoothed=smoothed)
+        horizontal = np.sqrt(np.mean(np.sum(np.square(error[smoothed])[..., :2], axis=-1)))
+        low, high = (0.9, 1.12) if smoothed else (0.97, 1.08)
+        assert low < horizontal / limit.horizontal_rms < high
+        for index, mean in zip(GROUPS.values(), np.mean(means[smoothed], axis=0), strict=True):
+            low, high = nees_band(len(index), 50)
+            assert low < mean < high
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_comes_after_helps(kind: str):
+    """The bound of smoothed output is below that of real time, except at the end."""
+    scenario = shortened("open-sea", 40.0)
+    online, smoothed = bound(scenario, [0], kind), bound(scenario, [0], kind, smoothed=True)
+    np.testing.assert_allclose(smoothed.covariance[-1], online.covariance[-1], rtol=1e-9)
+    assert np.all(smoothed.sigma[:-5, :6] < 0.98 * online.sigma[:-5, :6])
+    assert smoothed.summary()["smoothed"]
 
 
 def test_information_is_averaged_before_it_is_inverted():
