@@ -6,6 +6,7 @@ from math import radians
 
 from estimators.models.ship import ShipModel, require_ship_aids
 from estimators.models.ship_chain import ShipChain
+from estimators.solvers.full_graph import FullGraph
 from estimators.solvers.window import WindowEstimator
 from simnav.estimator import register
 from simnav.types import InitialState, Instruments
@@ -58,7 +59,7 @@ class ShipFgo(_ShipGraph):
 
 
 @register("ship-fgo-full")
-class ShipFgoFull(_ShipGraph):
+class ShipFgoFull(FullGraph, _ShipGraph):
     """Full factor graph of a ship without an INS: every epoch since the start is estimated anew at every epoch.
 
     The graph of ``ship-fgo`` without a window (the baseline of paper 002's comparison of run times). It begins each

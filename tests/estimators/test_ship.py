@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from estimators.models.ship import ShipModel
 from estimators.models.ship_points import ShipPoints
 from estimators.ship_ekf import ShipEkf
+from estimators.ship_graphs import ShipFgo
 from simnav import earth, rotation
 from simnav.estimator import UnsuitableScenario
 from simnav.recording import AidStream, Block, Recording
@@ -157,13 +158,12 @@ def stochastic_voyage(seed: int, duration: int, model: ShipModel, sheets: tuple[
 
 
 @pytest.mark.slow
-def test_ship_ekf_is_consistent_on_the_matched_scenario(run_over):
+@pytest.mark.parametrize("kind", [ShipEkf, ShipFgo])
+def test_consistent_on_the_matched_scenario(kind: type, run_over):
     """Average NEES over 50 seeds; 95 % bands, widened by Bonferroni for four epochs of three quantities."""
     sheets = (SHEETS[3], SHEETS[4], Datasheet("gnss", "gnss_position", 1.0, np.array([3.0, 3.0, 6.0])))
-    runs = []
-    for seed in range(50):
-        estimator = ShipEkf()
-        runs.append(run_over(estimator, stochastic_voyage(seed, 200, estimator.model, sheets)))
+    moves = ShipEkf().model
+    runs = [run_over(kind(), stochastic_voyage(seed, 200, moves, sheets)) for seed in range(50)]
     errors, covariances = (np.array(x) for x in zip(*runs, strict=True))
     epochs = [9, 69, 129, 199]
     for part in ([0, 1], [3, 4], [8]):
