@@ -19,11 +19,10 @@ from estimators.adaptations.noise import Scope
 from estimators.adaptations.robust import EquivalentWeights, huber, igg3
 from estimators.adaptations.sage_husa import SageHusa
 from estimators.adaptations.variational_bayes import VariationalBayes
-from estimators.models.base import ErrorModel
 from estimators.models.inertial import InertialModel
-from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, ShipModel
+from estimators.models.suitable import model_for
 from estimators.solvers.kalman import KalmanEstimator
-from simnav.estimator import UnsuitableScenario, register
+from simnav.estimator import register
 from simnav.types import InitialState, Instruments
 
 __all__ = [
@@ -44,19 +43,6 @@ __all__ = [
 ]
 
 
-def model_for(instruments: Instruments) -> ErrorModel:
-    """The inertial model where there is an IMU, else the ship model; UnsuitableScenario where neither will do."""
-    if instruments.imu is not None:
-        if not instruments:
-            raise UnsuitableScenario("the filter needs an instrument beside the IMU; there is none")
-        return InertialModel()
-    if not instruments.of_kind(*HEADING_KINDS):
-        raise UnsuitableScenario("without an IMU the filter needs a compass; there is none")
-    if not instruments.of_kind(*POSITION_KINDS, "gnss_velocity", "dvl", "speed_log"):
-        raise UnsuitableScenario("without an IMU the filter needs GNSS, a terrain fix, a log or a DVL; there is none")
-    return ShipModel()
-
-
 class _Adaptive(KalmanEstimator):
     """A Kalman filter over the model that suits the instruments."""
 
@@ -65,7 +51,7 @@ class _Adaptive(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and another instrument, or what the ship model needs."""
-        self.model = model_for(instruments)
+        self.model = model_for(instruments, self.name)
         super().reset(start, instruments)
 
 
@@ -310,5 +296,5 @@ class Imm(ImmEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and another instrument, or what the ship model needs."""
-        self.model = model_for(instruments)
+        self.model = model_for(instruments, self.name)
         super().reset(start, instruments)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from estimators.models.inertial import InertialModel
+from estimators.models.suitable import require_inertial_aids
 from estimators.solvers.kalman import KalmanEstimator
-from simnav.estimator import UnsuitableScenario, register
+from simnav.estimator import register
 from simnav.types import InitialState, Instruments
 
 __all__ = ["AidedInertial", "Ekf"]
@@ -15,9 +16,7 @@ class AidedInertial(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and at least one aiding instrument."""
-        if instruments.imu is None or not instruments:
-            lacks = "an IMU" if instruments.imu is None else "an instrument beside the IMU"
-            raise UnsuitableScenario(f"it needs an IMU and at least one other instrument; there is not {lacks}")
+        require_inertial_aids(instruments, self.name)
         super().reset(start, instruments)
 
 

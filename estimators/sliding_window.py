@@ -7,12 +7,14 @@ from estimators.adaptations.innovation_based import InnovationBased
 from estimators.adaptations.weighting import Weighting
 from estimators.models.inertial import InertialModel
 from estimators.models.inertial_chain import InertialChain
+from estimators.models.ship_chain import ShipChain
+from estimators.models.suitable import model_for, require_inertial_aids
 from estimators.solvers.full_graph import FullGraph
 from estimators.solvers.window import WindowEstimator
-from simnav.estimator import UnsuitableScenario, register
+from simnav.estimator import register
 from simnav.types import InitialState, Instruments
 
-__all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "InertialWindow", "SwFgo"]
+__all__ = ["AidedWindow", "FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "InertialWindow", "SwFgo"]
 
 
 class InertialWindow(WindowEstimator):
@@ -39,9 +41,35 @@ class InertialWindow(WindowEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and at least one aiding instrument."""
-        if instruments.imu is None or not instruments:
-            lacks = "an IMU" if instruments.imu is None else "an instrument beside the IMU"
-            raise UnsuitableScenario(f"it needs an IMU and at least one other instrument; there is not {lacks}")
+        require_inertial_aids(instruments, self.name)
+        super().reset(start, instruments)
+
+
+class AidedWindow(WindowEstimator):
+    """What adaptive and robust rows share: the inertial model where there is an IMU, else the ship model.
+
+    So each is ``sw-fgo`` or ``ship-fgo`` but for its adaptation or weighting.
+
+    Parameters
+    ----------
+    adaptation, weighting, window, tolerance, iterations
+        As for `WindowEstimator`.
+    """
+
+    def __init__(
+        self,
+        adaptation: Adaptation | None = None,
+        weighting: Weighting | None = None,
+        window: int | None = 20,
+        tolerance: float = 1e-3,
+        iterations: int = 10,
+    ):
+        super().__init__(InertialChain(InertialModel()), adaptation, weighting, window, tolerance, iterations)
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; needs an IMU and another instrument, or what the ship model needs."""
+        model = model_for(instruments, self.name)
+        self.chain = InertialChain(model) if isinstance(model, InertialModel) else ShipChain(model)
         super().reset(start, instruments)
 
 
@@ -102,7 +130,7 @@ class FgoFull(FullGraph, InertialWindow):
 
 
 @register("iae-fgo")
-class IaeFgo(InertialWindow):
+class IaeFgo(AidedWindow):
     """The sliding window with innovation-based estimation of the measurement noise, window after paper 001, eqs. 16-20.
 
     Parameters
@@ -127,11 +155,11 @@ class IaeFgo(InertialWindow):
         iterations: int = 10,
     ):
         noise = InnovationBased("innovation", shortest, longest, low, high, forgetting, lowest=lowest, highest=highest)
-        super().__init__(InertialModel(), noise, window=window, tolerance=tolerance, iterations=iterations)
+        super().__init__(noise, window=window, tolerance=tolerance, iterations=iterations)
 
 
 @register("iae-fgo-fixed")
-class IaeFgoFixed(InertialWindow):
+class IaeFgoFixed(AidedWindow):
     """The sliding window with innovation-based estimation of the measurement noise over a fixed number of innovations.
 
     IAE-FGO-Fix of paper 001.
@@ -159,4 +187,4 @@ class IaeFgoFixed(InertialWindow):
         noise = InnovationBased(
             "innovation", innovations, innovations, forgetting=forgetting, lowest=lowest, highest=highest
         )
-        super().__init__(InertialModel(), noise, window=window, tolerance=tolerance, iterations=iterations)
+        super().__init__(noise, window=window, tolerance=tolerance, iterations=iterations)

@@ -18,6 +18,7 @@ The newest one is the last block of the elimination.
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from math import hypot, isfinite
 
@@ -155,9 +156,10 @@ class WindowEstimator(Estimator):
             cross = covariance @ jacobian.T
             predicted = jacobian @ cross
             chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, covariance, cross))
-            total = predicted + (noise if chosen is None else chosen)
             diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
-            diagnostics[f"nis.{m.instrument}"] = float(residual @ np.linalg.pinv(total) @ residual)
+            with contextlib.suppress(np.linalg.LinAlgError):
+                white = np.linalg.solve(predicted + (noise if chosen is None else chosen), residual)
+                diagnostics[f"nis.{m.instrument}"] = float(residual @ white)
             if chosen is None:
                 flagged.append((m.instrument, m.time))
                 return False
