@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from estimators.adaptations.weighting import Factors, Weighting
 from simnav.types import Array, Instruments
 
-__all__ = ["GradientAdaptive", "Shape", "medians"]
+__all__ = ["GradientAdaptive", "Shape", "middles"]
 
 #: a, c and w_min of eq. 21.
 Shape = tuple[float, float, float]
@@ -46,28 +46,32 @@ Shape = tuple[float, float, float]
 _CHI_MEDIAN = np.array([1.0, 0.674490, 1.177410, 1.538172])
 
 
-def medians(values: Array, group: NDArray[np.intp], groups: int) -> Array:
-    """Median of the values of each group; 0 where it has none.
+def middles(group: NDArray[np.intp], groups: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where the medians of groups are, once the values are ordered by group and value.
 
     Parameters
     ----------
-    values : (M,) array
     group : (M,) array of int
-        Of each value, below ``groups``.
+        Of each value, below ``groups``; M > 0.
     groups : int
+
+    Returns
+    -------
+    lower, upper : (groups,) array of int
+        The median is the mean of the ordered values at both; of a group without values it is any.
 
     Examples
     --------
-    >>> medians(np.array([3.0, 1.0, 2.0, 5.0, 8.0]), np.array([0, 0, 0, 2, 2]), 3)
-    array([2. , 0. , 6.5])
+    >>> values, group = np.array([3.0, 1.0, 2.0, 5.0, 8.0]), np.array([0, 0, 0, 1, 1])
+    >>> lower, upper = middles(group, 2)
+    >>> ordered = values[np.lexsort((values, group))]
+    >>> 0.5 * (ordered[lower] + ordered[upper])
+    array([2. , 6.5])
     """
     counts = np.bincount(group, minlength=groups)
     ends = counts.cumsum()
-    begins = ends - counts
-    ordered = np.append(values[np.lexsort((values, group))], 0.0)
-    middle: Array = 0.5 * (ordered[begins + (counts - 1) // 2] + ordered[begins + counts // 2])
-    middle[counts == 0] = 0.0
-    return middle
+    twice = 2 * ends - counts - 1
+    return np.maximum(twice // 2, 0), np.minimum((twice + 1) // 2, len(group) - 1)
 
 
 class GradientAdaptive(Weighting):
@@ -108,67 +112,55 @@ class GradientAdaptive(Weighting):
         """Begin a run."""
         self._kinds = {name: sheet.kind for name, sheet in instruments.items()}
         self._names: tuple[str, ...] = ()
-        self._scales = np.ones(0)
-        self._motion_scale = 1.0
+        self._group = np.empty(0, np.intp)
+        self._scales = np.ones(1)
 
     def weigh(self, factors: Factors) -> bool:
         """Set the weights of the measurements and of motion."""
-        if factors.names != self._names:
-            self._arrange(factors.names)
-        group = factors.instrument
-        paper = self.preset == "paper"
-        norm = _rows(factors.residual) if paper else factors.norm
-        if paper:
-            self._scales = 1.4826 * medians(norm, group, len(self._names))
+        count = len(factors.weight)
+        if count + len(factors.motion_weight) == 0:
+            return True
+        if factors.iteration == 0 or len(self._group) != count + len(factors.motion_weight):
+            self._arrange(factors)
+        if self.preset == "paper":
+            norm = np.concatenate((_rows(factors.residual), _rows(factors.motion_residual[:, :9])))
         else:
-            consistent = norm / _CHI_MEDIAN[factors.components]
-            self._scales = np.maximum(medians(consistent, group, len(self._names)), 1.0)
-            if len(norm) < self.fewest * len(self._names):
-                self._scales[np.bincount(group, minlength=len(self._names)) < self.fewest] = 1.0
-        # r~^2 / c^2, then a / (1 + r~^2 / c^2)
-        ratio = norm / (self._c * (self._scales + self.epsilon))[group]
-        ratio *= ratio
-        ratio += 1.0
-        np.minimum(np.maximum(self._a[group] / ratio, self._least[group]), 1.0, out=factors.weight)
-        self._weigh_motion(factors)
+            norm = np.concatenate((factors.norm, factors.motion_norm * (3.0 / factors.motion_residual.shape[1]) ** 0.5))
+        scaled = norm * self._kappa
+        ordered = scaled[np.lexsort((scaled, self._group))]
+        self._scales = np.maximum(0.5 * (ordered[self._lower] + ordered[self._upper]), self._floor)
+        self._scales[self._few] = 1.0
+        ratio = norm / (self._shapes[:, 1] * (self._scales + self.epsilon))[self._group]
+        weight = np.minimum(np.maximum(self._a / (1.0 + ratio * ratio), self._least), 1.0)
+        factors.weight[:] = weight[:count]
+        factors.motion_weight[:] = weight[count:]
         return True
 
-    def _weigh_motion(self, factors: Factors) -> None:
-        count, size = factors.motion_residual.shape
-        if count == 0:
-            return
-        a, c, least = self._motion
+    def _arrange(self, factors: Factors) -> None:
+        """Spread the constants over an epoch's factors, motion being one more instrument."""
+        if factors.names != self._names:
+            self._names = factors.names
+            gnss = ("gnss_position", "gnss_velocity")
+            shapes = [self._gnss if self._kinds[n] in gnss else self._other for n in factors.names]
+            self._shapes = np.array([*shapes, self._motion], dtype=np.float64)
+        motions = len(factors.motion_weight)
+        self._group = np.concatenate((factors.instrument, np.full(motions, len(self._names))))
+        self._a, _, self._least = self._shapes[self._group].T
+        groups = len(self._shapes)
+        self._lower, self._upper = middles(self._group, groups)
         if self.preset == "paper":
-            norm = _rows(factors.motion_residual[:, :9])
-            self._motion_scale = 1.4826 * _median(norm)
+            self._kappa, self._floor, fewest = np.full(len(self._group), 1.4826), 0.0, 1
         else:
-            norm = factors.motion_norm * (3.0 / size) ** 0.5
-            # The mean square of n/3 blocks is near 3 for residuals as large as the noise.
-            self._motion_scale = max(_median(norm) / 3.0**0.5, 1.0) if count >= self.fewest else 1.0
-        ratio = norm / (c * (self._motion_scale + self.epsilon))
-        np.minimum(np.maximum(a / (1.0 + ratio * ratio), least), 1.0, out=factors.motion_weight)
-
-    def _arrange(self, names: tuple[str, ...]) -> None:
-        """Spread the constants over the instruments."""
-        self._names = names
-        gnss = ("gnss_position", "gnss_velocity")
-        shapes = [self._gnss if self._kinds[n] in gnss else self._other for n in names]
-        self._a, self._c, self._least = np.array(shapes, dtype=np.float64).reshape(-1, 3).T.copy()
+            self._kappa = 1.0 / np.concatenate((_CHI_MEDIAN[factors.components], np.full(motions, 3.0**0.5)))
+            self._floor, fewest = 1.0, self.fewest
+        self._few = np.bincount(self._group, minlength=groups) < fewest
 
     def diagnostics(self) -> dict[str, float | Array]:
         """``scale.<instrument>`` and ``scale.motion``: s, in sigma or as the preset has it."""
-        scales: dict[str, float | Array] = {f"scale.{n}": s for n, s in zip(self._names, self._scales.tolist())}
-        scales["scale.motion"] = self._motion_scale
-        return scales
+        return {f"scale.{name}": s for name, s in zip((*self._names, "motion"), self._scales.tolist())}
 
 
 def _rows(matrix: Array) -> Array:
     """Euclidean norm of each row."""
     norm: Array = np.sqrt(np.einsum("ij,ij->i", matrix, matrix))
     return norm
-
-
-def _median(values: Array) -> float:
-    ordered = np.sort(values)
-    n = len(ordered)
-    return 0.5 * float(ordered[(n - 1) // 2] + ordered[n // 2])
