@@ -189,11 +189,14 @@ def solve_chain(  # type: ignore[no-untyped-def]
             cross, S, v = (cross1, S1, v1) if m == 1 else ((cross2, S2, v2) if m == 2 else (cross3, S3, v3))
             for a in range(m):
                 for r in range(n):
-                    x = 0.0
-                    for c in range(n):
-                        x += jacobian[i, a, c] * P[c, r]
-                    cross[r, a] = x
-                    crosses[i, a, r] = x
+                    crosses[i, a, r] = 0.0
+                for c in range(n):  # few are not zero
+                    x = jacobian[i, a, c]
+                    if x != 0.0:
+                        for r in range(n):
+                            crosses[i, a, r] += x * P[c, r]
+                for r in range(n):
+                    cross[r, a] = crosses[i, a, r]
             for a in range(m):
                 x = residual[i, a]
                 for c in range(n):
