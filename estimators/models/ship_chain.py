@@ -17,7 +17,17 @@ import numpy as np
 
 from estimators.models.chain import Chain
 from estimators.models.ship import ShipModel
-from estimators.models.ship_kernels import E, N, fill_jacobian, residual_of, sail_step, shift_ship, steps_of
+from estimators.models.ship_kernels import (
+    E,
+    N,
+    decay_of,
+    fill_jacobian,
+    residual_of,
+    sail_step,
+    set_identity,
+    shift_ship,
+    steps_of,
+)
 from simnav.compiled import kernel
 from simnav.earth import radii_scalar
 from simnav.types import Array, InitialState, Instruments
@@ -28,16 +38,16 @@ __all__ = ["ShipChain"]
 @kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1])")
 def _linearise_motion(time, position, x, rate, turn_time, residual, jacobian):  # type: ignore[no-untyped-def]
     count, n = residual.shape
-    p, y = np.empty(3), np.empty(n)
+    p, y, decay = np.empty(3), np.empty(n), np.empty(n)
     for k in range(count):
-        p[:] = position[k]
-        y[:] = x[k]
-        F = jacobian[k]
-        F[:] = 0.0
+        for i in range(3):
+            p[i] = position[k, i]
         for i in range(n):
-            F[i, i] = 1.0
+            y[i] = x[k, i]
+        F = jacobian[k]
+        set_identity(F)
         steps, dt, turning = steps_of(time[k + 1] - time[k], turn_time)
-        decay = np.exp(-rate * dt)
+        decay_of(rate, dt, decay)
         for _ in range(steps):
             sail_step(p, y, F, decay, turning, dt)
         meridian, prime = radii_scalar(sin(p[0]))
@@ -58,7 +68,9 @@ def _linearise_aids(  # type: ignore[no-untyped-def]
         k, s = node[i] - base, instrument[i]
         a, b = residual_of(codes[s], aids[s], position[k], x[k], value[i, 0], value[i, 1])
         residual[i, 0], residual[i, 1], residual[i, 2] = a, b, 0.0
-        jacobian[i] = 0.0
+        for r in range(3):
+            for c in range(x.shape[1]):
+                jacobian[i, r, c] = 0.0
         fill_jacobian(codes[s], aids[s], x[k], jacobian[i])
 
 

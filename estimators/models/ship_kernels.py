@@ -55,6 +55,22 @@ def steps_of(elapsed, turn_time):  # type: ignore[no-untyped-def]
 
 
 @kernel()
+def decay_of(rate, dt, decay):  # type: ignore[no-untyped-def]
+    """Fill in by what the states shrink in a step. (Loops, here and below: they compile faster than expressions.)"""
+    for i in range(rate.size):
+        decay[i] = exp(-rate[i] * dt)
+
+
+@kernel()
+def set_identity(M):  # type: ignore[no-untyped-def]
+    """``M = 1``."""
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            M[i, j] = 0.0
+        M[i, i] = 1.0
+
+
+@kernel()
 def sail(x, decay, turning, dt):  # type: ignore[no-untyped-def]
     """Move x on by a step; return metres north and east, the speed, and cosine and sine of the mean heading."""
     u, turn = x[U], turning * x[R]
@@ -124,10 +140,9 @@ def advance_ship(  # type: ignore[no-untyped-def]
     """
     n = x.size
     steps, dt, turning = steps_of(elapsed, turn_time)
-    decay = np.exp(-rate * dt)
-    transition[:] = 0.0
-    for i in range(n):
-        transition[i, i] = 1.0
+    decay = np.empty(n)
+    decay_of(rate, dt, decay)
+    set_identity(transition)
     for _ in range(steps):
         u, c, s = sail_step(position, x, transition, decay, turning, dt)
         for i in range(n):
@@ -148,7 +163,8 @@ def advance_ship(  # type: ignore[no-untyped-def]
 def move_ships(states, rate, turn_time, elapsed):  # type: ignore[no-untyped-def]
     """Advance (k, n) states by the same motion; their positions are metres."""
     steps, dt, turning = steps_of(elapsed, turn_time)
-    decay = np.exp(-rate * dt)
+    decay = np.empty(rate.size)
+    decay_of(rate, dt, decay)
     for k in range(states.shape[0]):
         for _ in range(steps):
             north, east, _u, _c, _s = sail(states[k], decay, turning, dt)
@@ -319,7 +335,8 @@ def describe_ship(x, covariance, sway, velocity, out):  # type: ignore[no-untype
         Rows and columns 0, 1, 3, 4 and 8 are overwritten.
     """
     n = x.size
-    code, aid = np.array([VELOCITY, -1, -1]), np.zeros(7)
+    code, aid = np.empty(3, dtype=np.int64), np.zeros(7)
+    code[0], code[1], code[2] = VELOCITY, -1, -1
     velocity[0], velocity[1] = reading(code, aid, x)
     G = np.zeros((2, n))
     fill_jacobian(code, aid, x, G)
