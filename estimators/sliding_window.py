@@ -109,6 +109,8 @@ class FgoUnsimplified(InertialWindow):
         As for `SwFgo`.
     """
 
+    slow = True
+
     def __init__(self, window: int = 5, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
         super().__init__(
             InertialModel(calibrate), window=window, tolerance=tolerance, iterations=iterations, every_sample=True
@@ -124,6 +126,8 @@ class FgoFull(FullGraph, InertialWindow):
     tolerance, iterations, calibrate
         As for `SwFgo`.
     """
+
+    slow = True
 
     def __init__(self, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
         super().__init__(InertialModel(calibrate), window=None, tolerance=tolerance, iterations=iterations)

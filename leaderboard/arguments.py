@@ -58,7 +58,9 @@ def _settings(given: Iterable[str]) -> dict[str, str]:
     return values
 
 
-def requests(given: Iterable[str] | None, settings: Sequence[str] | None = None) -> list[EstimatorRequest]:
+def requests(
+    given: Iterable[str] | None, settings: Sequence[str] | None = None, *, quick: Output | None = None
+) -> list[EstimatorRequest]:
     """The estimators that were asked for, all registered ones where none was.
 
     Files are not imported here: whoever runs them does so, in a process of its own where it can.
@@ -69,6 +71,8 @@ def requests(given: Iterable[str] | None, settings: Sequence[str] | None = None)
         As for `split_estimators`.
     settings : sequence of str or None
         ``name=value``; of several estimators each gets those that it has a parameter for.
+    quick : Output or None
+        Where it is given, and none was asked for, the slow ones are left out, and it is told.
 
     Raises
     ------
@@ -78,7 +82,12 @@ def requests(given: Iterable[str] | None, settings: Sequence[str] | None = None)
     from leaderboard.campaign import EstimatorRequest
     from simnav.estimator import describe, make, names
 
-    asked = split_estimators(given) or [(name, {}) for name in names()]
+    asked = split_estimators(given)
+    if not asked:
+        slow = [name for name in names() if describe(name).slow] if quick is not None else []
+        if quick is not None and slow:
+            quick.note(f"simnav: left out of a quick campaign, for their cost: {', '.join(slow)} (-e names them)")
+        asked = [(name, {}) for name in names() if name not in slow]
     common = _settings(settings or ())
     unused = set(common)
     made: dict[str, EstimatorRequest] = {}

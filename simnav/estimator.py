@@ -61,10 +61,14 @@ class Estimator(ABC):
     reference : bool
         True for rows that are told the truth (an oracle); they are marked and not ranked, and
         `reveal` is called before `reset`.
+    slow : bool
+        True for rows that take several milliseconds an epoch or more; a quick campaign leaves them out unless it is
+        asked for them.
     """
 
     name: ClassVar[str] = ""
     reference: ClassVar[bool] = False
+    slow: ClassVar[bool] = False
 
     @abstractmethod
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -139,7 +143,7 @@ class Description:
     file : str
     line : int
         Where the class is defined.
-    reference : bool
+    reference, slow : bool
     parameters : tuple of Parameter
     """
 
@@ -149,6 +153,7 @@ class Description:
     file: str
     line: int
     reference: bool
+    slow: bool
     parameters: tuple[Parameter, ...]
 
 
@@ -239,6 +244,7 @@ def describe(name_or_path: str) -> Description:
         file=file,
         line=line,
         reference=cls.reference,
+        slow=cls.slow,
         parameters=tuple(
             Parameter(p.name, p.default, "" if p.annotation is p.empty else inspect.formatannotation(p.annotation))
             for p in _parameters(cls)
