@@ -76,6 +76,8 @@ class ShipFgoFull(FullGraph, _ShipGraph):
         Of the model, as for ``ship-ekf``.
     """
 
+    slow = True
+
     def __init__(
         self,
         tolerance: float = 1e-3,
