@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.trial import Trial
 
-__all__ = ["fixes", "outage_spans", "run_figure", "true_track"]
+__all__ = ["fixes", "outage_spans", "relative_track", "run_figure", "true_track"]
 
 _POSITION_KINDS = ("gnss_position", "terrain_fix")
 _AXES = (
@@ -38,6 +38,13 @@ def _origin(recording: Recording) -> Array:
 def _track(label: str, position: Array, origin: Array) -> Track:
     ned = relative_position(position, origin)
     return Track(label, ned[:, 1], ned[:, 0])
+
+
+def relative_track(label: str, position: Array, recording: Recording) -> Track:
+    """Track of positions (n, 3) of a run, from its start; the height does not matter."""
+    flat = position.copy()
+    flat[:, 2] = 0.0
+    return _track(label, flat, _origin(recording))
 
 
 def true_track(recording: Recording) -> Track:
@@ -80,7 +87,6 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
     references : sequence of str
         Labels of those that are told the truth.
     """
-    origin = _origin(recording)
     shown = [(label, trial, errors(trial, recording)) for label, trial in trials if len(trial)]
     style = Style((label for label, _, _ in shown), references)
     panels: dict[str, list[Curve]] = {}
@@ -99,9 +105,7 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
             panels[title] = curves
     tracks = []
     for label, trial, _ in shown:
-        position = np.where(trial.estimated[:, :3], trial.position, np.nan)
-        position[:, 2] = 0.0  # the chart is horizontal
-        tracks.append(_track(label, position, origin))
+        tracks.append(relative_track(label, np.where(trial.estimated[:, :3], trial.position, np.nan), recording))
     note = f", {recording.note}" if recording.note else ""
     return run_chart(
         true_track(recording),

@@ -228,6 +228,7 @@ def campaign(
 def leaderboard_(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the site.")] = Path("site"),
+    papers: Annotated[Path, typer.Option(help="What 'simnav reproduce' wrote; gets pages.")] = Path("reproduced"),
     workers: Workers = 2,
     json: Json = False,
     debug: Debug = False,
@@ -236,7 +237,7 @@ def leaderboard_(
     with session(json, debug) as out:
         from leaderboard import monte_carlo
 
-        out.code = monte_carlo.leaderboard(out, results, output, workers)
+        out.code = monte_carlo.leaderboard(out, results, output, workers, papers)
 
 
 @app.command()

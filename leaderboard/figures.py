@@ -31,8 +31,15 @@ __all__ = [
     "dots",
     "error_cdf",
     "error_over_time",
+    "figure",
+    "frame_errors",
+    "legend_below",
+    "plain_log_ticks",
     "run_chart",
     "save",
+    "shade",
+    "styled",
+    "time_unit",
     "trajectory",
 ]
 
@@ -213,7 +220,8 @@ def figure(width: float, height: float) -> Figure:
         return Figure(figsize=(width, height), layout="constrained")
 
 
-def _styled() -> Any:
+def styled() -> Any:
+    """The house style, for the time of a ``with`` block."""
     import matplotlib as mpl
 
     return mpl.rc_context(_RC)
@@ -240,7 +248,7 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     written = []
-    with _styled():
+    with styled():
         FigureCanvasAgg(fig)
         layout = fig.get_layout_engine()
         if layout is not None:
@@ -293,7 +301,7 @@ def trajectory(
     title: str = "",
 ) -> Figure:
     """Chart of one run: truth, fixes and estimates. The frame is the truth's; what diverges leaves it."""
-    with _styled():
+    with styled():
         width, height = _frame(truth)
         fig = figure(7.2, min(max(5.4 * height / width, 3.0), 7.5))
         _chart(fig.add_subplot(), truth, tracks, style, fixes or {}, title)
@@ -356,13 +364,13 @@ def error_over_time(
         Shaded [s].
     title : str
     """
-    with _styled():
+    with styled():
         fig = figure(7.6, 1.0 + 2.15 * len(panels))
         axes = np.atleast_1d(fig.subplots(len(panels), 1, sharex=True))
         longest = max((float(b.time[-1]) for bands in panels.values() for b in bands if len(b.time)), default=1.0)
-        unit, factor = _time_unit(longest)
+        unit, factor = time_unit(longest)
         for ax, (label, bands) in zip(axes, panels.items(), strict=True):
-            _shade(ax, outages, factor, named=ax is axes[0])
+            shade(ax, outages, factor, named=ax is axes[0])
             floor = math.inf
             for band in sorted(bands, key=lambda b: style.order(b.label), reverse=True):
                 every = max(1, -(-len(band.time) // _POINTS))
@@ -378,13 +386,13 @@ def error_over_time(
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
         axes[0].set_title(title)
         axes[-1].set_xlabel(f"Time [{unit}]")
-        _legend_below(fig, axes[0])
+        legend_below(fig, axes[0])
     return fig
 
 
 def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "") -> Figure:
     """Share of all epochs of all runs whose error is below x; ``label`` names x, with its unit."""
-    with _styled():
+    with styled():
         fig = figure(7.0, 3.8)
         ax = fig.add_subplot()
         low, high = math.inf, 0.0
@@ -416,7 +424,7 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
         ax.set_xscale("log")
         if high > 0.0 and math.isfinite(low):
             ax.set_xlim(max(low, 1e-6 * high) * 0.8, high * 1.15)
-        _plain_log_ticks(ax.xaxis)
+        plain_log_ticks(ax.xaxis)
         ax.set(xlabel=label, ylabel="Share of epochs [%]", ylim=(0.0, 101.0), title=title)
         ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
     return fig
@@ -424,7 +432,7 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
 
 def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log: bool = True) -> Figure:
     """One line an estimator: the runs as faint points, the figure with its interval in front."""
-    with _styled():
+    with styled():
         fig = figure(7.6, 0.9 + 0.34 * max(len(rows), 1))
         ax = fig.add_subplot()
         for y, row in enumerate(rows):
@@ -441,7 +449,7 @@ def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log:
                     mfc=PAPER if row.hollow else colour, zorder=4)  # fmt: skip
         if log and any(math.isfinite(r.value) and r.value > 0 for r in rows):
             ax.set_xscale("log")
-            _plain_log_ticks(ax.xaxis)
+            plain_log_ticks(ax.xaxis)
         names = [f"{r.label}  {r.note}".rstrip() for r in rows]
         ax.set_yticks(range(len(rows)), names)
         ax.set_ylim(len(rows) - 0.4, -0.6)
@@ -485,7 +493,7 @@ def run_chart(
     title : str
     """
     right = {**errors, **(diagnostics or {})}
-    with _styled():
+    with styled():
         fig = figure(13.0, max(5.0, 1.0 + 1.45 * len(right)))
         grid = fig.add_gridspec(max(len(right), 1), 2, width_ratios=(1.0, 1.15))
         _chart(fig.add_subplot(grid[:, 0]), truth, tracks, style, fixes or {}, title)
@@ -493,12 +501,12 @@ def run_chart(
         chart.set_anchor("N")
         chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, borderaxespad=0.0)
         longest = max((float(c.time[-1]) for cs in right.values() for c in cs if len(c.time)), default=1.0)
-        unit, factor = _time_unit(longest)
+        unit, factor = time_unit(longest)
         first: Axes | None = None
         for row, (label, curves) in enumerate(right.items()):
             ax = fig.add_subplot(grid[row, 1], sharex=first)
             first = first or ax
-            _shade(ax, outages, factor, named=row == 0)
+            shade(ax, outages, factor, named=row == 0)
             for c in curves:
                 colour = style.colour(c.label)
                 ax.plot(c.time * factor, c.values, color=colour, ls=style.line(c.label), lw=1.1, label=c.label)
@@ -506,7 +514,7 @@ def run_chart(
                     for sign in (1.0, -1.0):
                         ax.plot(c.time * factor, sign * c.bound, color=colour, lw=0.8, ls=(0, (3, 2)), alpha=0.75)
             if label in errors:
-                _frame_errors(ax, curves)
+                frame_errors(ax, curves)
                 ax.axhline(0.0, color=GREY, lw=0.6, zorder=0.5)
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
             ax.tick_params(labelbottom=row == len(right) - 1)
@@ -517,7 +525,7 @@ def run_chart(
     return fig
 
 
-def _frame_errors(ax: Axes, curves: Sequence[Curve]) -> None:
+def frame_errors(ax: Axes, curves: Sequence[Curve]) -> None:
     """One estimator that diverges must not flatten the others: beyond 30 x the best, it leaves the frame."""
     spans = [float(np.nanmax(np.abs(c.values))) for c in curves if np.isfinite(c.values).any()]
     bounds = [
@@ -534,7 +542,8 @@ def _frame_errors(ax: Axes, curves: Sequence[Curve]) -> None:
 # ------------------------------------------------------------------------------------------------
 
 
-def _time_unit(longest: float) -> tuple[str, float]:
+def time_unit(longest: float) -> tuple[str, float]:
+    """Unit that suits a time axis up to ``longest`` [s], and the factor to it."""
     if longest > 3.0 * 3600.0:
         return "h", 1.0 / 3600.0
     return ("min", 1.0 / 60.0) if longest > 600.0 else ("s", 1.0)
@@ -553,7 +562,8 @@ def _percentiles(values: Array, levels: Sequence[float]) -> Array:
     return result
 
 
-def _shade(ax: Axes, outages: Sequence[tuple[float, float, str]], factor: float, *, named: bool) -> None:
+def shade(ax: Axes, outages: Sequence[tuple[float, float, str]], factor: float, *, named: bool) -> None:
+    """Shade outages (start, end [s], name), and name them at the top."""
     last = -math.inf
     for start, end, name in sorted(outages):
         ax.axvspan(start * factor, end * factor, color=SHADE, lw=0, zorder=0)
@@ -567,10 +577,10 @@ def _log_scale(ax: Axes, floor: float) -> None:
     ax.set_yscale("log")
     if math.isfinite(floor) and floor > 0.0:
         ax.set_ylim(bottom=0.5 * floor)
-    _plain_log_ticks(ax.yaxis)
+    plain_log_ticks(ax.yaxis)
 
 
-def _plain_log_ticks(axis: Any) -> None:
+def plain_log_ticks(axis: Any) -> None:
     """Powers of ten as 0.1, 1, 10, 100, 1k; more ticks where the range is short."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -588,7 +598,8 @@ def _plain_log_ticks(axis: Any) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def _legend_below(fig: Figure, ax: Axes) -> None:
+def legend_below(fig: Figure, ax: Axes) -> None:
+    """One legend for all panels, from one of them."""
     handles, labels = ax.get_legend_handles_labels()
     if handles:
         fig.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=min(len(labels), 5))

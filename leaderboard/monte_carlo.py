@@ -124,14 +124,14 @@ def campaign(
     return 0 if any(r.status == "ok" for r in results) else FAILED
 
 
-def leaderboard(out: Output, folder: Path, output: Path, workers: int) -> int:
+def leaderboard(out: Output, folder: Path, output: Path, workers: int, papers: Path | None = None) -> int:
     """Show the ranking and write the site; returns the exit code."""
     from leaderboard.site import build
 
     results = _load(absolute(folder), series=True)
     ranking = _rank(results)
     with out.progress("site") as progress:
-        index = build(results, ranking, output, progress=progress, workers=workers)
+        index = build(results, ranking, output, progress=progress, workers=workers, papers=papers)
     out.document({"site": str(index), "runs": len(results), "failed": _failures(results), "ranking": ranking.to_dict()})
     out.print(ranking_table(ranking, results))
     _print_failures(out, results)

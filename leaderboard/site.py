@@ -24,6 +24,7 @@ import numpy as np
 from leaderboard import export, tables
 from leaderboard.console import UserError
 from leaderboard.figures import Dot, Style, dots
+from leaderboard.pages import STATIC, TEMPLATES, environment
 from leaderboard.ranking_table import (
     SCORE_AXIS,
     SCORE_CAPTION,
@@ -35,6 +36,7 @@ from leaderboard.ranking_table import (
     ratio,
     sortable,
 )
+from leaderboard.reproduce import page as reproduction
 from leaderboard.site_figures import catalogued, scenario_figures, write_figure
 from leaderboard.summary import NO_TRIAL, Interval, Runs, group
 
@@ -44,11 +46,10 @@ if TYPE_CHECKING:
 
 __all__ = ["build"]
 
-_TEMPLATES = Path(__file__).parent / "templates"
 _WORTH_PROCESSES = 3  # scenarios
 _STALE = 3600.0  # a build of this age runs no more [s]
 _NAME_OF_LABEL = re.compile(r"[(\[ ]")  # a label is a name, and its parameters in brackets
-_STATIC = ("style.css", "tables.js", "results.schema.json")
+_STATIC = (*STATIC, "results.schema.json")
 _DEGREES = math.degrees(1.0)
 
 #: Columns of score tables: score, heading, factor, how it is written ("": with interval), whether small is best.
@@ -77,6 +78,7 @@ def build(
     command: str | None = None,
     progress: Callable[..., None] | None = None,
     workers: int = 1,
+    papers: Path | None = None,
 ) -> Path:
     """Write the site.
 
@@ -93,6 +95,8 @@ def build(
         Called with (done, total, note=...).
     workers : int
         Processes that draw the figures.
+    papers : Path, optional
+        Folder of ``simnav reproduce``: each paper that is found there gets a page.
 
     Returns
     -------
@@ -113,9 +117,11 @@ def build(
     draft = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent))
     try:
         draft.chmod(0o755)
-        _Site(
+        site = _Site(
             results, ranking, draft, command or reproduce(results), progress or (lambda *_, **__: None), workers
-        ).write()
+        )
+        site.papers = [] if papers is None else reproduction.find(Path(papers))
+        site.write()
         _swap(draft, output)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -202,6 +208,7 @@ class _Site:
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking = ranking.to_dict()
         self.folder, self.command, self.progress, self.workers = folder, command, progress, workers
+        self.papers: list[dict[str, Any]] = []
         self.runs = group(self.results)
         self.rows = ranking_rows(self.ranking, self.results)
         labels = list(
@@ -224,15 +231,7 @@ class _Site:
 
     def write(self) -> None:
         """Write all pages, figures and data."""
-        from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-        pages = Environment(
-            loader=FileSystemLoader(_TEMPLATES),
-            autoescape=True,
-            undefined=StrictUndefined,
-            trim_blocks=True,
-            lstrip_blocks=True,
-        )
+        pages = environment()
         (self.folder / "figures").mkdir()
         generated = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
         shared = {
@@ -240,6 +239,7 @@ class _Site:
             "versions": _versions(),
             "generated": generated,
             "scenarios": self.scenarios,
+            "papers": self.papers,
             "total": len(self.results),
             "command": self.command,
         }
@@ -252,8 +252,10 @@ class _Site:
         for label, estimator in self.estimators.items():
             self._page(pages, "estimator.html", estimator["page"], estimator=self._of_estimator(label), **shared)
         self._page(pages, "index.html", "index.html", **self._index(), **shared)
+        for document in self.papers:
+            reproduction.install(document, self.folder, shared)
         for name in _STATIC:
-            shutil.copyfile(_TEMPLATES / name, self.folder / name)
+            shutil.copyfile(TEMPLATES / name, self.folder / name)
         facts = ("id", "name", "title", "description", "source", "seeds")
         document = export.as_document(
             self.results,

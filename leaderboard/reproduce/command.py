@@ -27,7 +27,7 @@ def _command(
         int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [few: ends within minutes]")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of results, CSV and figures. [reproduced/PAPER]")
+        Path | None, typer.Option("--output", "-o", help="Folder of results, tables, figures, page. [reproduced/PAPER]")
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")] = False,
@@ -41,7 +41,8 @@ def _command(
 def run(out: Output, key: str, runs: int | None, output: Path | None, workers: int) -> None:
     """Reproduce a paper and show it."""
     from leaderboard.campaign import CampaignError
-    from leaderboard.reproduce import figures, paper, report
+    from leaderboard.reproduce import figures, page, paper, report
+    from leaderboard.reproduce.comparison import RULES
     from leaderboard.reproduce.reproduction import reproduce
     from leaderboard.store import StoreError
 
@@ -66,13 +67,17 @@ def run(out: Output, key: str, runs: int | None, output: Path | None, workers: i
             raise
     folder.mkdir(parents=True, exist_ok=True)
     table = report.write_csv(found, folder / f"paper-{key}.csv")
-    drawn = figures.write_figures(found, folder)
-    out.document({**found.to_dict(), "csv": str(table), "figures": [str(p) for p in drawn]})
+    with out.progress("drawing", len(chosen.figures)) as bar:
+        drawn = figures.write_figures(found, folder, lambda done, total, note: bar(done, total, note=note))
+    written = page.write(found, drawn, folder)
+    paths = [d.path for d in drawn if d.path is not None]
+    out.document({**found.to_dict(), "contents": report.contents_rows(found, drawn), "csv": str(table),
+                  "page": str(written), "figures": [str(p) for p in paths]})  # fmt: skip
     out.print(f"Paper {key}: {chosen.title}", f"{chosen.citation}\n")
     for shown in report.paper_tables(found):
         out.print(shown)
+    out.print(report.contents_table(found, drawn))
     for note in chosen.notes:
         out.print(f"note: {note}")
-    out.print(f"{report.summary(found)}; the paper's number: --runs {chosen.full}", f"table:   {table}")
-    for path in drawn:
-        out.print(f"figure:  {path}")
+    out.print(f"rule: {RULES}", f"{report.summary(found)}; the paper's number: --runs {chosen.full}")
+    out.print(f"table:   {table}", f"figures: {len(paths)} as PNG in {folder}", f"page:    {written}")

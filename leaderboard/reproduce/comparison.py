@@ -28,7 +28,19 @@ import numpy as np
 
 from leaderboard.reproduce.paper import Range, Rule
 
-__all__ = ["FEWEST", "GAIN", "TOLERANCE", "VAGUE", "Interval", "Verdict", "judge", "judge_gain", "mean", "mean_ratio"]
+__all__ = [
+    "FEWEST",
+    "GAIN",
+    "RULES",
+    "TOLERANCE",
+    "VAGUE",
+    "Interval",
+    "Verdict",
+    "judge",
+    "judge_gain",
+    "mean",
+    "mean_ratio",
+]
 
 TOLERANCE = 0.25
 GAIN = 1.5
@@ -36,6 +48,16 @@ VAGUE = 0.5
 FEWEST = 3
 
 _LEVEL = 0.95
+
+#: The rule in short, for the command and the pages.
+RULES = (
+    "Intervals are Student's 95 % over the runs. A figure agrees within 25 % of the paper's, or where the paper's "
+    "lies in the "
+    "interval; a bound, where our mean keeps it; a gain, where its sign is certain and the logarithm of its ratio "
+    "within a "
+    "factor of 1.5 of the paper's. Too wide an interval, or fewer than three runs, decide nothing. What differs has "
+    "a note."
+)
 
 
 @dataclass(frozen=True)

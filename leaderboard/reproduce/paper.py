@@ -1,7 +1,8 @@
-"""What is known of a paper: the methods that it compares, their figures, and what follows from them."""
+"""What is known of a paper: the methods that it compares, their figures, what follows from them, and what it draws."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -11,13 +12,50 @@ from leaderboard.reproduce import PAPERS
 from simnav.scenario import Scenario
 from simnav.scenario import load as load_scenario
 
-__all__ = ["Curves", "Gain", "Method", "Paper", "Range", "Row", "Rule", "Table", "Value", "load"]
+__all__ = [
+    "ATTITUDE",
+    "HORIZONTAL",
+    "HORIZONTAL_VELOCITY",
+    "POSITION",
+    "VELOCITY",
+    "Draw",
+    "Figure",
+    "Gain",
+    "Left",
+    "Method",
+    "Paper",
+    "Range",
+    "Row",
+    "Rule",
+    "Table",
+    "Value",
+    "load",
+]
 
 #: A figure, or the two ends of what a paper gives as a range.
 Range = float | tuple[float, float]
 
-#: ``equal``: ours should be the paper's; ``at-most``, ``at-least``: the paper's is a bound.
-Rule = Literal["equal", "at-most", "at-least"]
+#: ``equal``: ours should be the paper's; ``at-most``, ``at-least``: the paper's is a bound; ``beside``: the two are not
+#: of the same thing, and are shown without a verdict.
+Rule = Literal["equal", "at-most", "at-least", "beside"]
+
+#: Of one run: ``track``, ``run`` (series over time). Of all runs: ``spread`` (series again), ``bars``, ``gains``,
+#: ``distribution``.
+Draw = Literal["track", "run", "spread", "bars", "gains", "distribution"]
+
+
+# Panels of figures of one run.
+_NORTH_EAST = {"North error [m]": "north", "East error [m]": "east"}
+_NORTH_EAST_VELOCITY = {"North velocity error [m/s]": "velocity_north", "East velocity error [m/s]": "velocity_east"}
+POSITION: Mapping[str, str] = {**_NORTH_EAST, "Down error [m]": "down"}
+HORIZONTAL: Mapping[str, str] = _NORTH_EAST
+VELOCITY: Mapping[str, str] = {**_NORTH_EAST_VELOCITY, "Down velocity error [m/s]": "velocity_down"}
+HORIZONTAL_VELOCITY: Mapping[str, str] = _NORTH_EAST_VELOCITY
+ATTITUDE: Mapping[str, str] = {
+    "Tilt about north [deg]": "tilt_north",
+    "Tilt about east [deg]": "tilt_east",
+    "Heading error [deg]": "heading",
+}
 
 
 @dataclass(frozen=True)
@@ -31,10 +69,13 @@ class Method:
     rows : tuple of str
         Estimators as typed on the command line (``adkf:factor=two-segment``), the best first: the first that is
         registered is taken.
+    smoothed : bool
+        Its output is the smoothed trajectory: that is what figures of one run show.
     """
 
     name: str
     rows: tuple[str, ...]
+    smoothed: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,33 +140,69 @@ Row = Value | Gain
 
 @dataclass(frozen=True)
 class Table:
-    """Rows that belong together."""
-
-    title: str
-    rows: tuple[Row, ...]
-
-
-@dataclass(frozen=True)
-class Curves:
-    """A figure over time that can be drawn from our runs.
+    """Rows that belong together.
 
     Attributes
     ----------
-    name : str
-        Of the file.
     title : str
-    scenario : str
-    methods : tuple of str
-    series : mapping of str to str
-        Label of each panel -> name of a series of the results (`simnav.scoring.series`), or a diagnostic of the
-        first run with the instrument's true sigma beside it (``sigma_north.gnss``).
+    rows : tuple of Row
+    number : str
+        Of the paper's table or figure that they answer (``Table 3``); empty where they answer its prose.
     """
 
-    name: str
     title: str
+    rows: tuple[Row, ...]
+    number: str = ""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a paper, drawn from our runs.
+
+    Attributes
+    ----------
+    number : str
+        ``Figure 4``; empty for one that the paper does not have.
+    what : str
+        Its title.
+    draw : str
+        How (see `Draw`).
+    scenario : str
+    methods : tuple of str
+        For ``gains`` the first is the one that is compared with each of the others.
+    series : mapping of str to str
+        Label of each panel, with its unit -> what is in it. ``run``: an error (`leaderboard.reproduce.figures.ERRORS`)
+        or a diagnostic (``weight.gnss``; a ``sigma_...`` gets the true one beside it). ``spread``: a series of the
+        results (`simnav.scoring.series`). ``bars``, ``gains``: a measure.
+    part : str
+        Tells several figures of the same number apart.
+    """
+
+    number: str
+    what: str
+    draw: Draw
     scenario: str
     methods: tuple[str, ...]
-    series: Mapping[str, str]
+    series: Mapping[str, str] = field(default_factory=dict)
+    part: str = ""
+
+    @property
+    def name(self) -> str:
+        """Of the file, without its ending.
+
+        >>> Figure("Figure 5", "Errors", "run", "ship-turn", (), part="CTM").name
+        'figure-5-ctm'
+        """
+        return re.sub(r"[^a-z0-9]+", "-", f"{self.number or self.what} {self.part}".lower()).strip("-")
+
+
+@dataclass(frozen=True)
+class Left:
+    """A table or figure of a paper that a simulation cannot show, and why."""
+
+    number: str
+    what: str
+    why: str
 
 
 @dataclass(frozen=True)
@@ -143,7 +220,9 @@ class Paper:
         As many as the paper has, or as settle the rows.
     methods : tuple of Method
     tables : tuple of Table
-    curves : tuple of Curves
+    figures : tuple of Figure
+    left : tuple of Left
+        Together with tables and figures all that the paper has.
     notes : tuple of str
         What the reader has to know of the comparison.
     variants : mapping of str to (str, callable)
@@ -157,7 +236,8 @@ class Paper:
     full: int
     methods: tuple[Method, ...]
     tables: tuple[Table, ...]
-    curves: tuple[Curves, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    left: tuple[Left, ...] = ()
     notes: tuple[str, ...] = ()
     variants: Mapping[str, tuple[str, Callable[[Scenario], Scenario]]] = field(default_factory=dict)
 
@@ -178,14 +258,15 @@ class Paper:
         return load_scenario(name)
 
     def participants(self) -> dict[str, list[str]]:
-        """Scenario -> methods that its rows and curves are about, in the paper's order."""
+        """Scenario -> methods that its rows and figures are about, in the paper's order."""
         wanted: dict[str, set[str]] = {}
         for row in self.rows():
             wanted.setdefault(row.scenario, set()).add(row.method)
             if isinstance(row, Gain):
                 wanted[row.scenario].add(row.than)
-        for curves in self.curves:
-            wanted.setdefault(curves.scenario, set()).update(curves.methods)
+        for figure in self.figures:
+            if figure.draw not in ("run", "track"):  # those are of one run, which is made for them
+                wanted.setdefault(figure.scenario, set()).update(figure.methods)
         return {s: [m.name for m in self.methods if m.name in names] for s, names in wanted.items()}
 
 

@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from leaderboard.reproduce.paper import Curves, Gain, Method, Paper, Row, Table, Value
+from leaderboard.reproduce.paper import (
+    ATTITUDE,
+    POSITION,
+    VELOCITY,
+    Figure,
+    Gain,
+    Left,
+    Method,
+    Paper,
+    Row,
+    Table,
+    Value,
+)
 from simnav.scenario import Scenario
 
 __all__ = ["PAPER"]
@@ -106,10 +118,12 @@ def _without_gross_errors(scenario: Scenario) -> Scenario:
 
 _SCHEMES = {"two segments": "two-segment", "three segments": "three-segment", "exponential": "exponential"}
 
+_COMPARED = ("KF", *(f"ADKF, {words}" for words in _SCHEMES))
+
 PAPER = Paper(
     key="003",
     title="GNSS/SINS/DVL with adaptive robust factors",
-    citation="Zhan, Liu, Jin, Xiang and Wang 2026, PLoS One 21(2) e0342016; Tables 2 and 3",
+    citation="Zhan, Liu, Jin, Xiang and Wang 2026, PLoS One 21(2) e0342016",
     runs=5,
     full=100,
     methods=(
@@ -121,7 +135,7 @@ PAPER = Paper(
         Method("EKF", ("ekf",)),
     ),
     tables=(
-        Table("With gross errors (Table 3)", _table_3()),
+        Table("With gross errors", _table_3(), "Table 3"),
         Table("Claims: ADKF against KF", _claims()),
         Table(
             "Beside them: the KF without feedback, the ADKF as printed, its plain filter",
@@ -132,14 +146,48 @@ PAPER = Paper(
             ),
         ),
         Table("With the disturbance as printed, 0.5 m/s^2 for 500 s, and the instruments of Table 1", _as_printed()),
-        Table("GNSS alone and integrated, undisturbed (Table 2)", _table_2()),
+        Table("GNSS alone and integrated, undisturbed", _table_2(), "Table 2"),
     ),
-    curves=(
-        Curves(
-            "figure-8", "Errors with gross errors", _LAKE,
-            ("KF", "ADKF, two segments", "ADKF, three segments", "ADKF, exponential"),
+    figures=(
+        Figure("Figure 3", "The straight course", "track", _CLEAN, ("GNSS alone", "KF")),
+        Figure(
+            "Figure 4", "Velocity errors of GNSS alone and integrated", "run", _CLEAN, ("GNSS alone", "KF"), VELOCITY
+        ),
+        Figure(
+            "Figure 5", "Position errors of GNSS alone and integrated", "run", _CLEAN, ("GNSS alone", "KF"), POSITION
+        ),
+        Figure("Figure 6", "Attitude errors of KF and ADKF", "run", _LAKE, _COMPARED, ATTITUDE),
+        Figure("Figure 7", "Velocity errors of KF and ADKF", "run", _LAKE, _COMPARED, VELOCITY),
+        Figure("Figure 8", "Position errors of KF and ADKF", "run", _LAKE, _COMPARED, POSITION),
+        Figure(
+            "",
+            "Position RMSE of all forms",
+            "bars",
+            _LAKE,
+            ("KF", *(f"ADKF, {words}" for words in _SCHEMES), *(f"ADKF as printed, {words}" for words in _SCHEMES)),
+            {"East [m]": "east_rmse", "North [m]": "north_rmse", "Up [m]": "vertical_rmse"},
+        ),
+        Figure(
+            "",
+            "Adaptive factors of the GNSS fixes and the DVL",
+            "run",
+            _LAKE,
+            ("ADKF, three segments", "ADKF as printed, three segments"),
+            {"GNSS": "factor.gnss", "DVL": "factor.dvl"},
+        ),
+        Figure(
+            "",
+            "Errors with gross errors, all runs",
+            "spread",
+            _LAKE,
+            _COMPARED,
             {"Horizontal error [m]": "horizontal", "Velocity error [m/s]": "velocity"},
         ),
+    ),
+    left=(
+        Left("Table 1", "Instruments", "settings, not results: uuv-surface has them"),
+        Left("Figure 1", "The algorithm", "a drawing of the method"),
+        Left("Figure 2", "The vehicle", "a photograph"),
     ),
     notes=(
         "The paper's filters are compared on one recorded run; its raw data are not used here.",
@@ -153,4 +201,4 @@ PAPER = Paper(
         "misalignment, whose plain form is EKF in the third table.",
     ),
     variants={_CLEAN: (_LAKE, _without_gross_errors)},
-)  # fmt: skip
+)

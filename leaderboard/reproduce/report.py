@@ -5,20 +5,27 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from leaderboard import tables
+from leaderboard.reproduce.contents import contents
 from leaderboard.reproduce.measures import measure
 from leaderboard.reproduce.paper import Gain, Range
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from leaderboard.reproduce.figures import Drawn
     from leaderboard.reproduce.reproduction import Finding, Reproduction
 
-__all__ = ["paper_tables", "summary", "write_csv"]
+__all__ = ["NUMERIC", "Sheet", "contents_rows", "contents_table", "paper_tables", "sheets", "summary", "write_csv"]
+
+#: Columns that are right-aligned.
+NUMERIC = ("paper", "ours [95 %]", "runs")
+_COLUMNS = ("method", "ours by", "measure", "paper", "ours [95 %]", "runs", "verdict")
 
 
 def summary(found: Reproduction) -> str:
@@ -29,14 +36,37 @@ def summary(found: Reproduction) -> str:
     return f"paper {found.paper.key}, {len(found.seeds)} runs a scenario: {', '.join(counts)}"
 
 
-def paper_tables(found: Reproduction) -> Iterator[Table]:
-    """One table for each of the paper's; methods without either figure are left out.
+@dataclass(frozen=True)
+class Sheet:
+    """One of the paper's tables with our figures, as plain text.
+
+    Attributes
+    ----------
+    title, number : str
+        Ours, and the paper's.
+    columns : list of str
+    rows : list of list of str
+    verdicts : list of str
+        Of each row.
+    notes : list of str
+        Why rows differ, with the letter that the rows refer to; what the marks mean.
+    """
+
+    title: str
+    number: str
+    columns: list[str]
+    rows: list[list[str]]
+    verdicts: list[str]
+    notes: list[str]
+
+
+def sheets(found: Reproduction) -> Iterator[Sheet]:
+    """One for each of the paper's tables; methods without either figure are left out.
 
     Why a row differs is a note below its table.
     """
     for of in found.paper.tables:
         rows = [f for f in found.findings if f.table == of.title and (f.verdict != "absent" or f.row.paper is not None)]
-        columns = ["method", "ours by", "measure", "paper", "ours [95 %]", "runs", "verdict"]
         whys = list(dict.fromkeys(f.why for f in rows if f.why and f.verdict != "absent"))
         several = len({f.row.scenario for f in rows}) > 1
         cells, before = [], ""
@@ -46,13 +76,42 @@ def paper_tables(found: Reproduction) -> Iterator[Table]:
             who = ["", ""] if same else [name, _by(f)]
             cells.append([*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys)])
             before = name
-        strong = [i for i, f in enumerate(rows) if f.verdict == "differs"]
-        dim = [i for i, f in enumerate(rows) if f.verdict in ("absent", "ours")]
         notes = [f"({chr(ord('a') + i)}) {why}" for i, why in enumerate(whys)]
+        if any(not isinstance(f.row, Gain) and f.row.rule == "beside" for f in rows):
+            notes.insert(0, "° of other data than ours: beside it, without a verdict")
         if any(f.row.derived and f.row.paper is not None for f in rows):
             notes.insert(0, "~ follows from other figures of the paper, or from its prose")
-        yield tables.table(of.title, columns, cells, numeric=["paper", "ours [95 %]", "runs"], strong=strong, dim=dim,
-                           caption="\n".join(notes) or None)  # fmt: skip
+        yield Sheet(of.title, of.number, list(_COLUMNS), cells, [f.verdict for f in rows], notes)
+
+
+def paper_tables(found: Reproduction) -> Iterator[Table]:
+    """The sheets as tables for the console."""
+    for sheet in sheets(found):
+        strong = [i for i, v in enumerate(sheet.verdicts) if v == "differs"]
+        dim = [i for i, v in enumerate(sheet.verdicts) if v in ("absent", "ours")]
+        title = f"{sheet.number}: {sheet.title}" if sheet.number else sheet.title
+        yield tables.table(title, sheet.columns, sheet.rows, numeric=NUMERIC, strong=strong, dim=dim,
+                           caption="\n".join(sheet.notes) or None)  # fmt: skip
+
+
+def contents_table(found: Reproduction, drawn: Sequence[Drawn]) -> Table:
+    """What the paper has, and where ours is, or why not."""
+    rows = [[row["number"], row["what"], row["where"]] for row in contents_rows(found, drawn)]
+    dim = [i for i, item in enumerate(contents(found.paper)) if not item.shown]
+    return tables.table("What the paper has, and where ours is", ["paper", "what", "ours, or why not"], rows, dim=dim)
+
+
+def contents_rows(found: Reproduction, drawn: Sequence[Drawn]) -> list[dict[str, str]]:
+    """The list of `contents_table`: number, what, where."""
+    missing = {f"{d.figure.name}.png": d.missing for d in drawn if d.path is None}
+    rows = []
+    for item in contents(found.paper):
+        places = []
+        for place in item.shown:
+            why = f" (not there yet: {', '.join(missing[place])})" if missing.get(place) else ""
+            places.append(f"{place}{why}")
+        rows.append({"number": item.number, "what": item.what, "where": "; ".join(places) or f"not shown: {item.why}"})
+    return rows
 
 
 def _method(f: Finding) -> str:
@@ -75,7 +134,7 @@ def _paper(f: Finding) -> str:
     mark = "~ " if f.row.derived else ""
     if isinstance(f.row, Gain):
         return mark + tables.percent(f.row.paper)
-    sign = {"at-most": "≤ ", "at-least": "≥ ", "equal": ""}[f.row.rule]
+    sign = {"at-most": "≤ ", "at-least": "≥ ", "equal": "", "beside": "° "}[f.row.rule]
     return mark + sign + _figure(f.row.paper)
 
 

@@ -33,8 +33,8 @@ class Finding:
     ours : Interval or None
         In the unit of the measure; for a `Gain` the ratio. None where there is nothing.
     verdict : str
-        ``agrees``, ``differs``, ``undecided``; ``ours`` where the paper has no figure; ``absent`` where a method is not
-        registered; ``failed`` or ``unsuitable``.
+        ``agrees``, ``differs``, ``undecided``; ``ours`` where the paper has no figure, or none to judge by; ``absent``
+        where a method is not registered; ``failed`` or ``unsuitable``.
     why : str
         A sentence, or empty where the row agrees.
     estimators : tuple of str
@@ -180,7 +180,7 @@ def reproduce(
         if found:
             told = None if progress is None else _told(progress, name)
             run_campaign([scenario], list(found.values()), seeds, folder, workers=workers, progress=told)
-            loaded = load(folder, series=bool(paper.curves))
+            loaded = load(folder, series=bool(paper.figures))
             results += [r for r in loaded if r.scenario == scenario.id and r.estimator in found and r.seed in seeds]
     by: dict[tuple[str, str], list[Result]] = {}
     for result in results:
@@ -240,7 +240,7 @@ def find(
         ours = mean(values[0].values())
         if math.isnan(ours.value):
             return Finding(table, row, None, "unsuitable", f"{names[0]} does not give it", names, failed)
-        if row.paper is None:
+        if row.paper is None or row.rule == "beside":
             return Finding(table, row, ours, "ours", "", names, failed)
         verdict = judge(ours, row.paper, row.rule)
         why = {-1: row.lower, 1: row.higher}

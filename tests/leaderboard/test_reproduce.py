@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import math
 import os
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from leaderboard.cli import app
+from leaderboard.figures import Style
 from leaderboard.reproduce import PAPERS, paper_001
 from leaderboard.reproduce import paper as papers
 from leaderboard.reproduce.comparison import Interval, judge, judge_gain, mean, mean_ratio
+from leaderboard.reproduce.contents import contents
+from leaderboard.reproduce.drawing import Bar, bars, broken
+from leaderboard.reproduce.figures import ERRORS
 from leaderboard.reproduce.measures import measure, value_of
-from leaderboard.reproduce.paper import Curves, Gain, Method, Paper, Table, Value
+from leaderboard.reproduce.page import find as find_pages
+from leaderboard.reproduce.paper import Figure, Gain, Left, Method, Paper, Table, Value
 from leaderboard.reproduce.report import paper_tables, summary, write_csv
 from leaderboard.reproduce.reproduction import Reproduction, find, find_method
 from leaderboard.result import Result
 from simnav.scenario import load
+from simnav.scoring import SCORES
 
+ROOT = Path(__file__).parents[2]
 ALL = [papers.load(key) for key in PAPERS]
 
 
@@ -171,6 +181,8 @@ def test_what_is_not_there_is_said():
     f = found(Gain("pond", "A", "C", "north_rmse", 0.3), runs_of("a", [1.0] * 3))
     assert (f.verdict, f.why) == ("absent", "not there yet: C")
     assert found(Value("pond", "A", "north_rmse"), runs_of("a", [1.0] * 3)).verdict == "ours"
+    beside = Value("pond", "A", "north_rmse", 9.0, rule="beside", lower="never said")
+    assert (found(beside, runs_of("a", [1.0] * 3)).verdict, found(beside, runs_of("a", [1.0] * 3)).why) == ("ours", "")
 
 
 def test_failures_are_never_dropped():
@@ -216,11 +228,48 @@ def test_every_row_can_be_filled(paper):
             assert measure(row.than_score)
         if isinstance(row.paper, tuple):
             assert row.paper[0] < row.paper[1]
-    for curves in paper.curves:
-        assert set(curves.methods) <= methods
     scenarios = [paper.scenario(name) for name in paper.participants()]
     assert len({s.id for s in scenarios}) == len(scenarios)
     assert 3 <= paper.runs <= paper.full
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_every_figure_can_be_drawn(paper):
+    methods, scores = {m.name for m in paper.methods}, {*SCORES, "position_rmse", "peak_memory"}
+    for figure in paper.figures:
+        assert set(figure.methods) <= methods
+        assert paper.scenario(figure.scenario)
+        known = {
+            "run": lambda name: name in ERRORS or "." in name,
+            "spread": {"horizontal", "vertical", "north", "east", "velocity", "heading"}.__contains__,
+            "bars": scores.__contains__,
+            "gains": scores.__contains__,
+        }.get(figure.draw)
+        assert bool(figure.series) == (known is not None)
+        assert known is None or all(known(name) for name in figure.series.values()), figure.number
+    names = [f.name for f in paper.figures]
+    assert len(set(names)) == len(names)
+
+
+# Tables and figures, as the papers count them.
+COUNTS = {"000": (3, 11), "001": (3, 5), "002": (4, 15), "003": (3, 8), "004": (2, 13)}
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_every_table_and_figure_of_a_paper_has_its_place(paper):
+    tables, figures = COUNTS[paper.key]
+    items = contents(paper)
+    assert [i.number for i in items] == [
+        *(f"Table {k + 1}" for k in range(tables)),
+        *(f"Figure {k + 1}" for k in range(figures)),
+    ]
+    for item in items:
+        assert bool(item.shown) != bool(item.why), item.number
+    # docs/papers.md lists them all, in the same words.
+    text = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8")
+    for item in items:
+        where = "; ".join(item.shown).replace("table '", "the table '") if item.shown else f"not shown: {item.why}"
+        assert f"| {item.number} | {item.what} | {where} |" in text, f"paper {paper.key}: {item.number}"
 
 
 @pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
@@ -319,13 +368,17 @@ class Fake(Estimator):
 '''
 
 
+NUMBERS = itertools.count()
+
+
 @pytest.fixture
 def tiny(tmp_path, monkeypatch):
     """A paper about a scenario and estimators in files."""
     monkeypatch.chdir(tmp_path)
     scenario, estimator = tmp_path / "pond.toml", tmp_path / "fake.py"
     scenario.write_text(POND)
-    estimator.write_text(FAKE)
+    # The process remembers names: each test needs its own.
+    estimator.write_text(FAKE.replace('"fake"', f'"fake-{next(NUMBERS)}"'))
     where = str(scenario)
     paper = Paper(
         key="001",
@@ -348,14 +401,22 @@ def tiny(tmp_path, monkeypatch):
                     Value(where, "Future", "sigma_east_rmse"),
                     Value(where, "Wrong", "horizontal_rmse"),
                 ),
+                "Table 1",
             ),
             Table("Claims", (Gain(where, "Wrong", "Right", "horizontal_rmse", 0.5, lower="they are the same"),)),
         ),
-        curves=(
-            Curves("errors", "Errors", where, ("Right", "Wrong"), {"Error [m]": "horizontal"}),
-            Curves("sigma", "Sigma", where, ("Right", "Wrong", "Future"), {"Sigma [m]": "sigma_north.gnss"}),
-            Curves("nothing", "Nothing", where, ("Future",), {"Error [m]": "horizontal"}),
+        figures=(
+            Figure("Figure 1", "Errors", "spread", where, ("Right", "Wrong"), {"Error [m]": "horizontal"}),
+            Figure("Figure 2", "Sigma", "run", where, ("Right", "Wrong", "Future"), {"Sigma": "sigma_north.gnss"}),
+            Figure("Figure 2", "Errors", "run", where, ("Right",), {"North": "north", "All": "position"}, part="b"),
+            Figure("Figure 3", "Nothing", "spread", where, ("Future",), {"Error [m]": "horizontal"}),
+            Figure("Figure 4", "Tracks", "track", where, ("Right",)),
+            Figure("Figure 4", "Route", "track", where, (), part="route"),
+            Figure("Figure 5", "Sigma by method", "bars", where, ("Right", "Wrong"), {"Sigma": "sigma_north_rmse"}),
+            Figure("Figure 6", "Gain", "gains", where, ("Wrong", "Right"), {"Gain [%]": "horizontal_rmse"}),
+            Figure("", "Distribution", "distribution", where, ("Right",)),
         ),
+        left=(Left("Figure 7", "The pond", "a photograph"),),
         notes=("One note.",),
     )
     monkeypatch.setattr("leaderboard.reproduce.paper.load", lambda key: paper)
@@ -386,7 +447,24 @@ def test_the_command(tiny):
         rows = list(csv.DictReader(file))
     assert [r["verdict"] for r in rows] == verdicts
     assert float(rows[1]["ours"]) == 2.0
-    assert [os.path.basename(p) for p in document["figures"]] == ["errors.png", "sigma.png"]
+    assert [os.path.basename(p) for p in document["figures"]] == [
+        "figure-1.png", "figure-2.png", "figure-2-b.png", "figure-4.png", "figure-4-route.png", "figure-5.png",
+        "figure-6.png", "distribution.png",
+    ]  # fmt: skip
+    assert [(c["number"], c["where"]) for c in document["contents"]] == [
+        ("Table 1", "table 'Sigma'"),
+        ("Figure 1", "figure-1.png"),
+        ("Figure 2", "figure-2.png; figure-2-b.png"),
+        ("Figure 3", "figure-3.png (not there yet: Future)"),
+        ("Figure 4", "figure-4.png; figure-4-route.png"),
+        ("Figure 5", "figure-5.png"),
+        ("Figure 6", "figure-6.png"),
+        ("Figure 7", "not shown: a photograph"),
+    ]
+    page = Path(document["page"]).read_text(encoding="utf-8")
+    for text in ("Tiny", "it is told", "One note.", "figure-2-b.png", "a photograph", "not there yet: Future"):
+        assert text in page
+    assert "index.html" not in page  # it stands alone
     for path in document["figures"]:
         with open(path, "rb") as file:
             assert file.read(8) == b"\x89PNG\r\n\x1a\n"
@@ -399,6 +477,46 @@ def test_the_command(tiny):
     fewer = json.loads(call("001", "--workers", "1", "--output", "out", "--json", "-n", "2").stdout)
     assert fewer["rows"][1]["runs"] == 2
     assert fewer["rows"][1]["verdict"] == "undecided"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
+def test_the_site_shows_what_was_reproduced(tiny):
+    assert call("001", "--workers", "1", "--output", "reproduced/001", "-n", "2").exit_code == 0
+    site = CliRunner().invoke(app, ["leaderboard", "reproduced/001/results", "--workers", "1"])
+    assert site.exit_code == 0, site.output
+    page = Path("site/paper-001.html").read_text(encoding="utf-8")
+    shown = re.findall(r'<img src="([^"]+)"', page)
+    assert len(shown) == 8
+    assert all((Path("site") / name).is_file() for name in shown)
+    assert 'href="paper-001.html"' in Path("site/index.html").read_text(encoding="utf-8")
+    assert 'href="index.html"' in page
+    # One that is damaged is left out.
+    (Path("reproduced") / "001" / "figure-1.png").unlink()
+    assert find_pages(Path("reproduced")) == []
+    assert CliRunner().invoke(app, ["leaderboard", "reproduced/001/results", "--workers", "1"]).exit_code == 0
+    assert not Path("site/paper-001.html").exists()
+
+
+def test_a_curve_is_broken_where_nothing_was_measured():
+    time = np.arange(20.0)
+    values = np.where((time > 5.0) & (time < 14.0), np.nan, time)
+    t, v = broken(time, values)
+    assert np.isnan(v).sum() == 1
+    assert t[np.isnan(v)] == 5.0
+    sparse = np.where(time % 3.0 == 0.0, time, np.nan)  # every third epoch is no gap
+    assert np.isfinite(broken(time, sparse)[1]).all()
+
+
+def test_bars_show_the_papers_figure():
+    of = [Bar("A", 2.0, 1.5, 2.5, [1.9, 2.1], (3.0, 3.0)), Bar("B", 1.0, math.nan, math.nan, [1.0], (0.5, 1.5))]
+    (axes,) = bars({"Error [m]": of}, Style(["A", "B"])).axes
+    xs = [line.get_xdata() for line in axes.lines]
+    assert any(np.array_equal(x, [3.0]) for x in xs)  # the paper's figure
+    assert any(np.array_equal(x, [0.5, 1.5]) for x in xs)  # its range
+    assert any(np.array_equal(x, [1.5, 2.5]) for x in xs)  # our interval
+    assert axes.get_xscale() == "linear"
+    wide = [Bar("A", 1.0, 1.0, 1.0, []), Bar("B", 5000.0, 5000.0, 5000.0, [])]
+    assert bars({"Error [m]": wide}, Style(["A", "B"])).axes[0].get_xscale() == "log"
 
 
 def test_mistakes_get_a_sentence(tmp_path, monkeypatch):

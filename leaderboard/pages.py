@@ -1,0 +1,28 @@
+"""What all pages have in common: templates and the files beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+__all__ = ["STATIC", "TEMPLATES", "environment"]
+
+TEMPLATES = Path(__file__).parent / "templates"
+#: Files that every page needs beside it.
+STATIC = ("style.css", "tables.js")
+
+
+def environment() -> Environment:
+    """The templates' environment: what comes from outside is escaped, and a name that is not there is a mistake."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    return Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
