@@ -172,10 +172,10 @@ class ImmEstimator(KalmanEstimator):
         # The chain's stationary distribution
         values, vectors = np.linalg.eig(self.transition.T)
         first = np.real(vectors[:, int(np.argmax(np.real(values)))])
-        self._probability = dict.fromkeys(self._used, first / first.sum())
+        self._probability = dict.fromkeys(self._names, first / first.sum())
         self._report: dict[str, float | Array] = {}
         self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
-        for name in self._used:
+        for name in self._names:
             self._report.update(zip(self._labels[name], map(float, instruments[name].sigma)))
             self._report[f"quiet.{name}"] = float(self._probability[name][0])
 

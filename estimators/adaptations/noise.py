@@ -10,7 +10,7 @@ import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
 from estimators.adaptations.prediction import PredictionTest
-from estimators.solvers.kalman import joseph_update
+from estimators.solvers.joseph import joseph_update
 from simnav.types import KINDS, Array, Instruments
 
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "scaled"]

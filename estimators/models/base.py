@@ -71,6 +71,25 @@ class ErrorModel(ABC):
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
 
+    def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
+        """Use a measurement with its nominal noise: `measure`, the update of the covariance and `correct` in one go.
+
+        Parameters
+        ----------
+        measurement : Measurement
+        covariance : (n, n) array
+            Updated.
+        correction : (n,) array
+            Overwritten with what was added to the state.
+
+        Returns
+        -------
+        (float, float) or None
+            Normalised innovation squared, or -1 where nothing was changed, and the norm of the innovation. None where
+            the model has no faster way than one after the other.
+        """
+        return None
+
     def snapshot(self) -> list[Array]:
         """Copies of what `correct` changes, for `restore`."""
         return [getattr(self, name).copy() for name in self.state]

@@ -30,6 +30,7 @@ from math import atan2, hypot
 import numpy as np
 
 from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov, triad_bias
+from estimators.models.inertial_update import update_inertial
 from estimators.models.measurements import CODES, observe, uncalibrated_noise, white_noise
 from estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
 from simnav.estimator import UnsuitableScenario
@@ -171,6 +172,9 @@ class InertialModel(ErrorModel):
                 CODES[sheet.kind], np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
+        # A subclass that measures or corrects in a way of its own does so step by step.
+        own = type(self).measure is InertialModel.measure and type(self).correct is InertialModel.correct
+        self._fused = set(self.noise) - self.uncalibrated if own else set()
         self._states += self._more_states()
         self.size = _NAV + len(self._states)
         self._jacobians = {name: np.empty((len(noise), self.size)) for name, noise in self.noise.items()}
@@ -237,6 +241,19 @@ class InertialModel(ErrorModel):
         if name in self.uncalibrated:
             noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
         return Linearised(innovation, jacobian, noise)
+
+    def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
+        """Use a measurement with its nominal noise (`estimators.models.inertial_update`)."""
+        name = measurement.instrument
+        if name not in self._fused:
+            return None
+        code, arm, bias_at, scale_at = self.aid_parameters[name]
+        nis, size = update_inertial(
+            code, arm, bias_at, scale_at, np.array(measurement.value, dtype=np.float64), self.position, self.velocity,
+            self.dcm, self.raw_rate, self.bias, self.calibration, self.noise[name], covariance,
+            correction,
+        )  # fmt: skip
+        return nis, size
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

@@ -99,7 +99,7 @@ class FederatedEstimator(KalmanEstimator):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(start, instruments)
-        names = list(self._used)
+        names = self._names
         shares = self.shares or tuple((1.0 - self.master_share) / len(names) for _ in names)
         if len(shares) != len(names):
             raise UnsuitableScenario(f"{len(shares)} shares do not fit {len(names)} aiding sensors: {', '.join(names)}")

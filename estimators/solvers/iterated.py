@@ -23,7 +23,8 @@ import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
 from estimators.models.base import ErrorModel
-from estimators.solvers.kalman import KalmanEstimator, joseph_update
+from estimators.solvers.joseph import joseph_update
+from estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Measurement
 
 __all__ = ["IteratedKalmanEstimator", "left_jacobian"]

@@ -12,15 +12,14 @@ Estimation*, 1977, for Joseph's form.
 
 from __future__ import annotations
 
-from itertools import pairwise
-from math import hypot, sqrt
+from math import hypot
 
 import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
 from estimators.models.base import ErrorModel, Linearised
-from estimators.models.measurements import plausible
-from simnav.compiled import kernel
+from estimators.solvers.admission import Admission
+from estimators.solvers.joseph import joseph_update, project
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
@@ -28,88 +27,9 @@ __all__ = ["KalmanEstimator", "Observation", "joseph_update"]
 
 #: Of m components and n states: innovation (m,), P H' (n, m), H P H' (m, m) and noise (m, m).
 Observation = tuple[Array, Array, Array, Array]
-#: A measurement this much older than the state [s] still counts as of its time.
-LATE = 1e-4
 
-
-@kernel("f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
-def joseph_update(covariance, cross, innovation_covariance, residual, correction):  # type: ignore[no-untyped-def]
-    """Kalman gain, correction and Joseph-form update of the covariance, in place.
-
-    With S = H P H' + R and K = P H' S^-1, Joseph's (I - K H) P (I - K H)' + K R K' is, multiplied out,
-    ``P - K (P H')' - (P H') K' + K S K'``.
-
-    Parameters
-    ----------
-    covariance : (n, n) array
-        P, updated.
-    cross : (n, m) array
-        P H'.
-    innovation_covariance : (m, m) array
-        S.
-    residual : (m,) array
-    correction : (n,) array
-        Overwritten with K times the residual.
-
-    Returns
-    -------
-    float
-        Normalised innovation squared; -1 where S is singular, and nothing is changed.
-    """
-    n, m = cross.shape
-    L = np.zeros((m, m))
-    for i in range(m):
-        for j in range(i + 1):
-            x = innovation_covariance[i, j]
-            for k in range(j):
-                x -= L[i, k] * L[j, k]
-            if i == j:
-                if not x > 1e-14 * innovation_covariance[i, i]:
-                    return -1.0
-                L[i, i] = sqrt(x)
-            else:
-                L[i, j] = x / L[j, j]
-    # Whitened: U = P H' L^-T, so that K S K' = U U', K (P H')' = U U'; Joseph's sum needs the gain K = U L^-1.
-    gain = np.empty((n, m))
-    for r in range(n):
-        for i in range(m):
-            x = cross[r, i]
-            for k in range(i):
-                x -= L[i, k] * gain[r, k]
-            gain[r, i] = x / L[i, i]
-        for i in range(m - 1, -1, -1):
-            x = gain[r, i]
-            for k in range(i + 1, m):
-                x -= L[k, i] * gain[r, k]
-            gain[r, i] = x / L[i, i]
-    nis = 0.0
-    white = np.empty(m)
-    for i in range(m):
-        x = residual[i]
-        for k in range(i):
-            x -= L[i, k] * white[k]
-        white[i] = x / L[i, i]
-        nis += white[i] * white[i]
-    for r in range(n):
-        x = 0.0
-        for i in range(m):
-            x += gain[r, i] * residual[i]
-        correction[r] = x
-    spread = np.empty((n, m))  # K S - P H'
-    for r in range(n):
-        for i in range(m):
-            x = -cross[r, i]
-            for k in range(m):
-                x += gain[r, k] * innovation_covariance[k, i]
-            spread[r, i] = x
-    for r in range(n):
-        for c in range(r + 1):
-            x = covariance[r, c]
-            for i in range(m):
-                x += spread[r, i] * gain[c, i] - gain[r, i] * cross[c, i]
-            covariance[r, c] = x
-            covariance[c, r] = x
-    return nis
+#: Of `KalmanEstimator`: where none is overridden and nothing adapts, the model may use a measurement in one go.
+_HOOKS = ("_observe", "_linearise", "_correct")
 
 
 class KalmanEstimator(Estimator):
@@ -135,11 +55,14 @@ class KalmanEstimator(Estimator):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         self.covariance = self.model.begin(start, instruments)
         self.adaptation.reset(instruments)
-        self._used = {name: -np.inf for name, sheet in instruments.items() if self.model.observes(sheet)}
-        self._kinds = {name: sheet.kind for name, sheet in instruments.items()}
+        self._names = [name for name, sheet in instruments.items() if self.model.observes(sheet)]
+        self._admission = Admission(instruments, self._names)
         self._correction = np.empty(self.model.size)
         self._skipped = 0
-        self._blank = {f"{quantity}.{name}": np.nan for name in self._used for quantity in ("innovation", "nis")}
+        self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
+        self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
+        hooks = all(getattr(type(self), name) is getattr(KalmanEstimator, name) for name in _HOOKS)
+        self._plain = hooks and type(self.adaptation) is Adaptation
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
@@ -147,25 +70,11 @@ class KalmanEstimator(Estimator):
         model.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        aids = measurements.aids
-        if any(before.time > after.time for before, after in pairwise(aids)):
-            aids = sorted(aids, key=_time)
-        for m in aids:
-            used = self._used.get(m.instrument)
-            if used is None:
-                continue
-            if (
-                not model.time - LATE <= m.time <= measurements.time + LATE
-                or m.time <= used
-                or not plausible(self._kinds[m.instrument], m.value)
-            ):
-                self._skipped += 1
-                continue
+        for m in self._admission.admit(measurements, model.time):
             self._propagate(min(m.time, measurements.time))
-            self._used[m.instrument] = m.time
             self._take(m, diagnostics, flagged)
         self._propagate(measurements.time)
-        diagnostics["skipped"] = float(self._skipped)
+        diagnostics["skipped"] = float(self._admission.skipped + self._skipped)
         diagnostics.update(self.adaptation.diagnostics())
         estimate = self._estimate()
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
@@ -185,8 +94,10 @@ class KalmanEstimator(Estimator):
         if linearised is None:
             return None
         residual, jacobian, noise = linearised
-        cross = np.dot(self.covariance, jacobian.T)
-        return residual, cross, np.dot(jacobian, cross), noise
+        d = len(residual)
+        cross, predicted = np.empty((len(self.covariance), d)), np.empty((d, d))
+        project(self.covariance, np.ascontiguousarray(jacobian, dtype=np.float64), cross, predicted)
+        return residual, cross, predicted, noise
 
     def _linearise(self, m: Measurement) -> Linearised | None:
         """The measurement at the present estimate; a hook."""
@@ -198,6 +109,11 @@ class KalmanEstimator(Estimator):
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         """Correct the state by one measurement."""
+        if self._plain:
+            used = self.model.assimilate(m, self.covariance, self._correction)
+            if used is not None:
+                self._note(m, *used, diagnostics)
+                return
         observation = self._observe(m)
         if observation is None:
             self._skipped += 1
@@ -212,13 +128,14 @@ class KalmanEstimator(Estimator):
             for matrix in (self.covariance, cross, predicted):
                 matrix *= inflation
         nis = joseph_update(self.covariance, cross, predicted + chosen, residual, self._correction)
+        if nis >= 0.0:
+            self._correct(self._correction)
+        self._note(m, nis, hypot(*residual.tolist()), diagnostics)
+
+    def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
+        """Note the innovation of a measurement, or that it was skipped (``nis`` below 0)."""
         if nis < 0.0:
             self._skipped += 1
             return
-        self._correct(self._correction)
-        diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
-        diagnostics[f"nis.{m.instrument}"] = nis
-
-
-def _time(m: Measurement) -> float:
-    return m.time
+        innovation, normalised = self._keys[m.instrument]
+        diagnostics[innovation], diagnostics[normalised] = size, nis

@@ -1,0 +1,108 @@
+"""One kernel a measurement, where nothing adapts: the same as one step after the other, and never in a hook's way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimators.adaptations.base import Adaptation
+from estimators.ekf import Ekf
+from estimators.ekf_presets import Ekf23
+from estimators.models.inertial import InertialModel
+from estimators.solvers.joseph import project
+from estimators.solvers.kalman import KalmanEstimator
+from simnav.types import Measurement
+
+
+class StepByStep(Adaptation):
+    """Changes nothing, but might."""
+
+
+def test_projection():
+    rng = np.random.default_rng(1)
+    root = rng.standard_normal((7, 7))
+    P, H = root @ root.T, rng.standard_normal((3, 7)) * (rng.random((3, 7)) < 0.5)
+    cross, predicted = np.empty((7, 3)), np.empty((3, 3))
+    project(P, H, cross, predicted)
+    np.testing.assert_allclose(cross, P @ H.T, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(predicted, H @ P @ H.T, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("row", [Ekf, Ekf23])
+def test_it_is_the_same_filter(recording_of, row: type[KalmanEstimator]):
+    recording = recording_of(2, 60.0)
+    plain, stepwise = row(), row()
+    stepwise.adaptation = StepByStep()
+    for estimator in (plain, stepwise):
+        estimator.reset(recording.start, recording.instruments)
+    taken = [0]
+    assimilate = plain.model.assimilate
+
+    def counting(*args):
+        used = assimilate(*args)
+        taken[0] += used is not None
+        return used
+
+    plain.model.assimilate = counting
+    for packet in recording.steps():
+        a, b = plain.update(packet), stepwise.update(packet)
+        np.testing.assert_allclose(plain._correction, stepwise._correction, rtol=1e-6, atol=1e-9)
+        assert a.diagnostics == pytest.approx(b.diagnostics, rel=1e-6, nan_ok=True)
+        np.testing.assert_allclose(a.position, b.position, rtol=1e-12)
+        np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-8, atol=1e-14)
+    assert taken[0] > 100
+
+
+@pytest.mark.parametrize("hook", ["_observe", "_linearise", "_correct"])
+def test_hooks_are_seen(recording_of, hook: str):
+    seen = []
+
+    def overridden(self, argument):
+        seen.append(argument)
+        return getattr(KalmanEstimator, hook)(self, argument)
+
+    recording = recording_of(2, 5.0)
+    estimator = type("Hooked", (Ekf,), {hook: overridden})()
+    estimator.reset(recording.start, recording.instruments)
+    for packet in recording.steps():
+        estimator.update(packet)
+    assert len(seen) == sum(map(len, (p.aids for p in recording.steps())))
+
+
+@pytest.mark.parametrize("method", ["measure", "correct"])
+def test_a_model_that_does_it_in_its_own_way_is_asked(recording_of, method: str):
+    seen = []
+
+    def own(self, argument):
+        seen.append(argument)
+        return getattr(InertialModel, method)(self, argument)
+
+    recording = recording_of(2, 5.0)
+    estimator = KalmanEstimator(type("Own", (InertialModel,), {method: own})())
+    estimator.reset(recording.start, recording.instruments)
+    for packet in recording.steps():
+        estimator.update(packet)
+    assert seen
+
+
+def test_singular_or_meaningless_measurements_change_nothing(recording_of):
+    """Two noiseless fixes of one place: the second has a singular covariance. And a heading straight up."""
+    recording = recording_of(2, 5.0)
+    estimator = Ekf()
+    estimator.reset(recording.start, recording.instruments)
+    model, P = estimator.model, estimator.covariance
+    name = next(s.name for s in recording.instruments.of_kind("gnss_position"))
+    model.noise[name] = np.zeros((3, 3))
+    m = Measurement(0.0, name, "gnss_position", model.position.copy())
+    dx = np.empty(model.size)
+    P[:3], P[:, :3] = 0.0, 0.0
+    P[6:9], P[:, 6:9] = 0.0, 0.0
+    before, state = P.copy(), model.snapshot()
+    assert model.assimilate(m, P, dx)[0] == -1.0
+    compass = next(s for s in recording.instruments.of_kind("gyrocompass", "magnetic_compass"))
+    upward = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    model.dcm[:] = upward
+    assert model.assimilate(Measurement(0.0, compass.name, compass.kind, np.ones(1)), P, dx)[0] == -1.0
+    np.testing.assert_array_equal(P, before)
+    np.testing.assert_array_equal(model.position, state[0])
+    np.testing.assert_array_equal(model.dcm, upward)
