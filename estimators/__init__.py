@@ -25,6 +25,7 @@ from estimators.ekf_presets import Ekf9, Ekf23
 from estimators.federated import Federated, FederatedNoReset
 from estimators.filterpy_rows import FilterpyUkf
 from estimators.gnss_only import GnssOnly
+from estimators.gtsam_rows import GtsamBatch, GtsamFixedLag, GtsamGnc, GtsamIsam2
 from estimators.inertial import PureInertial
 from estimators.invariant import InvariantEkf
 from estimators.iterated import IteratedEkf
@@ -55,6 +56,10 @@ __all__ = [
     "FilterpyUkf",
     "GatedEkf",
     "GnssOnly",
+    "GtsamBatch",
+    "GtsamFixedLag",
+    "GtsamGnc",
+    "GtsamIsam2",
     "HuberKf",
     "Iae",
     "IaeFgo",

@@ -1,0 +1,235 @@
+"""The inertial navigation graph for GTSAM: nodes, factors, and the conversion of what comes out.
+
+A node is a pose (body to `TangentFrame`), a velocity and a bias, GTSAM's variables x, v, b; between nodes there is one
+`CombinedImuFactor` (`estimators.solvers.gtsam_preintegration`).
+
+Aids: `GPSFactorArm` for GNSS positions. For all others GTSAM has nothing that fits; they are `CustomFactor` with the
+measurement models of `estimators.models.measurements`, of 15 states: biases, scale factor and misalignment of the aids
+count as white noise. Their Jacobian is converted by the frame's error map.
+
+A custom factor calls Python each time that it is linearised. The alternative, a container of the factor as it was
+linearised first (`LinearContainerFactor`), is faster but keeps the error of its first attitude.
+
+Source: F. Dellaert and others, GTSAM 4.3.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from estimators.models.base import Linearised
+from estimators.models.inertial import InertialModel
+from estimators.models.measurements import observe_inertial
+from estimators.solvers.gtsam_preintegration import Preintegration
+from estimators.solvers.tangent_frame import TangentFrame, tangent_state
+from simnav.compiled import kernel
+from simnav.rotation import rpy_from_dcm
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
+
+__all__ = ["InertialGraph", "observe_tangent"]
+
+#: Least initial sigmas of gyroscope [rad/s] and accelerometer [m/s^2] biases: a prior must be invertible.
+LEAST_BIAS = 1e-10, 1e-8
+#: In the order of a node's variables, the place of each component in `InertialModel`'s bias.
+_BIAS_ORDER = [3, 4, 5, 0, 1, 2]
+
+
+@kernel(
+    "i8(i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])"
+)
+def observe_tangent(  # type: ignore[no-untyped-def]
+    code, arm, value, origin, axes, rotation, place, speed, rate, bias, error, jacobian
+):
+    """Prediction less measurement, and its Jacobian, of a state in a `TangentFrame`.
+
+    Parameters
+    ----------
+    code, arm, value
+        As in `estimators.models.measurements.observe_inertial`.
+    origin, axes : arrays
+        Of the frame.
+    rotation : (3, 3) array
+        Body to frame.
+    place, speed, rate : (3,) arrays
+        Position and velocity in the frame; body rate as measured.
+    bias : (6,) array
+        Accelerometers, gyroscopes.
+    error : (3,) array
+        Filled.
+    jacobian : (3, 15) array
+        Filled: by rotation and displacement in body axes, velocity in the frame, bias.
+
+    Returns
+    -------
+    int
+        Number of components; 0 where the measurement says nothing.
+    """
+    position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
+    tangent_state(origin, axes, rotation, place, speed, position, velocity, dcm, error_map, np.empty(3))
+    gyroscope, nothing, ours = np.empty(3), np.empty(0), np.empty((3, 15))
+    for r in range(3):
+        gyroscope[r] = bias[3 + r]
+    d = observe_inertial(code, arm, -1, -1, value, position, velocity, dcm, rate, gyroscope, nothing, error, ours)
+    for i in range(d):
+        error[i] = -error[i]
+        for j in range(9):
+            x = 0.0
+            for k in range(9):
+                x += ours[i, k] * error_map[k, j]
+            jacobian[i, j] = x
+        for j in range(3):
+            jacobian[i, 9 + j] = ours[i, 12 + j]
+            jacobian[i, 12 + j] = ours[i, 9 + j]
+    return d
+
+
+class InertialGraph:
+    """Makes the nodes and factors of a run; the newest node, and what happened since, is at hand.
+
+    Attributes
+    ----------
+    frame : TangentFrame
+    motion : Preintegration
+        From the newest node on.
+    node : int
+        Number of the newest node.
+    times : list of float
+        Of all nodes.
+    start_covariance : (15, 15) array
+        Of node 0's variables.
+    """
+
+    def begin(self, start: InitialState, instruments: Instruments) -> tuple[Any, Any]:
+        """Node 0; returns its prior factor and its values. Raises UnsuitableScenario without an IMU."""
+        import gtsam
+
+        self.model = InertialModel(calibrate=False)
+        covariance = self.model.begin(start, instruments)[:15, :15].copy()
+        index = np.arange(9, 15)
+        covariance[index, index] = np.maximum(covariance[index, index], np.repeat(np.square(LEAST_BIAS), 3))
+        self.frame = frame = TangentFrame(start.position)
+        turn = frame.turn(start.position)
+        state = gtsam.NavState(gtsam.Rot3(turn @ self.model.dcm), frame.local(start.position), turn @ start.velocity)
+        bias = gtsam.imuBias.ConstantBias()
+        self.motion = Preintegration(self.model._noise, np.diag(covariance)[9:], frame, start.time)
+        self.motion.begin(state, bias)
+        self.node, self.times, self._rates = 0, [start.time], [np.zeros(3)]
+        self._aid = {name: (code, np.array(arm)) for name, (code, arm, _, _) in self.model.aid_parameters.items()}
+        inverse = np.linalg.inv(self._error_map(state))
+        self.start_covariance = inverse @ covariance @ inverse.T
+        return self.prior(0, state, bias, self.start_covariance), self.values(0, state, bias)
+
+    def keys(self, node: int) -> tuple[int, int, int]:
+        """Keys of a node's pose, velocity and bias."""
+        return _X + node, _V + node, _B + node
+
+    def prior(self, node: int, state: Any, bias: Any, covariance: Array) -> Any:
+        """A factor that holds a node at a state, with a (15, 15) covariance of its variables."""
+        import gtsam
+
+        root = np.linalg.inv(np.linalg.cholesky(0.5 * (covariance + covariance.T)))
+        x, v, b = self.keys(node)
+        unit = gtsam.noiseModel.Unit.Create(15)
+        linear = gtsam.JacobianFactor(x, root[:, :6], v, root[:, 6:9], b, root[:, 9:], np.zeros(15), unit)
+        return gtsam.LinearContainerFactor(linear, self.values(node, state, bias))
+
+    def values(self, node: int, state: Any, bias: Any) -> Any:
+        """The variables of a node."""
+        import gtsam
+
+        x, v, b = self.keys(node)
+        values = gtsam.Values()
+        values.insert(x, state.pose())
+        values.insert(v, state.velocity())
+        values.insert(b, bias)
+        return values
+
+    def extend(self) -> tuple[Any, Any]:
+        """Make a node of where the motion has led; returns its IMU factor and values."""
+        motion = self.motion
+        state = motion.predict()
+        factor = motion.factor(self.keys(self.node), self.keys(self.node + 1))
+        self.node += 1
+        self.times.append(motion.time)
+        self._rates.append(motion.rate)
+        motion.begin(state, motion.bias)
+        return factor, self.values(self.node, state, motion.bias)
+
+    def linearise(self, measurement: Measurement) -> Linearised | None:
+        """A measurement at the state that the motion has led to; None where it says nothing usable."""
+        model, state = self.model, self.motion.predict()
+        model.position[:], model.velocity[:], model.dcm[:], _ = self.frame.state(
+            state.pose().rotation().matrix(), state.position(), state.velocity()
+        )
+        model.bias[:3], model.bias[3:] = self.motion.bias.gyroscope(), self.motion.bias.accelerometer()
+        model.raw_rate[:] = self.motion.rate
+        return model.measure(measurement)
+
+    def aid(self, measurement: Measurement, noise: Array, node: int) -> Any:
+        """The factor of a measurement on a node, with its (m, m) noise."""
+        import gtsam
+
+        name, value = measurement.instrument, np.array(measurement.value, dtype=np.float64)
+        code, arm = self._aid[name]
+        if measurement.kind == "gnss_position":
+            turn = self.frame.turn(value)
+            gaussian = gtsam.noiseModel.Gaussian.Covariance(turn @ noise @ turn.T)
+            return gtsam.GPSFactorArm(self.keys(node)[0], self.frame.local(value), arm, gaussian)
+        x, v, b = self.keys(node)
+        origin, axes, rate, m = self.frame.origin, self.frame.axes, self._rates[node], len(noise)
+        moving = measurement.kind in ("gnss_velocity", "dvl", "speed_log")
+        levered = moving and bool(np.any(arm))
+        still, unbiased = np.zeros(3), np.zeros(6)
+
+        def error(_: Any, values: Any, jacobians: Any) -> Array:
+            pose = values.atPose3(x)
+            rotation = np.ascontiguousarray(pose.rotation().matrix())
+            speed = values.atPoint3(v) if moving else still
+            bias = values.atConstantBias(b).vector() if levered else unbiased
+            e, h = np.zeros(3), np.zeros((3, 15))
+            observe_tangent(
+                code, arm, value, origin, axes, rotation, np.array(pose.translation()), speed, rate, bias, e, h
+            )
+            if jacobians is not None:
+                jacobians[0] = h[:m, :6]
+                if moving:
+                    jacobians[1] = h[:m, 6:9]
+                if levered:
+                    jacobians[2] = h[:m, 9:]
+            return e[:m]
+
+        keys = [x, v, b] if levered else [x, v] if moving else [x]
+        return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(noise), keys, error)
+
+    def read(self, values: Any, node: int) -> tuple[Any, Any]:
+        """State and bias of a node among GTSAM's values."""
+        import gtsam
+
+        x, v, b = self.keys(node)
+        return gtsam.NavState(values.atPose3(x), values.atPoint3(v)), values.atConstantBias(b)
+
+    def navigation(self, state: Any) -> tuple[Array, Array, Array]:
+        """Geodetic position, velocity and roll-pitch-yaw of a gtsam.NavState."""
+        rotation, place, speed = state.pose().rotation().matrix(), state.position(), state.velocity()
+        position, velocity, dcm, _ = self.frame.state(rotation, place, speed)
+        return position, velocity, rpy_from_dcm(dcm)
+
+    def estimate(self, covariance: Array) -> Estimate:
+        """Where the motion has led, from the (15, 15) covariance of the newest node."""
+        state = self.motion.predict()
+        to_ours = self._error_map(state)[:9]
+        ours = to_ours @ self.motion.carry(covariance) @ to_ours.T
+        return Estimate(self.motion.time, *self.navigation(state), 0.5 * (ours + ours.T))
+
+    def _error_map(self, state: Any) -> Array:
+        """(15, 15) matrix from a change of a node's variables to the error of `InertialModel`."""
+        _, _, _, nine = self.frame.state(state.pose().rotation().matrix(), state.position(), state.velocity())
+        full = np.zeros((15, 15))
+        full[:9, :9] = nine
+        full[9 + np.arange(6), 9 + np.array(_BIAS_ORDER)] = 1.0
+        return full
+
+
+_X, _V, _B = (ord(letter) << 56 for letter in "xvb")

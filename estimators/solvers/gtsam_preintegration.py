@@ -1,0 +1,278 @@
+"""IMU samples in the form in which GTSAM integrates them, and its preintegration on the rotating Earth.
+
+Preintegration is that of 4.3 on the Galilean group (`PreintegratedCombinedMeasurementsG`, `GalileanCombinedImuFactor`):
+it integrates a sample of constant rate and force in closed form, the turn of the axes included. The older
+`PreintegratedCombinedMeasurements` sums rotation vectors in a tangent space by Euler's method (0.1 urad a second in a
+seaway), and forces in the axes at the start of each sample (millimetres per second). Our samples are means, and the
+rate is not constant in an interval: `imu_pieces` adds coning and sculling (as `simnav.strapdown`, Savage 1998).
+
+GTSAM 4.3 moves a factor exactly in the rotating frame: Coriolis, and the centrifugal acceleration about the *origin* of
+the frame. Gravity at p contains the centrifugal acceleration of p, so ``g(p) + w x (w x p)`` is handed over, one vector
+for a factor, at its middle. That gravity changes with the position is in no Jacobian (the Schuler loop, of 84 minutes).
+
+Biases walk at random with the densities that `InertialModel` uses. GTSAM has no Gauss-Markov decay: the variance of a
+bias with a correlation time grows where nothing observes it.
+
+GTSAM keeps a pointer to the parameters in every factor, so each preintegration has its own.
+
+Sources: F. Dellaert and others, GTSAM 4.3; C. Forster et al., "On-manifold preintegration for real-time visual-inertial
+odometry", IEEE Trans. Robotics 33(1), 2017.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from estimators.models.propagation import HELD_ATTITUDE, HELD_VELOCITY, LARGEST_FORCE, LARGEST_RATE, TURN_TIME
+from estimators.solvers.tangent_frame import TangentFrame
+from simnav.compiled import kernel
+from simnav.rotation import cross
+from simnav.types import Array, ImuSamples
+
+__all__ = ["Preintegration", "imu_pieces"]
+
+#: Least density of the biases' random walk, as a fraction of their initial variance [1/s], and least densities at all:
+#: a factor needs a covariance that can be inverted, in double precision.
+LEAST_WALK, LEAST_GYROSCOPE, LEAST_ACCELEROMETER = 1e-9, 1e-20, 1e-16
+#: GTSAM's integration covariance [m^2/s]; it keeps a factor of a single sample invertible: 1 um in a second.
+INTEGRATION = 1e-12
+
+
+@kernel("UniTuple(i8, 2)(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8, f8[:, ::1])")
+def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, nominal, pieces):  # type: ignore[no-untyped-def]
+    """Cut the stretch up to a time into pieces of constant rate and force, as GTSAM integrates them.
+
+    A sample that spans ``until`` is used in part, the rest by the next call; where samples are missing there is a piece
+    to be held. The rules are those of `estimators.models.propagation.advance_inertial`.
+
+    Parameters
+    ----------
+    clock : (14,) array
+        Time; end of the last sample used; its mean rate and force; the mean rate of the one before; the rate at the
+        time of the clock, extrapolated from both. Updated.
+    memory : (6,) array
+        Angle and velocity increment of the last whole sample; updated.
+    bias : (6,) array
+        Gyroscopes, accelerometers: taken off for coning and sculling, and put on again.
+    time, interval : (k,) arrays
+    rate, force : (k, 3) arrays
+        Usable samples.
+    first : int
+        The first that is not used up.
+    until, nominal : float
+        End of the stretch, and the nominal interval [s].
+    pieces : (m, 8) array
+        Filled: duration, rate, force, 1 where the state is to be held. m of twice the samples and four more suffices.
+
+    Returns
+    -------
+    int, int
+        Index of the first sample that is not used up, and the number of pieces.
+    """
+    eps = 1e-7
+    t, i, n, count = clock[0], first, time.size, 0
+    while t < until - eps:
+        while i < n and time[i] <= t + eps:
+            i += 1
+        hold, whole, stop = False, False, until
+        if i < n and time[i] - interval[i] <= t + 0.5 * nominal:
+            stop = min(time[i], until)
+            started = time[i] - interval[i]
+            if t <= started + eps or clock[1] < started - 0.5 * nominal:
+                adjacent = clock[1] >= started - 0.5 * nominal
+                for r in range(3):
+                    clock[8 + r] = clock[2 + r] if adjacent else rate[i, r]
+            ahead = (stop - started) / interval[i] - 0.5
+            for r in range(3):
+                clock[2 + r], clock[5 + r] = rate[i, r], force[i, r]
+                clock[11 + r] = rate[i, r] + ahead * (rate[i, r] - clock[8 + r])
+            clock[1] = stop
+            whole = stop >= time[i] - eps
+        elif i < n:
+            stop, hold = min(time[i] - interval[i], until), True
+        elif t < clock[1] + 1.5 * nominal:
+            stop = min(clock[1] + 2.0 * nominal, until)  # the step ends between samples: carry the last one on
+        else:
+            hold = True
+        dt = stop - t
+        piece = pieces[count]
+        count += 1
+        piece[0], piece[7] = dt, 0.0
+        if hold:
+            piece[7] = 1.0
+            memory[:] = 0.0
+        else:
+            a0, a1, a2 = (clock[2] - bias[0]) * dt, (clock[3] - bias[1]) * dt, (clock[4] - bias[2]) * dt
+            n0, n1, n2 = (clock[5] - bias[3]) * dt, (clock[6] - bias[4]) * dt, (clock[7] - bias[5]) * dt
+            m0, m1, m2 = memory[0], memory[1], memory[2]
+            q0, q1, q2 = cross(m0, m1, m2, a0, a1, a2)
+            r0, r1, r2 = a0 + q0 / 12.0, a1 + q1 / 12.0, a2 + q2 / 12.0
+            x0, x1, x2 = cross(m0, m1, m2, n0, n1, n2)
+            y0, y1, y2 = cross(memory[3], memory[4], memory[5], a0, a1, a2)
+            s0, s1, s2 = (x0 + y0) / 12.0, (x1 + y1) / 12.0, (x2 + y2) / 12.0
+            # GTSAM will turn all of it by half the sample; the sculling is in the axes at the start.
+            x0, x1, x2 = cross(r0, r1, r2, s0, s1, s2)
+            piece[1], piece[2], piece[3] = r0 / dt + bias[0], r1 / dt + bias[1], r2 / dt + bias[2]
+            piece[4] = (n0 + s0 - 0.5 * x0) / dt + bias[3]
+            piece[5] = (n1 + s1 - 0.5 * x1) / dt + bias[4]
+            piece[6] = (n2 + s2 - 0.5 * x2) / dt + bias[5]
+            if whole:
+                scale = interval[i] / dt
+                memory[0], memory[1], memory[2] = a0 * scale, a1 * scale, a2 * scale
+                memory[3], memory[4], memory[5] = n0 * scale, n1 * scale, n2 * scale
+        t = stop
+    clock[0] = max(clock[0], until)
+    return i, count
+
+
+class Preintegration:
+    """What happened since the newest node: GTSAM's preintegrated measurements, and where they lead.
+
+    Parameters
+    ----------
+    densities : (9,) array
+        As in `estimators.models.propagation.accumulate_error`.
+    variance : (6,) array
+        Initial variances of the biases, gyroscopes first.
+    frame : TangentFrame
+    time : float
+        At which it begins [s].
+
+    Attributes
+    ----------
+    state : gtsam.NavState
+    bias : gtsam.imuBias.ConstantBias
+        Of the node at which it begins.
+    elapsed : float
+        Since the node [s].
+    held : float
+        Seconds without usable samples so far.
+    """
+
+    def __init__(self, densities: Array, variance: Array, frame: TangentFrame, time: float):
+        self._noise, self._frame = densities, frame
+        self._walk = (
+            max(float(densities[3]), LEAST_WALK * float(variance[0]), LEAST_WALK * LEAST_GYROSCOPE),
+            max(float(densities[5]), LEAST_WALK * float(variance[3]), LEAST_WALK * LEAST_ACCELEROMETER),
+        )
+        self._clock, self._memory, self._turn = np.zeros(14), np.zeros(6), np.zeros(3)
+        self._clock[0], self._clock[1] = time, -1e9
+        self.held = 0.0
+        self.load(None)
+
+    @property
+    def time(self) -> float:
+        """Of the end [s]."""
+        return float(self._clock[0])
+
+    @property
+    def rate(self) -> Array:
+        """Body rate at the end, extrapolated, as measured [rad/s]."""
+        return self._clock[11:14].copy()
+
+    def load(self, imu: ImuSamples | None) -> None:
+        """Take the IMU samples of the step that follows; those that no marine vehicle could make are left out."""
+        self._first = 0
+        if imu is None or len(imu) == 0:
+            self._samples: tuple[Array, ...] = (np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+            return
+        usable = np.abs(imu.angular_rate).sum(axis=1) < LARGEST_RATE
+        usable &= np.abs(imu.specific_force).sum(axis=1) < LARGEST_FORCE
+        arrays = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
+        self._samples = tuple(np.array(a[usable], dtype=np.float64, order="C") for a in arrays)
+
+    def begin(self, state: Any, bias: Any) -> None:
+        """Start anew at a node."""
+        import gtsam
+
+        noise, turn = self._noise, self._turn**2
+        self.state, self.bias, self.elapsed = state, bias, 0.0
+        self._hat = np.array([*bias.gyroscope(), *bias.accelerometer()])
+        turning = noise[6] * turn + noise[7] * (turn.sum() - turn)
+        self._white = (
+            np.diag(np.maximum(noise[0] + turning, LEAST_GYROSCOPE)),
+            max(float(noise[1]), LEAST_ACCELEROMETER) * np.eye(3),
+        )
+        self._params = p = gtsam.PreintegrationCombinedParams(self._frame.gravity(state.position()))
+        p.setOmegaCoriolis(self._frame.rotation)
+        p.setGyroscopeCovariance(self._white[0])
+        p.setAccelerometerCovariance(self._white[1])
+        p.setIntegrationCovariance(INTEGRATION * np.eye(3))
+        p.setBiasOmegaCovariance(self._walk[0] * np.eye(3))
+        p.setBiasAccCovariance(self._walk[1] * np.eye(3))
+        self._measurements = gtsam.PreintegratedCombinedMeasurementsG(p, bias)
+
+    def revise(self, state: Any, bias: Any) -> None:
+        """The node has moved; what was integrated stays, about the former bias."""
+        self.state, self.bias = state, bias
+
+    def advance(self, until: float) -> None:
+        """Integrate up to a time."""
+        elapsed = until - self.time
+        if elapsed <= 0.0:
+            return
+        pieces = np.empty((2 * len(self._samples[0]) + 4, 8))
+        self._first, count = imu_pieces(
+            self._clock, self._memory, self._hat, *self._samples, self._first, until, float(self._noise[8]), pieces
+        )
+        pieces = pieces[:count]
+        rates, forces = pieces[:, 1:4], pieces[:, 4:7]
+        integrate = self._measurements.integrateMeasurement
+        for k, (dt, held) in enumerate(pieces[:, ::7].tolist()):
+            if held:
+                self._hold(dt)
+            else:
+                integrate(forces[k], rates[k], dt)
+        self.elapsed += elapsed
+        used = pieces[:, 7] == 0.0
+        mean = (rates[used] - self._hat[:3]).T @ pieces[used, 0] / elapsed
+        self._turn += min(1.0, elapsed / TURN_TIME) * (mean - self._turn)
+
+    def _hold(self, dt: float) -> None:
+        """No data: attitude and velocity stay as they are, with noise to match."""
+        p, w, state = self._params, self._frame.rotation, self.predict()
+        back = state.pose().rotation().matrix().T
+        place, speed = state.position(), state.velocity()
+        force = 2.0 * np.cross(w, speed) + np.cross(w, np.cross(w, place)) - self._frame.gravity(place)
+        p.setGyroscopeCovariance(self._white[0] + HELD_ATTITUDE**2 * np.eye(3))
+        p.setAccelerometerCovariance(self._white[1] + HELD_VELOCITY**2 * np.eye(3))
+        self._measurements.integrateMeasurement(back @ force + self._hat[3:], back @ w + self._hat[:3], dt)
+        p.setGyroscopeCovariance(self._white[0])
+        p.setAccelerometerCovariance(self._white[1])
+        self.held += dt
+
+    def predict(self) -> Any:
+        """The gtsam.NavState at the end."""
+        if self._measurements.deltaTij() == 0.0:
+            return self.state
+        end = self._measurements.predict(self.state, self.bias)
+        self._params.n_gravity = self._frame.gravity(0.5 * (self.state.position() + end.position()))
+        return self._measurements.predict(self.state, self.bias)
+
+    def factor(self, begin: tuple[int, int, int], end: tuple[int, int, int]) -> Any:
+        """The factor between two nodes, each given by the keys of pose, velocity and bias."""
+        import gtsam
+
+        self.predict()  # so that gravity is that of the middle
+        return gtsam.GalileanCombinedImuFactor(begin[0], begin[1], end[0], end[1], begin[2], end[2], self._measurements)
+
+    def carry(self, covariance: Array) -> Array:
+        """(15, 15) covariance at the end from that at the node: pose, velocity and bias, as GTSAM's variables.
+
+        GTSAM's `NavState` has the velocity in body axes.
+        """
+        if self._measurements.deltaTij() == 0.0:
+            return covariance
+        by_state, by_bias = np.zeros((9, 9), order="F"), np.zeros((9, 6), order="F")
+        end = self._measurements.predict(self.state, self.bias, by_state, by_bias)
+        into, out = np.eye(9), np.eye(15)
+        into[6:, 6:] = self.state.pose().rotation().matrix().T
+        out[6:9, 6:9] = end.pose().rotation().matrix()
+        transition = np.eye(15)
+        transition[:9, :9] = by_state @ into
+        transition[:9, 9:] = by_bias
+        moved = transition @ covariance @ transition.T + self._measurements.preintMeasCov()
+        carried: Array = out @ moved @ out.T
+        return carried

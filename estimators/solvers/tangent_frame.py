@@ -1,0 +1,204 @@
+"""A Cartesian frame fixed to the Earth: the local tangent plane, north-east-down, at a point.
+
+For solvers that know vectors only. Geodetic positions are converted through Earth-centred, Earth-fixed coordinates, so
+that nothing is approximated; gravity and the rotation of the Earth are vectors in the frame.
+
+With C the DCM body to north-east-down at the state's own place and R the rotation body to frame, ``C = N R`` where N
+turns the frame's axes to those of the place. A rotation ``R exp(w x)``, a displacement ``R r`` and a velocity change d
+(in the frame) change what `InertialModel` calls the error by
+
+- position: ``C r``
+- velocity: ``N d + v x (W C r)``
+- attitude: ``C w - W C r``
+
+where W maps a displacement to the turn of the north-east-down axes (the transport rate's matrix, Groves eq. 5.44).
+
+Sources: P. D. Groves 2013, sections 2.4.3 and 5.4; B. R. Bowring, "Transformation from spatial to geographical
+coordinates", Survey Review 23(181), 1976 (its iteration gains about ten digits a step near the Earth's surface).
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, sin, sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.earth import (
+    ECCENTRICITY_SQUARED,
+    FLATTENING,
+    ROTATION_RATE,
+    SEMI_MAJOR_AXIS,
+    SEMI_MINOR_AXIS,
+    gravity_scalar,
+    radii_scalar,
+)
+from simnav.types import Array
+
+__all__ = ["TangentFrame", "tangent_state"]
+
+_SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
+
+
+@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
+def tangent_state(  # type: ignore[no-untyped-def]
+    origin, axes, rotation, place, speed, position, velocity, dcm, error_map, attraction
+):
+    """Geodetic state of a state in the frame, and how its error changes.
+
+    Parameters
+    ----------
+    origin : (3,) array
+        Of the frame, Earth-centred [m].
+    axes : (3, 3) array
+        Earth-centred to frame.
+    rotation : (3, 3) array
+        Body to frame.
+    place, speed : (3,) arrays
+        Position [m] and velocity relative to the Earth [m/s] in the frame.
+    position, velocity : (3,) arrays
+        Filled: geodetic [rad, rad, m], north-east-down [m/s].
+    dcm : (3, 3) array
+        Filled: body to north-east-down.
+    error_map : (9, 9) array
+        Filled: error of position, velocity and attitude (north-east-down) by rotation and displacement in body axes and
+        velocity change in the frame (equations in the module).
+    attraction : (3,) array
+        Filled: gravity in the frame [m/s^2].
+    """
+    x = origin[0] + axes[0, 0] * place[0] + axes[1, 0] * place[1] + axes[2, 0] * place[2]
+    y = origin[1] + axes[0, 1] * place[0] + axes[1, 1] * place[1] + axes[2, 1] * place[2]
+    z = origin[2] + axes[0, 2] * place[0] + axes[1, 2] * place[1] + axes[2, 2] * place[2]
+    level = sqrt(x * x + y * y)
+    # Reduced latitude, by Bowring's iteration
+    s, c = z * SEMI_MAJOR_AXIS, level * SEMI_MINOR_AXIS
+    for _ in range(3):
+        r = 1.0 / sqrt(s * s + c * c)
+        s, c = s * r, c * r
+        up = z + _SECOND_ECCENTRICITY_SQUARED * SEMI_MINOR_AXIS * s * s * s
+        out = level - ECCENTRICITY_SQUARED * SEMI_MAJOR_AXIS * c * c * c
+        s, c = (1.0 - FLATTENING) * up, out
+    r = 1.0 / sqrt(up * up + out * out)
+    s, c = up * r, out * r  # of the latitude
+    position[0], position[1] = atan2(up, out), atan2(y, x)
+    height = level * c + z * s - SEMI_MAJOR_AXIS * sqrt(1.0 - ECCENTRICITY_SQUARED * s * s)
+    position[2] = height
+    sl, cl = sin(position[1]), cos(position[1])
+    # North, east, down in the frame: rows of N
+    N = np.empty((3, 3))
+    for j in range(3):
+        a0, a1, a2 = axes[j, 0], axes[j, 1], axes[j, 2]
+        N[0, j] = -s * cl * a0 - s * sl * a1 + c * a2
+        N[1, j] = -sl * a0 + cl * a1
+        N[2, j] = -c * cl * a0 - c * sl * a1 - s * a2
+    g = gravity_scalar(s, height)
+    for i in range(3):
+        attraction[i] = g * N[2, i]
+        velocity[i] = N[i, 0] * speed[0] + N[i, 1] * speed[1] + N[i, 2] * speed[2]
+        for j in range(3):
+            dcm[i, j] = N[i, 0] * rotation[0, j] + N[i, 1] * rotation[1, j] + N[i, 2] * rotation[2, j]
+    meridian, prime = radii_scalar(s)
+    a, b = 1.0 / (meridian + height), 1.0 / (prime + height)
+    t = s / c
+    v0, v1, v2 = velocity[0], velocity[1], velocity[2]
+    error_map[:] = 0.0
+    for j in range(3):
+        c0, c1 = dcm[0, j], dcm[1, j]
+        w0, w1, w2 = b * c1, -a * c0, -b * t * c1  # W C
+        for i in range(3):
+            error_map[i, 3 + j] = dcm[i, j]
+            error_map[6 + i, j] = dcm[i, j]
+            error_map[3 + i, 6 + j] = N[i, j]
+        error_map[3, 3 + j] = v1 * w2 - v2 * w1
+        error_map[4, 3 + j] = v2 * w0 - v0 * w2
+        error_map[5, 3 + j] = v0 * w1 - v1 * w0
+        error_map[6, 3 + j], error_map[7, 3 + j], error_map[8, 3 + j] = -w0, -w1, -w2
+
+
+class TangentFrame:
+    """The tangent plane at a geodetic position.
+
+    Parameters
+    ----------
+    position : (3,) array
+        Latitude, longitude [rad], height [m].
+
+    Attributes
+    ----------
+    origin : (3,) array
+        Earth-centred [m].
+    axes : (3, 3) array
+        Rotation from Earth-centred axes to the frame's.
+    rotation : (3,) array
+        Of the Earth, in the frame [rad/s].
+
+    Examples
+    --------
+    >>> frame = TangentFrame(np.array([0.8, 0.1, 20.0]))
+    >>> bool(np.allclose(frame.local(np.array([0.8, 0.1, 10.0])), [0.0, 0.0, 10.0], atol=1e-8))
+    True
+    """
+
+    def __init__(self, position: Array):
+        self.axes = north_east_down(position)
+        self.origin = earth_centred(position)
+        self.rotation = ROTATION_RATE * self.axes[:, 2]
+
+    def local(self, position: Array) -> Array:
+        """(3,) position in the frame of a geodetic one."""
+        there: Array = self.axes @ (earth_centred(position) - self.origin)
+        return there
+
+    def turn(self, position: Array) -> Array:
+        """(3, 3) rotation from north-east-down at a geodetic position to the frame."""
+        turned: Array = self.axes @ north_east_down(position).T
+        return turned
+
+    def state(self, rotation: Array, place: Array, speed: Array) -> tuple[Array, Array, Array, Array]:
+        """A state in the frame as we know it.
+
+        Parameters
+        ----------
+        rotation : (3, 3) array
+            Body to frame.
+        place, speed : (3,) arrays
+
+        Returns
+        -------
+        position, velocity : (3,) arrays
+        dcm : (3, 3) array
+        error_map : (9, 9) array
+        """
+        position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
+        # GTSAM's arrays are in Fortran's order, or to be read only.
+        rotation, place, speed = (np.array(a, dtype=np.float64, order="C") for a in (rotation, place, speed))
+        tangent_state(self.origin, self.axes, rotation, place, speed, position, velocity, dcm, error_map, np.empty(3))
+        return position, velocity, dcm, error_map
+
+    def gravity(self, place: Array) -> Array:
+        """(3,) gravity at a place in the frame, less the centrifugal acceleration about the origin [m/s^2]."""
+        attraction, zero, eye = np.empty(3), np.zeros(3), np.eye(3)
+        tangent_state(
+            self.origin, self.axes, eye, np.array(place), zero, np.empty(3), np.empty(3), np.empty((3, 3)),
+            np.empty((9, 9)), attraction,
+        )  # fmt: skip
+        w = self.rotation
+        return attraction + w * (w @ place) - (w @ w) * place
+
+
+def earth_centred(position: Array) -> Array:
+    """Earth-centred, Earth-fixed coordinates [m] of a geodetic position (Groves eq. 2.112)."""
+    latitude, longitude, height = np.asarray(position).tolist()
+    s, c = sin(latitude), cos(latitude)
+    prime = SEMI_MAJOR_AXIS / sqrt(1.0 - ECCENTRICITY_SQUARED * s * s)
+    level = (prime + height) * c
+    return np.array(
+        [level * cos(longitude), level * sin(longitude), ((1.0 - ECCENTRICITY_SQUARED) * prime + height) * s]
+    )
+
+
+def north_east_down(position: Array) -> Array:
+    """(3, 3) rotation from Earth-centred axes to north-east-down at a geodetic position (Groves eq. 2.150)."""
+    latitude, longitude = float(position[0]), float(position[1])
+    s, c, sl, cl = sin(latitude), cos(latitude), sin(longitude), cos(longitude)
+    return np.array([[-s * cl, -s * sl, c], [-sl, cl, 0.0], [-c * cl, -c * sl, -s]])
