@@ -32,6 +32,19 @@ from estimators.iterated import IteratedEkf
 from estimators.kf import Kf, Kf23
 from estimators.oracle import Oracle
 from estimators.references import OracleClairvoyant, OracleMixture, OracleRts
+from estimators.robust_graphs import (
+    CauchyFgo,
+    DcsFgo,
+    GaFgo,
+    GaFgoPaper,
+    GmFgo,
+    GncFgo,
+    HuberFgo,
+    MaxMixtureFgo,
+    SwFgoPaper,
+    SwitchableFgo,
+    TukeyFgo,
+)
 from estimators.ship_ekf import ShipEkf
 from estimators.ship_graphs import ShipFgo, ShipFgoFull
 from estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
@@ -41,7 +54,9 @@ from estimators.smoothers import EkfRts, EkfTwoFilter, ShipEkfRts
 __all__ = [
     "Adkf",
     "AdkfPaper",
+    "CauchyFgo",
     "Ckf",
+    "DcsFgo",
     "DeadReckoning",
     "Ekf",
     "Ekf9",
@@ -54,12 +69,17 @@ __all__ = [
     "FgoFull",
     "FgoUnsimplified",
     "FilterpyUkf",
+    "GaFgo",
+    "GaFgoPaper",
     "GatedEkf",
+    "GmFgo",
+    "GncFgo",
     "GnssOnly",
     "GtsamBatch",
     "GtsamFixedLag",
     "GtsamGnc",
     "GtsamIsam2",
+    "HuberFgo",
     "HuberKf",
     "Iae",
     "IaeFgo",
@@ -71,6 +91,7 @@ __all__ = [
     "IteratedEkf",
     "Kf",
     "Kf23",
+    "MaxMixtureFgo",
     "Mckf",
     "Oracle",
     "OracleClairvoyant",
@@ -87,6 +108,9 @@ __all__ = [
     "ShipFgoFull",
     "ShipUkf",
     "SwFgo",
+    "SwFgoPaper",
+    "SwitchableFgo",
+    "TukeyFgo",
     "Ukf",
     "VbAkf",
 ]

@@ -13,6 +13,8 @@ What is settled otherwise than printed, unless the preset is ``"paper"``:
 - |r| is the whitened norm. The print's unwhitened norm of a GNSS residual is mostly that of the Down axis.
 - The print calls ``1.4826 median(|r|)`` MAD and consistent. That holds for one component; of three, it is 2.28 sigma.
   Here kappa makes s consistent whatever the number of components: 1.4826, 0.849 and 0.650 for 1, 2 and 3.
+- c of the DVL is 2: in units of the consistent scale the print's 1 costs 15 % of the efficiency on Gaussian noise,
+  which in the print's units of 2.28 sigma it does not.
 - epsilon is in units of sigma. The print's 0.1 has the unit of the residual, whichever it is.
 - s is never less than 1, the datasheet's noise. The residuals of a window are smaller than its noise where they fitted
   it, and a median of few means nothing: with fewer than ``fewest`` s is 1.
@@ -82,7 +84,8 @@ class GradientAdaptive(Weighting):
     preset : "default" or "paper"
         Whether the norms and scales are as printed.
     gnss, motion, other : (a, c, w_min)
-        Of eq. 21, for GNSS, the IMU, and the DVL with all other instruments.
+        Of eq. 21, for GNSS, the IMU, and the DVL with all other instruments; of the last, None: ``(2, 2, 0.3)``, or
+        ``(2, 1, 0.3)`` with the preset "paper".
     epsilon : float
         Of eq. 19; in sigma, or with the preset "paper" in the residual's unit.
     fewest : int
@@ -94,12 +97,13 @@ class GradientAdaptive(Weighting):
         preset: Literal["default", "paper"] = "default",
         gnss: Shape = (3.0, 1.5, 0.5),
         motion: Shape = (2.0, 1.0, 0.3),
-        other: Shape = (2.0, 1.0, 0.3),
+        other: Shape | None = None,
         epsilon: float = 0.1,
         fewest: int = 5,
     ):
         if preset not in ("default", "paper"):
             raise ValueError(f"preset = {preset!r}: it must be 'default' or 'paper'")
+        other = other or (2.0, 1.0 if preset == "paper" else 2.0, 0.3)
         for name, shape in (("gnss", gnss), ("motion", motion), ("other", other)):
             if len(shape) != 3 or not (shape[0] > 0.0 and shape[1] > 0.0 and 0.0 <= shape[2] <= 1.0):
                 raise ValueError(f"{name} = {shape}: it must be a > 0, c > 0 and w_min in [0, 1]")

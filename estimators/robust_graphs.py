@@ -1,0 +1,265 @@
+"""Robust rows of the sliding window: each is ``sw-fgo`` with one weighting of its factors, and paper 000's presets."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from estimators.adaptations.dynamic_covariance_scaling import DynamicCovarianceScaling
+from estimators.adaptations.gradient_adaptive import GradientAdaptive, Shape
+from estimators.adaptations.graduated_non_convexity import GraduatedNonConvexity
+from estimators.adaptations.m_estimators import MEstimator, cauchy, constants, geman_mcclure, huber, tukey
+from estimators.adaptations.max_mixture import MaxMixture
+from estimators.adaptations.switchable_constraints import SwitchableConstraints
+from estimators.adaptations.weighting import Weighting
+from estimators.models.inertial import InertialModel
+from estimators.models.nine_state import NineStateModel
+from estimators.sliding_window import InertialWindow
+from simnav.estimator import register
+
+__all__ = [
+    "CauchyFgo",
+    "DcsFgo",
+    "GaFgo",
+    "GaFgoPaper",
+    "GmFgo",
+    "GncFgo",
+    "HuberFgo",
+    "MaxMixtureFgo",
+    "SwFgoPaper",
+    "SwitchableFgo",
+    "TukeyFgo",
+]
+
+
+class _Robust(InertialWindow):
+    """A window of the 15-state model with a weighting."""
+
+    def __init__(self, weighting: Weighting, window: int, tolerance: float, iterations: int):
+        super().__init__(
+            InertialModel(), weighting=weighting, window=window, tolerance=tolerance, iterations=iterations
+        )
+
+
+@register("huber-fgo")
+class HuberFgo(_Robust):
+    """Sliding window with Huber's weights: a residual beyond c sigma pulls no harder than one of c sigma.
+
+    See `estimators.adaptations.m_estimators`; ``window``, ``tolerance`` and ``iterations`` as for ``sw-fgo``.
+
+    Parameters
+    ----------
+    efficiency : float
+        On Gaussian noise; c follows, for each number of components.
+    """
+
+    def __init__(self, efficiency: float = 0.98, window: int = 20, tolerance: float = 0.05, iterations: int = 10):
+        super().__init__(MEstimator(huber, constants(huber, efficiency)), window, tolerance, iterations)
+
+
+@register("tukey-fgo")
+class TukeyFgo(_Robust):
+    """Sliding window with Tukey's biweight: a residual beyond c sigma counts for next to nothing.
+
+    See `estimators.adaptations.m_estimators`, and ``huber-fgo`` for the parameters.
+    """
+
+    def __init__(
+        self,
+        efficiency: float = 0.98,
+        smallest: float = 1e-3,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 10,
+    ):
+        super().__init__(MEstimator(tukey, constants(tukey, efficiency), smallest), window, tolerance, iterations)
+
+
+@register("cauchy-fgo")
+class CauchyFgo(_Robust):
+    """Sliding window with Cauchy's weights, which fall with the square of the residual.
+
+    See `estimators.adaptations.m_estimators`, and ``huber-fgo`` for the parameters.
+    """
+
+    def __init__(
+        self,
+        efficiency: float = 0.98,
+        smallest: float = 1e-3,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 10,
+    ):
+        super().__init__(MEstimator(cauchy, constants(cauchy, efficiency), smallest), window, tolerance, iterations)
+
+
+@register("gm-fgo")
+class GmFgo(_Robust):
+    """Sliding window with Geman and McClure's weights, which fall with the fourth power of the residual.
+
+    See `estimators.adaptations.m_estimators`, and ``huber-fgo`` for the parameters.
+    """
+
+    def __init__(
+        self,
+        efficiency: float = 0.98,
+        smallest: float = 1e-3,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 10,
+    ):
+        tuned = constants(geman_mcclure, efficiency)
+        super().__init__(MEstimator(geman_mcclure, tuned, smallest), window, tolerance, iterations)
+
+
+@register("dcs-fgo")
+class DcsFgo(_Robust):
+    """Sliding window with dynamic covariance scaling.
+
+    See `estimators.adaptations.dynamic_covariance_scaling`, and ``sw-fgo`` for the other parameters.
+    """
+
+    def __init__(
+        self,
+        phi: float = 0.0,
+        efficiency: float = 0.98,
+        smallest: float = 1e-3,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 10,
+    ):
+        super().__init__(DynamicCovarianceScaling(phi, efficiency, smallest), window, tolerance, iterations)
+
+
+@register("switchable-fgo")
+class SwitchableFgo(_Robust):
+    """Sliding window with switchable constraints, the switches eliminated in closed form.
+
+    See `estimators.adaptations.switchable_constraints`, and ``sw-fgo`` for the other parameters.
+    """
+
+    def __init__(
+        self,
+        sigma: float = 0.3,
+        smallest: float = 1e-3,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 10,
+    ):
+        super().__init__(SwitchableConstraints(sigma, smallest), window, tolerance, iterations)
+
+
+@register("gnc-fgo")
+class GncFgo(_Robust):
+    """Sliding window with graduated non-convexity: after an outlier the robust cost begins convex and hardens.
+
+    See `estimators.adaptations.graduated_non_convexity`, and ``sw-fgo`` for the other parameters.
+    """
+
+    def __init__(
+        self,
+        cost: Literal["tls", "gm"] = "tls",
+        growth: float = 3.0,
+        efficiency: float = 0.98,
+        smallest: float = 1e-3,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 15,
+    ):
+        super().__init__(GraduatedNonConvexity(cost, growth, efficiency, smallest), window, tolerance, iterations)
+
+
+@register("max-mixture-fgo")
+class MaxMixtureFgo(_Robust):
+    """Sliding window in which each measurement is of the nominal or of a wide noise, whichever is the more probable.
+
+    See `estimators.adaptations.max_mixture`, and ``sw-fgo`` for the other parameters.
+    """
+
+    def __init__(
+        self,
+        spread: float = 10.0,
+        probability: float = 0.05,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 10,
+    ):
+        super().__init__(MaxMixture(spread, probability), window, tolerance, iterations)
+
+
+@register("ga-fgo")
+class GaFgo(_Robust):
+    """Gradient-adaptive factor graph after paper 000, its residuals whitened and its scales consistent.
+
+    See `estimators.adaptations.gradient_adaptive`, and ``sw-fgo`` for the other parameters.
+    """
+
+    def __init__(
+        self,
+        gnss: Shape = (3.0, 1.5, 0.5),
+        motion: Shape = (2.0, 1.0, 0.3),
+        other: Shape = (2.0, 2.0, 0.3),
+        epsilon: float = 0.1,
+        window: int = 20,
+        tolerance: float = 0.05,
+        iterations: int = 10,
+    ):
+        super().__init__(GradientAdaptive("default", gnss, motion, other, epsilon), window, tolerance, iterations)
+
+
+class _Paper(InertialWindow):
+    """A window of paper 000's 9-state model.
+
+    Parameters
+    ----------
+    sigma_position, sigma_velocity, sigma_attitude_deg : float
+        Of one second of motion [m], [m/s], [deg].
+    sigma_gnss_horizontal, sigma_gnss_vertical : float
+        Of a GNSS position [m]; 0 for the datasheet's.
+    sigma_dvl : float
+        Of a DVL velocity [m/s]; 0 for the datasheet's.
+    window, tolerance, iterations
+        As for ``sw-fgo``.
+    """
+
+    weigh: type[Weighting] | None = None
+
+    def __init__(
+        self,
+        sigma_position: float = 0.01,
+        sigma_velocity: float = 0.02,
+        sigma_attitude_deg: float = 0.01,
+        sigma_gnss_horizontal: float = 2.5,
+        sigma_gnss_vertical: float = 5.0,
+        sigma_dvl: float = 0.1,
+        window: int = 20,
+        tolerance: float = 1e-6,
+        iterations: int = 10,
+    ):
+        front = NineStateModel(
+            sigma_position, sigma_velocity, sigma_attitude_deg,
+            sigma_gnss_horizontal, sigma_gnss_vertical, sigma_dvl,
+        )  # fmt: skip
+        super().__init__(front, weighting=self._weighting(), window=window, tolerance=tolerance, iterations=iterations)
+
+    def _weighting(self) -> Weighting | None:
+        """None: every factor counts in full."""
+        return None
+
+
+@register("sw-fgo-paper")
+class SwFgoPaper(_Paper):
+    """Sliding-window factor graph as paper 000 has it: 9 states, fixed sigmas, no biases.
+
+    See `estimators.models.nine_state` for what is settled of the print, and how; and ``ekf-9`` for the sigmas.
+    """
+
+
+@register("ga-fgo-paper")
+class GaFgoPaper(_Paper):
+    """Gradient-adaptive factor graph as paper 000 prints it: 9 states, fixed sigmas, unwhitened norms and their scale.
+
+    See `estimators.models.nine_state`, and `estimators.adaptations.gradient_adaptive` for the preset "paper".
+    """
+
+    def _weighting(self) -> Weighting:
+        return GradientAdaptive("paper")
