@@ -28,7 +28,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from estimators.solvers.kalman import KalmanEstimator
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 __all__ = ["SmoothingEstimator", "Stretches", "scale_of", "smoother_gains"]
 
@@ -152,9 +152,10 @@ class SmoothingEstimator(KalmanEstimator):
         into.count = k + 1
         self._here[:] = 0.0
 
-    def _correct(self, dx: Array) -> None:
-        super()._correct(dx)
-        self._here += dx
+    def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
+        super()._note(m, nis, size, diagnostics)
+        if nis >= 0.0:
+            self._here += self._correction
 
     def _backward(self) -> Iterator[tuple[int, list[Array], Array, Array]]:
         """From the last stop to the first: its index, the filter's state there, c and S; a hook."""

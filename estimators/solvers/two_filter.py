@@ -39,7 +39,7 @@ import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
 from estimators.models.base import Linearised
-from estimators.solvers.kalman import joseph_update
+from estimators.solvers.joseph import joseph_update
 from estimators.solvers.smoother import SmoothingEstimator, Stretches, scale_of
 from simnav.estimator import UnsuitableScenario
 from simnav.types import Array, InitialState, Instruments, Measurement
