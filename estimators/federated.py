@@ -45,6 +45,9 @@ class Federated(FederatedEstimator, AidedInertial):
 class FederatedNoReset(Federated):
     """Federated Kalman filter whose local filters are never told what the others saw.
 
+    Its covariance is an upper bound, not the error's: conservative where the sensors differ
+    (`estimators.solvers.federated`).
+
     Parameters
     ----------
     fusion_period, master_share, shares, calibrate
