@@ -11,9 +11,8 @@ from estimators.adaptations.m_estimators import MEstimator, cauchy, constants, g
 from estimators.adaptations.max_mixture import MaxMixture
 from estimators.adaptations.switchable_constraints import SwitchableConstraints
 from estimators.adaptations.weighting import Weighting
-from estimators.models.inertial import InertialModel
 from estimators.models.nine_state import NineStateModel
-from estimators.sliding_window import InertialWindow
+from estimators.sliding_window import AidedWindow, InertialWindow
 from simnav.estimator import register
 
 __all__ = [
@@ -31,13 +30,11 @@ __all__ = [
 ]
 
 
-class _Robust(InertialWindow):
-    """A window of the 15-state model with a weighting."""
+class _Robust(AidedWindow):
+    """A window with a weighting, over the inertial model or, without an IMU, the ship model."""
 
     def __init__(self, weighting: Weighting, window: int, tolerance: float, iterations: int):
-        super().__init__(
-            InertialModel(), weighting=weighting, window=window, tolerance=tolerance, iterations=iterations
-        )
+        super().__init__(weighting=weighting, window=window, tolerance=tolerance, iterations=iterations)
 
 
 @register("huber-fgo")
