@@ -31,6 +31,8 @@ class GtsamFixedLag(FixedLagEstimator):
         Most updates of the solver in a step.
     """
 
+    slow = True
+
     def __init__(self, window: int = 20, threshold: float = 1.0, iterations: int = 5):
         super().__init__(window, threshold, iterations)
 
@@ -47,6 +49,8 @@ class GtsamIsam2(Isam2Estimator):
         Most updates of the solver in a step.
     """
 
+    slow = True
+
     def __init__(self, threshold: float = 1.0, iterations: int = 5):
         super().__init__(threshold, iterations)
 
@@ -62,6 +66,8 @@ class GtsamBatch(BatchEstimator):
     most : int
         Most iterations of the batch.
     """
+
+    slow = True
 
     def __init__(self, window: int = 20, threshold: float = 1.0, iterations: int = 5, most: int = 50):
         super().__init__(window, threshold, iterations, most)
@@ -80,6 +86,8 @@ class GtsamGnc(GncEstimator):
     probability : float
         Of a good measurement to be taken for good.
     """
+
+    slow = True
 
     def __init__(
         self,
