@@ -49,7 +49,7 @@ class HuberFgo(_Robust):
         On Gaussian noise; c follows, for each number of components.
     """
 
-    def __init__(self, efficiency: float = 0.98, window: int = 20, tolerance: float = 0.05, iterations: int = 10):
+    def __init__(self, efficiency: float = 0.95, window: int = 20, tolerance: float = 0.05, iterations: int = 10):
         super().__init__(MEstimator(huber, constants(huber, efficiency)), window, tolerance, iterations)
 
 
@@ -62,7 +62,7 @@ class TukeyFgo(_Robust):
 
     def __init__(
         self,
-        efficiency: float = 0.98,
+        efficiency: float = 0.95,
         smallest: float = 1e-3,
         window: int = 20,
         tolerance: float = 0.05,
@@ -80,7 +80,7 @@ class CauchyFgo(_Robust):
 
     def __init__(
         self,
-        efficiency: float = 0.98,
+        efficiency: float = 0.95,
         smallest: float = 1e-3,
         window: int = 20,
         tolerance: float = 0.05,
@@ -98,7 +98,7 @@ class GmFgo(_Robust):
 
     def __init__(
         self,
-        efficiency: float = 0.98,
+        efficiency: float = 0.95,
         smallest: float = 1e-3,
         window: int = 20,
         tolerance: float = 0.05,
@@ -118,7 +118,7 @@ class DcsFgo(_Robust):
     def __init__(
         self,
         phi: float = 0.0,
-        efficiency: float = 0.98,
+        efficiency: float = 0.95,
         smallest: float = 1e-3,
         window: int = 20,
         tolerance: float = 0.05,
@@ -156,7 +156,7 @@ class GncFgo(_Robust):
         self,
         cost: Literal["tls", "gm"] = "tls",
         growth: float = 3.0,
-        efficiency: float = 0.98,
+        efficiency: float = 0.95,
         smallest: float = 1e-3,
         window: int = 20,
         tolerance: float = 0.05,
@@ -217,8 +217,6 @@ class _Paper(InertialWindow):
     window, tolerance, iterations
         As for ``sw-fgo``.
     """
-
-    weigh: type[Weighting] | None = None
 
     def __init__(
         self,
