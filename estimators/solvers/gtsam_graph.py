@@ -30,6 +30,8 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["InertialGraph", "observe_tangent"]
 
+#: Correlations of less than this between the groups of a prior are left out.
+LEAST_CORRELATION = 1e-2
 #: Least initial sigmas of gyroscope [rad/s] and accelerometer [m/s^2] biases: a prior must be invertible.
 LEAST_BIAS = 1e-10, 1e-8
 #: In the order of a node's variables, the place of each component in `InertialModel`'s bias.
@@ -102,7 +104,7 @@ class InertialGraph:
     """
 
     def begin(self, start: InitialState, instruments: Instruments) -> tuple[Any, Any]:
-        """Node 0; returns its prior factor and its values. Raises UnsuitableScenario without an IMU."""
+        """Node 0; returns its prior factors and its values. Raises UnsuitableScenario without an IMU."""
         import gtsam
 
         self.model = InertialModel(calibrate=False)
@@ -126,14 +128,34 @@ class InertialGraph:
         return _X + node, _V + node, _B + node
 
     def prior(self, node: int, state: Any, bias: Any, covariance: Array) -> Any:
-        """A factor that holds a node at a state, with a (15, 15) covariance of its variables."""
+        """Factors that hold a node at a state, with a (15, 15) covariance of its variables.
+
+        Where its groups (rotation, position, velocity, bias) are uncorrelated they are GTSAM's own priors; else a
+        container of one linear factor, which GTSAM does not turn with the node: once the heading is corrected by w, it
+        pulls a position in a direction that is off by w/2.
+        """
         import gtsam
 
-        root = np.linalg.inv(np.linalg.cholesky(0.5 * (covariance + covariance.T)))
+        graph = gtsam.NonlinearFactorGraph()
         x, v, b = self.keys(node)
-        unit = gtsam.noiseModel.Unit.Create(15)
-        linear = gtsam.JacobianFactor(x, root[:, :6], v, root[:, 6:9], b, root[:, 9:], np.zeros(15), unit)
-        return gtsam.LinearContainerFactor(linear, self.values(node, state, bias))
+        sigma = np.sqrt(np.diag(covariance))
+        correlation = covariance / sigma / sigma[:, None]
+        for group in (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 15)):
+            correlation[group, group] = 0.0
+        if np.abs(correlation).max() > LEAST_CORRELATION:
+            root = np.linalg.inv(np.linalg.cholesky(0.5 * (covariance + covariance.T)))
+            unit = gtsam.noiseModel.Unit.Create(15)
+            linear = gtsam.JacobianFactor(x, root[:, :6], v, root[:, 6:9], b, root[:, 9:], np.zeros(15), unit)
+            graph.push_back(gtsam.LinearContainerFactor(linear, self.values(node, state, bias)))
+            return graph
+        gaussian = gtsam.noiseModel.Gaussian.Covariance
+        turn = state.pose().rotation().matrix()
+        place, rotation = turn @ covariance[3:6, 3:6] @ turn.T, state.pose().rotation()
+        graph.push_back(gtsam.PoseRotationPrior3D(x, rotation, gaussian(covariance[:3, :3])))
+        graph.push_back(gtsam.GPSFactor(x, state.position(), gaussian(place)))
+        graph.push_back(gtsam.PriorFactorPoint3(v, state.velocity(), gaussian(covariance[6:9, 6:9])))
+        graph.push_back(gtsam.PriorFactorConstantBias(b, bias, gaussian(covariance[9:, 9:])))
+        return graph
 
     def values(self, node: int, state: Any, bias: Any) -> Any:
         """The variables of a node."""

@@ -24,20 +24,18 @@ Letters 5(2), 2020; F. Dellaert and others, GTSAM 4.3.
 from __future__ import annotations
 
 from abc import abstractmethod
-from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
-from estimators.models.measurements import plausible
+from estimators.models.suitable import require_inertial_aids
+from estimators.solvers.admission import Admission
 from estimators.solvers.gtsam_graph import InertialGraph
-from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 __all__ = ["BatchEstimator", "FixedLagEstimator", "GncEstimator", "GtsamEstimator", "Isam2Estimator"]
 
-#: A measurement this much older than the state [s] still counts as of its time.
-LATE = 1e-4
 #: A node without a measurement is made after this long [s]: a factor has one gravity vector.
 LONGEST = 2.0
 #: Linear update at which a variable is linearised again: pose (rotation [rad], position [m]), velocity [m/s],
@@ -45,6 +43,9 @@ LONGEST = 2.0
 THRESHOLDS = {"x": [1e-3] * 3 + [10.0] * 3, "v": [0.05] * 3, "b": [0.02] * 3 + [1e-3] * 3}
 
 
+#: Least linear update that is handed on in back-substitution, of rotations [rad] as of positions [m]; GTSAM's 1e-3
+#: would leave milliradians undone.
+WILDFIRE = 1e-7
 #: Sigma of the tie between a linearised factor and its error, in units of that error's sigma.
 TIGHT = 1e-3
 #: A factor with less is left out.
@@ -77,16 +78,14 @@ class GtsamEstimator(Estimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and at least one aiding instrument."""
-        if instruments.imu is None or not instruments:
-            lacks = "an IMU" if instruments.imu is None else "an instrument beside the IMU"
-            raise UnsuitableScenario(f"it needs an IMU and at least one other instrument; there is not {lacks}")
+        require_inertial_aids(instruments, self.name)
         prior, values = self.graph.begin(start, instruments)
-        self._kinds = {name: sheet.kind for name, sheet in instruments.items() if self.graph.model.observes(sheet)}
-        self._used = dict.fromkeys(self._kinds, -np.inf)
-        self._skipped = self._restarts = self._epoch = 0
+        observed = [name for name, sheet in instruments.items() if self.graph.model.observes(sheet)]
+        self._admission = Admission(instruments, observed)
+        self._restarts = self._epoch = 0
         self._ends: list[tuple[float, int]] = []
         self._covariance = self.graph.start_covariance
-        self._blank = {f"residual.{name}": np.nan for name in self._kinds}
+        self._blank = {f"residual.{name}": np.nan for name in observed}
         self._begin(prior, values)
 
     def update(self, measurements: Measurements) -> Estimate:
@@ -94,20 +93,12 @@ class GtsamEstimator(Estimator):
         graph, step = self.graph, _Step(self.graph)
         motion = graph.motion
         motion.load(measurements.imu)
-        for m in _in_order(measurements.aids):
-            used = self._used.get(m.instrument)
-            if used is None:
-                continue
-            late = not motion.time - LATE <= m.time <= measurements.time + LATE
-            if late or m.time <= used or not plausible(self._kinds[m.instrument], m.value):
-                self._skipped += 1
-                continue
+        for m in self._admission.admit(measurements, motion.time):
             motion.advance(min(m.time, measurements.time))
             linearised = graph.linearise(m)
             if linearised is None:
-                self._skipped += 1
+                self._admission.skipped += 1
                 continue
-            self._used[m.instrument] = m.time
             step.extend()
             step.observe(m, linearised.noise)
         motion.advance(measurements.time)
@@ -117,7 +108,7 @@ class GtsamEstimator(Estimator):
         if step.motions.size() or step.aids.size():
             self._epoch += 1
             diagnostics.update(self._take(step))
-        diagnostics |= {"skipped": float(self._skipped), "restarts": float(self._restarts)}
+        diagnostics |= {"skipped": float(self._admission.skipped), "restarts": float(self._restarts)}
         self._ends.append((measurements.time, graph.node))
         estimate = graph.estimate(self._covariance)
         estimate.diagnostics = diagnostics
@@ -140,7 +131,7 @@ class GtsamEstimator(Estimator):
                 if attempt < 2:
                     factors.push_back(step.aids)
                 else:
-                    self._skipped += step.aids.size()
+                    self._admission.skipped += step.aids.size()
                     step.drop_aids()
                 diagnostics = self._solve(factors, values)
                 found = self._values(keys)
@@ -166,6 +157,7 @@ class GtsamEstimator(Estimator):
         import gtsam
 
         parameters = gtsam.ISAM2Params()
+        parameters.setOptimizationParams(gtsam.ISAM2GaussNewtonParams(WILDFIRE))
         limits = gtsam.ISAM2ThresholdMap()
         for letter, values in THRESHOLDS.items():
             limits.insert((letter, self.threshold * np.array(values)))
@@ -222,12 +214,8 @@ class FixedLagEstimator(GtsamEstimator):
         self.window = window
 
     def _begin(self, prior: Any, values: Any) -> None:
-        import gtsam
-
         self._renew()
-        graph = gtsam.NonlinearFactorGraph()
-        graph.push_back(prior)
-        self._solve(graph, values)
+        self._solve(prior, values)
 
     def _renew(self) -> None:
         import gtsam
@@ -264,9 +252,7 @@ class Isam2Estimator(GtsamEstimator):
         self._settled = gtsam.Values()
         self._solver: Any = None
         self._renew()
-        graph = gtsam.NonlinearFactorGraph()
-        graph.push_back(prior)
-        self._solve(graph, values)
+        self._solve(prior, values)
 
     def _renew(self) -> None:
         import gtsam
@@ -493,9 +479,3 @@ class _Step:
         import gtsam
 
         self.aids, self.observed = gtsam.NonlinearFactorGraph(), []
-
-
-def _in_order(aids: list[Measurement]) -> list[Measurement]:
-    if any(before.time > after.time for before, after in pairwise(aids)):
-        return sorted(aids, key=lambda m: m.time)
-    return aids
