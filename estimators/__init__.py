@@ -19,6 +19,7 @@ from estimators.adaptive import (
     SageHusaPaper,
     VbAkf,
 )
+from estimators.anfis_rows import AnfisEkf, AnfisFgo, AnfisFgoMotion
 from estimators.dead_reckoning import DeadReckoning
 from estimators.ekf import Ekf
 from estimators.ekf_presets import Ekf9, Ekf23
@@ -54,6 +55,9 @@ from estimators.smoothers import EkfRts, EkfTwoFilter, ShipEkfRts
 __all__ = [
     "Adkf",
     "AdkfPaper",
+    "AnfisEkf",
+    "AnfisFgo",
+    "AnfisFgoMotion",
     "CauchyFgo",
     "Ckf",
     "DcsFgo",

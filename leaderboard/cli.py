@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from leaderboard import bounds
+from leaderboard import bounds, training
 from leaderboard.console import USER, Output, UserError, session
 from leaderboard.reproduce import command as reproduce
 
@@ -205,7 +205,7 @@ def campaign(
     runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 3]")] = None,
     seed: FirstSeed = 0,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("results"),
-    quick: Annotated[bool, typer.Option("--quick", help="Ends within minutes: 3 seeds, no long scenarios.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Within minutes: 3 seeds, nothing long or slow.")] = False,
     set_: Set = None,
     workers: Workers = 2,
     time_limit: TimeLimit = None,
@@ -219,7 +219,10 @@ def campaign(
 
         seeds = range(seed, seed + (runs or (_QUICK_RUNS if quick else _RUNS)))
         out.code = monte_carlo.campaign(
-            out, arguments.scenarios(scenario, out, quick=quick), arguments.requests(estimator, set_), seeds,
+            out,
+            arguments.scenarios(scenario, out, quick=quick),
+            arguments.requests(estimator, set_, quick=out if quick else None),
+            seeds,
             monte_carlo.Limits(workers, time_limit, memory_limit), output,
         )  # fmt: skip
 
@@ -251,6 +254,7 @@ def warmup(json: Json = False, debug: Debug = False) -> None:
 
 bounds.register(app)
 reproduce.register(app)
+training.register(app)
 
 
 def _leave_out_working_directory() -> None:

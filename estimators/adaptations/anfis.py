@@ -1,0 +1,171 @@
+"""GNSS noise from a neuro-fuzzy network (ANFIS): a reconstruction of the adaptation of paper 002.
+
+Section 3 of the paper, the ANFIS itself, is missing from the text at hand. Known are: a five-layer first-order network,
+fed with features of the present moment (of the ship's motion), that gives the covariance of the GNSS. Reconstructed
+after Jang 1993 (`estimators.adaptations.sugeno`, `estimators.adaptations.hybrid_learning`): three inputs with three
+Gaussian memberships, 27 rules. The output is the logarithm of the variance over the datasheet's. What it learns from is
+in `estimators.adaptations.anfis_training`; `simnav train anfis` learns it again.
+"""
+
+from __future__ import annotations
+
+from math import exp, log1p, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from estimators.adaptations.anfis_file import FEATURES, FeatureSet, Parameters, shipped
+from estimators.adaptations.base import Innovation
+from estimators.adaptations.noise import NoiseAdaptation
+from estimators.models.measurements import wrap
+from simnav.types import Array, Instruments
+
+__all__ = ["Anfis", "Features", "Motion"]
+
+HEADING_KINDS = ("gyrocompass", "magnetic_compass")
+SPEED_KINDS = ("speed_log", "dvl")
+
+
+class Motion:
+    """Speed, turn rate and change of speed, from what the filter expects a compass and a log to show.
+
+    Measured less innovation is the prediction, in which the filter has smoothed the instrument's noise already; its
+    differences, through a first-order low pass, are the rates. All of it is known before the fix that it is used for.
+    The first compass and the first log (or DVL) of the run are used.
+
+    Parameters
+    ----------
+    instruments : Instruments
+
+    Attributes
+    ----------
+    speed, turn_rate, change_of_speed : float
+        [m/s], [rad/s], [m/s^2], without sign; NaN where there is no instrument to tell, or not yet.
+    """
+
+    SMOOTHING = 5.0  # s; of the low pass
+
+    def __init__(self, instruments: Instruments):
+        headings, speeds = instruments.of_kind(*HEADING_KINDS), instruments.of_kind(*SPEED_KINDS)
+        self._heading = headings[0].name if headings else None
+        self._speed = speeds[0].name if speeds else None
+        self._last: dict[str, tuple[float, float]] = {}
+        self._rates: dict[str, float] = {}
+
+    def observe(self, innovation: Innovation) -> None:
+        """See an innovation of any instrument."""
+        m = innovation.measurement
+        if m.instrument not in (self._heading, self._speed):
+            return
+        expected = float(m.value[0]) - float(innovation.residual[0])
+        before = self._last.get(m.instrument)
+        self._last[m.instrument] = m.time, expected
+        if before is None or m.time <= before[0]:
+            return
+        elapsed, change = m.time - before[0], expected - before[1]
+        rate = (wrap(change) if m.instrument == self._heading else change) / elapsed
+        smoothed = self._rates.get(m.instrument, 0.0)
+        self._rates[m.instrument] = smoothed + (1.0 - exp(-elapsed / self.SMOOTHING)) * (rate - smoothed)
+
+    @property
+    def speed(self) -> float:
+        return abs(self._last[self._speed][1]) if self._speed in self._last else np.nan
+
+    @property
+    def turn_rate(self) -> float:
+        return abs(self._rates.get(self._heading or "", np.nan))
+
+    @property
+    def change_of_speed(self) -> float:
+        return abs(self._rates.get(self._speed or "", np.nan))
+
+
+class Features:
+    """The inputs of the network, at each fix.
+
+    - ``innovation``: ``ln(1 + sqrt(v' S^-1 v / m))`` of the fix's m components, S with the datasheet's noise. The
+      logarithm, since what is to be told apart lies between 1 and 5 sigma, and gross errors reach 30.
+    - ``recent_innovations``: its fading mean, the present one included.
+    - ``speed``, ``turn_rate``, ``change_of_speed``: of `Motion`.
+
+    Parameters
+    ----------
+    features : str
+        Key of `FEATURES`.
+    instruments : Instruments
+    """
+
+    MEMORY = 10.0  # s; of the fading mean
+
+    def __init__(self, features: str, instruments: Instruments):
+        self._names = FEATURES[features]
+        self._motion = Motion(instruments)
+        self._recent: dict[str, tuple[float, float]] = {}
+
+    def observe(self, innovation: Innovation) -> Array | None:
+        """See an innovation; the (1, n) inputs where it is a fix of GNSS, else None."""
+        m = innovation.measurement
+        if m.kind != "gnss_position":
+            self._motion.observe(innovation)
+            return None
+        now = _whitened(innovation)
+        before, mean = self._recent.get(m.instrument, (m.time, now))
+        mean += (1.0 - exp(-max(m.time - before, 0.0) / self.MEMORY)) * (now - mean)
+        self._recent[m.instrument] = m.time, mean
+        known = {"innovation": now, "recent_innovations": mean}
+        return np.array([[known[n] if n in known else getattr(self._motion, n) for n in self._names]])
+
+
+class Anfis(NoiseAdaptation):
+    """The noise of GNSS fixes, scaled by the network (reconstruction of paper 002).
+
+    Inputs beyond what training saw are clipped to it; an input that is not known (no compass, no log) is the median of
+    training. Every component of a fix is scaled alike. Other instruments keep their nominal noise.
+
+    Parameters
+    ----------
+    features : "innovation", "motion" or "recent"
+        The set of inputs: the innovation beside the motion; the motion only; the innovation beside those before it.
+    file : str
+        Parameter file of `simnav train anfis`; empty for the one that comes with the package.
+    lowest, highest : float
+        Bounds of the sigma in units of the datasheet's, as of `EstimatedNoise`.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are not 0 < lowest <= highest, or the file cannot be used or holds other features.
+    """
+
+    def __init__(self, features: FeatureSet = "innovation", file: str = "", lowest: float = 1.0, highest: float = 30.0):
+        if not 0.0 < lowest <= highest:
+            raise ValueError(f"lowest = {lowest:g} and highest = {highest:g}: it must be 0 < lowest <= highest")
+        path = Path(file).expanduser() if file else shipped(features)
+        self.parameters = Parameters.load(path)
+        if self.parameters.features != features:
+            raise ValueError(f"{path}: features should be {features!r}, not {self.parameters.features!r}")
+        self.features, self.lowest, self.highest = features, lowest, highest
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._inputs = Features(self.features, instruments)
+        self._seen: Array | None = None
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """The noise to use; compass and log are watched on the way."""
+        self._seen = self._inputs.observe(innovation)
+        return super().adapt(innovation)
+
+    def choose(self, innovation: Innovation) -> Array:
+        """The noise scaled by the network, for a fix; the nominal noise for anything else."""
+        if self._seen is None:
+            return innovation.noise
+        factor = exp(float(self.parameters.log_factor(self._seen)[0]))
+        return innovation.noise * min(max(factor, self.lowest**2), self.highest**2)
+
+
+def _whitened(innovation: Innovation) -> float:
+    v = innovation.residual
+    nis = float(v @ np.linalg.solve(innovation.predicted + innovation.noise, v))
+    return log1p(sqrt(max(nis, 0.0) / len(v)))

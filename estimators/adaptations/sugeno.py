@@ -1,0 +1,83 @@
+"""A first-order Sugeno network of five layers (ANFIS): Gaussian memberships on a grid, linear consequents.
+
+The layers of J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Trans. Systems, Man and
+Cybernetics 23(3), 1993, section III:
+
+1. grades of membership ``exp(-((x - c) / s)^2 / 2)`` of each input (Jang's bell is another function of the same use);
+2. strength of a rule: the product of the grades of its antecedents, one membership of each input;
+3. strengths divided by their sum;
+4. each rule's consequent ``p' x + r``, weighted by that;
+5. the sum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simnav.types import Array
+
+__all__ = ["Sugeno"]
+
+
+@dataclass(frozen=True, eq=False)
+class Sugeno:
+    """The network; n inputs with m memberships each make ``m**n`` rules.
+
+    Rule ``r`` has the memberships ``unravel_index(r, (m,) * n)`` as antecedents: the last input changes fastest.
+
+    Attributes
+    ----------
+    centres, widths : (n, m) array
+        Of the Gaussian memberships, in the inputs' units; the premise parameters.
+    consequents : (m**n, n + 1) array
+        Slopes and constant of each rule.
+    """
+
+    centres: Array
+    widths: Array
+    consequents: Array
+
+    @classmethod
+    def grid(cls, inputs: int, memberships: int = 3) -> Sugeno:
+        """Memberships evenly over [0, 1], neighbours crossing at one half (Jang 1993, section IV); output zero."""
+        centres = np.tile(np.linspace(0.0, 1.0, memberships), (inputs, 1))
+        half = 0.5 / (memberships - 1)
+        widths = np.full_like(centres, half / np.sqrt(2.0 * np.log(2.0)))
+        return cls(centres, widths, np.zeros((memberships**inputs, inputs + 1)))
+
+    @property
+    def antecedents(self) -> Array:
+        """(m**n, n, m) array: one where a rule uses a membership of an input, zero elsewhere."""
+        n, m = self.centres.shape
+        used: Array = np.eye(m)[np.indices((m,) * n).reshape(n, -1).T]
+        return used
+
+    def grades(self, x: Array) -> Array:
+        """Layer 1: (k, n, m) grades of membership of (k, n) inputs."""
+        graded: Array = np.exp(-0.5 * ((x[:, :, None] - self.centres) / self.widths) ** 2)
+        return graded
+
+    def weights(self, x: Array) -> Array:
+        """Layers 2 and 3: (k, m**n) normalised strengths of (k, n) inputs.
+
+        By logarithms, so that an input far from all memberships still belongs to the nearest.
+        """
+        logs = -0.5 * ((x[:, :, None] - self.centres) / self.widths) ** 2
+        strength: Array = logs[:, 0]
+        for i in range(1, logs.shape[1]):
+            strength = (strength[:, :, None] + logs[:, i, None, :]).reshape(len(x), -1)
+        strength = np.exp(strength - strength.max(axis=1, keepdims=True))
+        strength /= strength.sum(axis=1, keepdims=True)
+        return strength
+
+    def rules(self, x: Array) -> Array:
+        """(k, m**n) consequents of (k, n) inputs."""
+        values: Array = x @ self.consequents[:, :-1].T + self.consequents[:, -1]
+        return values
+
+    def __call__(self, x: Array) -> Array:
+        """Layers 4 and 5: (k,) outputs of (k, n) inputs."""
+        output: Array = np.einsum("kr,kr->k", self.weights(x), self.rules(x))
+        return output

@@ -1,0 +1,81 @@
+"""The rows of the ANFIS: a reconstruction of paper 002's ANFIS-FGO, and the same adaptation in a filter."""
+
+from __future__ import annotations
+
+from estimators.adaptations.anfis import Anfis
+from estimators.adaptations.anfis_file import FeatureSet
+from estimators.ship_ekf import ShipEkf
+from estimators.ship_graphs import ShipFgo
+from simnav.estimator import register
+
+__all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
+
+
+@register("anfis-fgo")
+class AnfisFgo(ShipFgo):
+    """ANFIS-FGO, a reconstruction: ``ship-fgo``, the noise of each fix chosen by a neuro-fuzzy network.
+
+    After paper 002, whose section on the network is missing from the text at hand; see docs/anfis.md. Needs what
+    ``ship-fgo`` needs.
+
+    Parameters
+    ----------
+    features : "innovation", "motion" or "recent"
+        Inputs of the network: the whitened innovation beside turn rate and change of speed; motion only; or the
+        innovation beside those before it.
+    file : str
+        Parameter file that `simnav train anfis` wrote; empty for the one that comes with the package.
+    lowest, highest : float
+        Bounds of the sigma in units of the datasheet's.
+    window : int
+        Epochs in the window.
+    tolerance : float
+        Largest component of a step, in its sigmas, at which the nodes have converged.
+    iterations : int
+        Most iterations an epoch.
+    """
+
+    def __init__(
+        self,
+        features: FeatureSet = "innovation",
+        file: str = "",
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        window: int = 20,
+        tolerance: float = 1e-3,
+        iterations: int = 10,
+    ):
+        super().__init__(window, tolerance, iterations)
+        self.adaptation = Anfis(features, file, lowest, highest)
+
+
+@register("anfis-fgo-motion")
+class AnfisFgoMotion(AnfisFgo):
+    """ANFIS-FGO, a reconstruction, with a network that sees the ship's motion only: ``anfis-fgo`` but for that.
+
+    The ablation of ``anfis-fgo``. In our simulations GNSS noise knows nothing of the ship's motion, so that this
+    network can learn no more than the mean.
+    """
+
+    def __init__(
+        self,
+        file: str = "",
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        window: int = 20,
+        tolerance: float = 1e-3,
+        iterations: int = 10,
+    ):
+        super().__init__("motion", file, lowest, highest, window, tolerance, iterations)
+
+
+@register("anfis-ekf")
+class AnfisEkf(ShipEkf):
+    """The network of ``anfis-fgo`` (a reconstruction of paper 002) in ``ship-ekf``: what it does without the graph.
+
+    The parameters are those of ``anfis-fgo``.
+    """
+
+    def __init__(self, features: FeatureSet = "innovation", file: str = "", lowest: float = 1.0, highest: float = 30.0):
+        super().__init__()
+        self.adaptation = Anfis(features, file, lowest, highest)
