@@ -166,7 +166,7 @@ class AdaptiveFactor(NoiseAdaptation):
                 raise ValueError("the printed discrepancy (eq. 30) needs P and P H' in the innovation")
             return float(np.linalg.norm(innovation.cross @ y) / sqrt(float(np.trace(innovation.covariance))))
         share = min(max(float(np.trace(solved[:, 1:])), 1e-9), m - 1e-9)
-        moved = max(float(posterior.correction @ y), 0.0) / share
+        moved = max(float((innovation.residual - posterior.residual) @ y), 0.0) / share
         if self.statistic == "discrepancy":
             return sqrt(moved)
         left = max(float(posterior.residual @ y), 1e-12) / (m - share)

@@ -2,14 +2,61 @@
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, sqrt
 from typing import Literal
 
+import numpy as np
+
 from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation, Posterior, scaled
+from estimators.adaptations.noise import NoiseAdaptation, posterior
+from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
-__all__ = ["MaximumCorrentropy"]
+__all__ = ["MaximumCorrentropy", "correntropy_noise"]
+
+
+@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, i8, b1, f8[:, ::1])")
+def correntropy_noise(  # type: ignore[no-untyped-def]
+    innovation, predicted, nominal, bandwidth, smallest, iterations, from_update, noise
+):
+    """The fixed-point iteration (see `MaximumCorrentropy`).
+
+    Parameters
+    ----------
+    innovation : (m,) array
+    predicted, nominal : (m, m) arrays
+        H P H' and R.
+    bandwidth, smallest : float
+    iterations : int
+    from_update : bool
+        Begin with the residual after the plain update, not with the innovation.
+    noise : (m, m) array
+        Overwritten with R over the weights.
+
+    Returns
+    -------
+    float
+        The least weight.
+    """
+    m = innovation.size
+    residual, weights, after = innovation.copy(), np.zeros(m), np.empty((m, m))
+    if from_update:
+        posterior(innovation, predicted, nominal, residual, after)
+    least = 1.0
+    for k in range(iterations):
+        least, settled = 1.0, True
+        for i in range(m):
+            w = max(exp(-0.5 * residual[i] * residual[i] / (bandwidth * bandwidth * nominal[i, i])), smallest)
+            settled = settled and abs(weights[i] - w) <= 0.02 * w
+            weights[i] = w
+            least = min(least, w)
+        for i in range(m):
+            for j in range(m):
+                noise[i, j] = nominal[i, j] / sqrt(weights[i] * weights[j])
+        if least > 0.7 or settled or k == iterations - 1:
+            break  # another round would hardly change them
+        posterior(innovation, predicted, noise, residual, after)
+    return least
 
 
 class MaximumCorrentropy(NoiseAdaptation):
@@ -61,26 +108,10 @@ class MaximumCorrentropy(NoiseAdaptation):
     def choose(self, innovation: Innovation) -> Array:
         """The noise over the weights; reports the least of them."""
         nominal = innovation.noise
-        inverse = [0.5 / (self.bandwidth**2 * r) for r in nominal.diagonal().tolist()]
-        noise = nominal
-        residual = _after(innovation, noise) if self.begin == "update" else innovation.residual.tolist()
-        weights: list[float] = []
-        for k in range(self.iterations):
-            before = weights
-            weights = [max(exp(-e * e * q), self.smallest) for e, q in zip(residual, inverse)]
-            noise = scaled(nominal, [1.0 / w for w in weights])
-            if min(weights) > 0.7 or (before and all(abs(a - b) <= 0.02 * b for a, b in zip(before, weights))):
-                break  # another round would hardly change them
-            if k < self.iterations - 1:
-                residual = _after(innovation, noise)
-        self.report(self._weights[innovation.measurement.instrument], min(weights))
+        noise: Array = np.empty_like(nominal)
+        least = correntropy_noise(
+            innovation.residual, innovation.predicted, nominal, self.bandwidth, self.smallest, self.iterations,
+            self.begin == "update", noise,
+        )  # fmt: skip
+        self.report(self._weights[innovation.measurement.instrument], least)
         return noise
-
-
-def _after(innovation: Innovation, noise: Array) -> list[float]:
-    """The residual after an update with this noise."""
-    if len(noise) == 1:
-        p, r, v = float(innovation.predicted[0, 0]), float(noise[0, 0]), float(innovation.residual[0])
-        return [v * r / (p + r)]
-    listed: list[float] = Posterior(innovation, noise).residual.tolist()
-    return listed

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimators.adaptations.base import Innovation
 from estimators.adaptations.noise import EstimatedNoise, Posterior, Scope
+from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
 __all__ = ["InnovationBased", "Window", "adaptive_window"]
@@ -32,6 +33,18 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
     return (shortest + longest) // 2 if variance > low * nominal else shortest
 
 
+@kernel("void(f8[:, ::1], i8, i8, f8[::1])")
+def _sum_before(rows, end, count, total):  # type: ignore[no-untyped-def]
+    """Sum of the ``count`` rows of a ring that end before ``end``."""
+    length = rows.shape[0]
+    for j in range(total.size):
+        total[j] = 0.0
+    for k in range(end - count, end):
+        row = rows[k % length]
+        for j in range(total.size):
+            total[j] += row[j]
+
+
 class Window:
     """The last rows of numbers of one instrument, in a ring.
 
@@ -50,26 +63,23 @@ class Window:
         The last estimate, for eq. 18.
     """
 
-    __slots__ = ("_rows", "count", "length", "smoothed")
+    __slots__ = ("_rows", "_total", "count", "length", "smoothed")
 
     def __init__(self, length: int, size: int):
         self.length, self.count = length, 0
-        self._rows = np.zeros((2 * length, size))
+        self._rows, self._total = np.zeros((length, size)), np.empty(size)
         self.smoothed: list[float] | None = None
 
     def add(self, row: list[float]) -> None:
         """Keep a row; the oldest goes."""
-        k = self.count % self.length
-        # Written twice, so that the last ones are always one slice.
-        self._rows[k] = row
-        self._rows[k + self.length] = self._rows[k]
+        self._rows[self.count % self.length] = row
         self.count += 1
 
     def sums(self, n: int) -> tuple[int, list[float]]:
         """How many the last n are, which may be fewer, and their sum."""
         n = min(n, self.count, self.length)
-        end = (self.count - 1) % self.length + 1 + self.length
-        listed: list[float] = np.add.reduce(self._rows[end - n : end]).tolist()
+        _sum_before(self._rows, self.count, n, self._total)
+        listed: list[float] = self._total.tolist()
         return n, listed
 
 

@@ -11,19 +11,60 @@ import numpy as np
 from estimators.adaptations.base import Adaptation, Innovation
 from estimators.adaptations.prediction import PredictionTest
 from estimators.solvers.joseph import joseph_update
+from simnav.compiled import kernel
 from simnav.types import KINDS, Array, Instruments
 
-__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "scaled"]
+__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "posterior", "scaled"]
 
 Scope = Literal["fixes", "all"]
+
+
+@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
+def posterior(innovation, predicted, noise, residual, after):  # type: ignore[no-untyped-def]
+    """Residual ``v - H P H' S^-1 v`` and ``H P+ H'`` after an update with ``S = H P H' + R``.
+
+    A state of m components observed directly is the same problem, so the solver's own kernel computes it.
+
+    Parameters
+    ----------
+    innovation : (m,) array
+    predicted, noise : (m, m) arrays
+        H P H' and R.
+    residual : (m,) array
+        Overwritten.
+    after : (m, m) array
+        Overwritten.
+
+    Returns
+    -------
+    float
+        Normalised innovation squared; -1 where S is singular: then nothing is corrected.
+    """
+    m = innovation.size
+    spread = np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            after[i, j] = predicted[i, j]
+            spread[i, j] = predicted[i, j] + noise[i, j]
+    nis = joseph_update(after, predicted, spread, innovation, residual)
+    for i in range(m):
+        residual[i] = innovation[i] - residual[i] if nis >= 0.0 else innovation[i]
+    return nis
+
+
+@kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")
+def _scale(noise, f0, f1, f2, product):  # type: ignore[no-untyped-def]
+    r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
+    for i in range(noise.shape[0]):
+        a = r0 if i == 0 else r1 if i == 1 else r2
+        for j in range(noise.shape[0]):
+            product[i, j] = noise[i, j] * a * (r0 if j == 0 else r1 if j == 1 else r2)
 
 
 class Posterior:
     """What using a measurement with noise R would give, in the measurement's own m components.
 
-    With ``S = H P H' + R``: NIS ``v' S^-1 v``; residual after the update ``v - H P H' S^-1 v``; and
-    ``H P+ H' = H P H' - H P H' S^-1 H P H'``. A state of m components observed directly is the same problem,
-    so the solver's own kernel computes it.
+    See `posterior`.
 
     Parameters
     ----------
@@ -37,31 +78,24 @@ class Posterior:
     residual : (m,) array
     predicted : (m, m) array
         H P+ H'.
-    correction : (m,) array
-        ``H K v``.
     """
 
-    __slots__ = ("correction", "nis", "predicted", "residual")
+    __slots__ = ("nis", "predicted", "residual")
 
     def __init__(self, innovation: Innovation, noise: Array):
-        self.predicted = innovation.predicted.copy()
-        self.correction = np.empty(len(innovation.residual))
-        self.nis: float = joseph_update(
-            self.predicted, innovation.predicted, innovation.predicted + noise, innovation.residual, self.correction
-        )
-        if self.nis < 0.0:
-            self.correction[:] = 0.0
-        self.residual = innovation.residual - self.correction
+        d = len(innovation.residual)
+        self.residual, self.predicted = np.empty(d), np.empty((d, d))
+        self.nis: float = posterior(innovation.residual, innovation.predicted, noise, self.residual, self.predicted)
 
 
 def scaled(noise: Array, factors: list[float]) -> Array:
-    """A covariance with the variance of component i multiplied by ``factors[i]``, correlations kept."""
+    """A covariance of up to three components, the variance of the i-th times ``factors[i]``, correlations kept."""
     if all(f == 1.0 for f in factors):
         return noise
     if len(factors) == 1:
         return noise * factors[0]
-    root = np.array([sqrt(f) for f in factors])
-    product: Array = noise * np.multiply.outer(root, root)
+    product: Array = np.empty_like(noise)
+    _scale(noise, factors[0], factors[1], factors[-1], product)
     return product
 
 
@@ -90,6 +124,8 @@ class NoiseAdaptation(Adaptation):
         self._prediction = PredictionTest(instruments, self.together)
         self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
         self._report: dict[str, float | Array] = {}
+        self._noisy: dict[str, Array] = {}  # a noise found above zero, and the one reported last
+        self._reported: dict[str, Array] = {}
         for name, sheet in instruments.items():
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
 
@@ -104,16 +140,20 @@ class NoiseAdaptation(Adaptation):
     def adapt(self, innovation: Innovation) -> Array | None:
         """`choose`, with its sigma noted; an instrument without noise stays as it is."""
         self.inflation = 1.0
-        if min(innovation.noise.diagonal().tolist()) <= 0.0:
-            return innovation.noise
+        name = innovation.measurement.instrument
+        if innovation.noise is not self._noisy.get(name):
+            if min(innovation.noise.diagonal().tolist()) <= 0.0:
+                return innovation.noise
+            self._noisy[name] = innovation.noise
         if self._prediction.fails(innovation):
             noise: Array | None = innovation.noise
             if self.inflates:
                 self.inflation = self._prediction.inflation(innovation)
         else:
             noise = self.choose(innovation)
-        if noise is not None:
-            for label, variance in zip(self._labels[innovation.measurement.instrument], noise.diagonal().tolist()):
+        if noise is not None and noise is not self._reported.get(name):
+            self._reported[name] = noise
+            for label, variance in zip(self._labels[name], noise.diagonal().tolist()):
                 self._report[label] = sqrt(variance)
         return noise
 

@@ -7,9 +7,10 @@ from math import sqrt
 import numpy as np
 
 from estimators.adaptations.base import Innovation
+from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
-__all__ = ["PredictionTest", "chi_square_limits"]
+__all__ = ["PredictionTest", "chi_square_limits", "standardised_squares"]
 
 FIXES = ("gnss_position", "gnss_velocity", "terrain_fix")
 LOGS = ("dvl", "speed_log")
@@ -20,6 +21,15 @@ def chi_square_limits(probability: float) -> list[float]:
     from scipy.special import chdtri
 
     return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]
+
+
+@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
+def standardised_squares(residual, predicted, noise):  # type: ignore[no-untyped-def]
+    """Sum of the squared components of an innovation, each over its variance in ``H P H' + R``."""
+    total = 0.0
+    for i in range(residual.size):
+        total += residual[i] * residual[i] / (predicted[i, i] + noise[i, i])
+    return total
 
 
 class PredictionTest:
@@ -97,6 +107,5 @@ class PredictionTest:
 
 
 def _squares(innovation: Innovation) -> float:
-    predicted, noise = innovation.predicted.diagonal().tolist(), innovation.noise.diagonal().tolist()
-    total: float = sum(v * v / (p + r) for v, p, r in zip(innovation.residual.tolist(), predicted, noise))
+    total: float = standardised_squares(innovation.residual, innovation.predicted, innovation.noise)
     return total

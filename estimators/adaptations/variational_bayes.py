@@ -2,11 +2,53 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
+import numpy as np
+
 from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import EstimatedNoise, Posterior, Scope, scaled
+from estimators.adaptations.noise import EstimatedNoise, Scope, posterior
+from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
-__all__ = ["VariationalBayes"]
+__all__ = ["VariationalBayes", "variational_noise"]
+
+
+@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8, f8, f8, f8[::1], f8[:, ::1])")
+def variational_noise(  # type: ignore[no-untyped-def]
+    innovation, predicted, nominal, shape, iterations, lowest, highest, scales, noise
+):
+    """The iteration (see `VariationalBayes`).
+
+    Parameters
+    ----------
+    innovation : (m,) array
+    predicted, nominal : (m, m) arrays
+        H P H' and R.
+    shape : float
+        Of the inverse gamma densities, this measurement included.
+    iterations : int
+    lowest, highest : float
+        Of the estimated variances over the nominal ones.
+    scales : (m,) array
+        Of the densities, in units of the nominal variances: before; overwritten by those after.
+    noise : (m, m) array
+        Overwritten with the estimate of R.
+    """
+    m = innovation.size
+    before, ratio, residual, after = scales.copy(), np.empty(m), np.empty(m), np.empty((m, m))
+    for i in range(m):
+        # The first update uses what was known before this measurement.
+        ratio[i] = min(max(before[i] / (shape - 0.5), lowest), highest)
+    for k in range(iterations + 1):
+        for i in range(m):
+            for j in range(m):
+                noise[i, j] = nominal[i, j] * sqrt(ratio[i] * ratio[j])
+        if k < iterations:
+            posterior(innovation, predicted, noise, residual, after)
+            for i in range(m):
+                scales[i] = before[i] + 0.5 * (residual[i] * residual[i] + after[i, i]) / nominal[i, i]
+                ratio[i] = min(max(scales[i] / shape, lowest), highest)
 
 
 class VariationalBayes(EstimatedNoise):
@@ -56,25 +98,17 @@ class VariationalBayes(EstimatedNoise):
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(instruments)
-        self._gammas: dict[str, tuple[float, list[float]]] = {}
+        self._gammas: dict[str, tuple[float, Array]] = {}
 
     def estimate(self, innovation: Innovation) -> Array:
         """The noise of the last iteration, bounded."""
         name, nominal = innovation.measurement.instrument, innovation.noise
-        variances = nominal.diagonal().tolist()
-        shape, scales = self._gammas.get(name) or (0.5 * self.prior, [0.5 * self.prior] * len(variances))
-        before = [self.forgetting * b for b in scales]
-        shape = self.forgetting * shape + 0.5
-        # The first update uses what was known before this measurement.
-        noise = self._noise(nominal, [b / (shape - 0.5) for b in before])
-        for _ in range(self.iterations):
-            after = Posterior(innovation, noise)
-            residual, predicted = after.residual.tolist(), after.predicted.diagonal().tolist()
-            scales = [b + 0.5 * (e * e + p) / r for b, e, p, r in zip(before, residual, predicted, variances)]
-            noise = self._noise(nominal, [b / shape for b in scales])
+        shape, scales = self._gammas.get(name) or (0.5 * self.prior, np.full(len(nominal), 0.5 * self.prior))
+        shape, scales = self.forgetting * shape + 0.5, self.forgetting * scales
+        noise: Array = np.empty_like(nominal)
+        variational_noise(
+            innovation.residual, innovation.predicted, nominal, shape, self.iterations, self.lowest**2, self.highest**2,
+            scales, noise,
+        )  # fmt: skip
         self._gammas[name] = shape, scales
         return noise
-
-    def _noise(self, nominal: Array, ratios: list[float]) -> Array:
-        low, high = self.lowest * self.lowest, self.highest * self.highest
-        return scaled(nominal, [min(max(x, low), high) for x in ratios])

@@ -7,9 +7,13 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from estimators.solvers.joseph import joseph_update, project
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
 
-__all__ = ["ErrorModel", "GaussMarkov", "Linearised", "gauss_markov", "triad_bias"]
+__all__ = ["ErrorModel", "GaussMarkov", "Linearised", "Observation", "gauss_markov", "triad_bias"]
+
+#: Of m components and n states: innovation (m,), P H' (n, m), H P H' (m, m) and noise (m, m).
+Observation = tuple[Array, Array, Array, Array]
 
 
 class Linearised(NamedTuple):
@@ -28,6 +32,13 @@ class Linearised(NamedTuple):
     innovation: Array
     jacobian: Array
     noise: Array
+
+    def project(self, covariance: Array) -> Observation:
+        """What it says of a state with an (n, n) ``covariance``."""
+        d, n = self.jacobian.shape
+        cross, predicted = np.empty((n, d)), np.empty((d, d))
+        project(covariance, np.ascontiguousarray(self.jacobian, dtype=np.float64), cross, predicted)
+        return self.innovation, cross, predicted, self.noise
 
 
 class ErrorModel(ABC):
@@ -71,8 +82,36 @@ class ErrorModel(ABC):
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
 
+    def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
+        """`measure`, projected; a model may have a faster way than one after the other."""
+        linearised = self.measure(measurement)
+        return None if linearised is None else linearised.project(covariance)
+
+    def absorb(self, observation: Observation, covariance: Array, correction: Array) -> float:
+        """Update a covariance and `correct` the state by what a measurement says.
+
+        Parameters
+        ----------
+        observation : tuple
+            With the noise that is to be used.
+        covariance : (n, n) array
+            Updated.
+        correction : (n,) array
+            Overwritten with what was added to the state.
+
+        Returns
+        -------
+        float
+            Normalised innovation squared; -1 where its covariance is singular, and nothing is changed.
+        """
+        innovation, cross, predicted, noise = observation
+        nis: float = joseph_update(covariance, cross, predicted + noise, innovation, correction)
+        if nis >= 0.0:
+            self.correct(correction)
+        return nis
+
     def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
-        """Use a measurement with its nominal noise: `measure`, the update of the covariance and `correct` in one go.
+        """Use a measurement with its nominal noise: `innovate` and `absorb` in one go.
 
         Parameters
         ----------

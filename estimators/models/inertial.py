@@ -29,8 +29,8 @@ from math import atan2, hypot
 
 import numpy as np
 
-from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov, triad_bias
-from estimators.models.inertial_update import update_inertial
+from estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
+from estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from estimators.models.measurements import CODES, observe, uncalibrated_noise, white_noise
 from estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
 from simnav.estimator import UnsuitableScenario
@@ -232,7 +232,7 @@ class InertialModel(ErrorModel):
         name = measurement.instrument
         code, arm, bias_at, scale_at = self.aid_parameters[name]
         jacobian, noise = self._jacobians[name], self.noise[name]
-        innovation, value = np.empty(len(noise)), np.array(measurement.value, dtype=np.float64)
+        innovation, value = np.empty(len(noise)), measurement.value.astype(np.float64)
         if not observe(
             code, arm, bias_at, scale_at, value, self.position, self.velocity, self.dcm, self.raw_rate, self.bias,
             self.calibration, innovation, jacobian,
@@ -242,15 +242,42 @@ class InertialModel(ErrorModel):
             noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
         return Linearised(innovation, jacobian, noise)
 
+    def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
+        """What a measurement says of the state (`estimators.models.inertial_update`)."""
+        name = measurement.instrument
+        if name not in self._fused:
+            return super().innovate(measurement, covariance)
+        code, arm, bias_at, scale_at = self.aid_parameters[name]
+        noise, value = self.noise[name], measurement.value.astype(np.float64)
+        d = len(noise)
+        innovation, cross, predicted = np.empty(d), np.empty((self.size, d)), np.empty((d, d))
+        if not innovate_inertial(
+            code, arm, bias_at, scale_at, value, self.position, self.velocity, self.dcm, self.raw_rate, self.bias,
+            self.calibration, covariance, innovation, cross, predicted,
+        ):  # fmt: skip
+            return None
+        return innovation, cross, predicted, noise
+
+    def absorb(self, observation: Observation, covariance: Array, correction: Array) -> float:
+        """Correct by what a measurement says (`estimators.models.inertial_update`)."""
+        if not self._fused:
+            return super().absorb(observation, covariance, correction)
+        innovation, cross, predicted, noise = observation
+        nis: float = absorb_inertial(
+            covariance, cross, predicted, np.ascontiguousarray(noise, dtype=np.float64), innovation,
+            self.position, self.velocity, self.dcm, self.bias, self.calibration, correction,
+        )  # fmt: skip
+        return nis
+
     def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
         """Use a measurement with its nominal noise (`estimators.models.inertial_update`)."""
         name = measurement.instrument
         if name not in self._fused:
             return None
         code, arm, bias_at, scale_at = self.aid_parameters[name]
-        nis, size = update_inertial(
-            code, arm, bias_at, scale_at, np.array(measurement.value, dtype=np.float64), self.position, self.velocity,
-            self.dcm, self.raw_rate, self.bias, self.calibration, self.noise[name], covariance,
+        nis, size = assimilate_inertial(
+            code, arm, bias_at, scale_at, measurement.value.astype(np.float64), self.position, self.velocity,
+            self.dcm, self.raw_rate, self.bias, self.calibration, covariance, self.noise[name],
             correction,
         )  # fmt: skip
         return nis, size

@@ -1,7 +1,6 @@
-"""One measurement of the inertial state in one kernel: observed, weighed and corrected for.
+"""One measurement of the inertial state in few kernels: observed, weighed and corrected for.
 
-What a Kalman filter does with a measurement whose noise nobody doubts; the same kernels as where somebody does, without
-the way through Python between them.
+Two of them where somebody may doubt the noise between (an adaptation), one where nobody does.
 """
 
 from __future__ import annotations
@@ -15,28 +14,90 @@ from estimators.models.propagation import correct_inertial
 from estimators.solvers.joseph import joseph_update, project
 from simnav.compiled import kernel
 
-__all__ = ["update_inertial"]
+__all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
+
+
+@kernel(
+    "b1(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], "
+    "f8[:, ::1], f8[:, ::1])"
+)
+def innovate_inertial(  # type: ignore[no-untyped-def]
+    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, covariance,
+    innovation, cross, predicted,
+):  # fmt: skip
+    """Innovation of a measurement, and what the covariance says of it.
+
+    Parameters
+    ----------
+    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration
+        As of `estimators.models.measurements.observe_inertial`.
+    covariance : (n, n) array
+        P.
+    innovation : (d,) array
+        Overwritten.
+    cross : (n, d) array
+        Overwritten with P H'.
+    predicted : (d, d) array
+        Overwritten with H P H'.
+
+    Returns
+    -------
+    bool
+        False where the measurement says nothing.
+    """
+    jacobian = np.empty((innovation.size, covariance.shape[0]))
+    if not observe_inertial(
+        code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, innovation, jacobian
+    ):
+        return False
+    project(covariance, jacobian, cross, predicted)
+    return True
+
+
+@kernel(
+    "f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], "
+    "f8[::1])"
+)
+def absorb_inertial(  # type: ignore[no-untyped-def]
+    covariance, cross, predicted, noise, innovation, position, velocity, dcm, bias, calibration, correction
+):
+    """Correct a state and its covariance by an innovation, in place.
+
+    Parameters
+    ----------
+    covariance, cross, predicted, innovation
+        As of `innovate_inertial`.
+    noise : (d, d) array
+        R.
+    position, velocity, dcm, bias, calibration
+        As of `estimators.models.propagation.correct_inertial`.
+    correction : (n,) array
+        Overwritten with what was added to the state.
+
+    Returns
+    -------
+    float
+        Normalised innovation squared; -1 where its covariance is singular, and nothing is changed.
+    """
+    d = innovation.size
+    spread = np.empty((d, d))
+    for i in range(d):
+        for k in range(d):
+            spread[i, k] = predicted[i, k] + noise[i, k]
+    nis = joseph_update(covariance, cross, spread, innovation, correction)
+    if nis >= 0.0:
+        correct_inertial(position, velocity, dcm, bias, calibration, correction)
+    return nis
 
 
 @kernel(
     "UniTuple(f8, 2)(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], "
     "f8[:, ::1], f8[:, ::1], f8[::1])"
 )
-def update_inertial(  # type: ignore[no-untyped-def]
-    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, noise, covariance, correction
+def assimilate_inertial(  # type: ignore[no-untyped-def]
+    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, covariance, noise, correction
 ):
-    """Correct a state and its covariance by one measurement, in place.
-
-    Parameters
-    ----------
-    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration
-        As of `estimators.models.measurements.observe_inertial`.
-    noise : (d, d) array
-        R.
-    covariance : (n, n) array
-        P.
-    correction : (n,) array
-        Overwritten with what was added to the state.
+    """`innovate_inertial` and `absorb_inertial` in one.
 
     Returns
     -------
@@ -47,19 +108,16 @@ def update_inertial(  # type: ignore[no-untyped-def]
         Norm of the innovation.
     """
     n, d = covariance.shape[0], noise.shape[0]
-    innovation, jacobian = np.empty(d), np.empty((d, n))
-    if not observe_inertial(
-        code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, innovation, jacobian
-    ):
+    innovation, cross, predicted = np.empty(d), np.empty((n, d)), np.empty((d, d))
+    if not innovate_inertial(
+        code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, covariance,
+        innovation, cross, predicted,
+    ):  # fmt: skip
         return -1.0, 0.0
-    cross, spread = np.empty((n, d)), np.empty((d, d))
-    project(covariance, jacobian, cross, spread)
     size = 0.0
     for i in range(d):
         size += innovation[i] * innovation[i]
-        for k in range(d):
-            spread[i, k] += noise[i, k]
-    nis = joseph_update(covariance, cross, spread, innovation, correction)
-    if nis >= 0.0:
-        correct_inertial(position, velocity, dcm, bias, calibration, correction)
+    nis = absorb_inertial(
+        covariance, cross, predicted, noise, innovation, position, velocity, dcm, bias, calibration, correction
+    )
     return nis, sqrt(size)

@@ -17,18 +17,16 @@ from math import hypot
 import numpy as np
 
 from estimators.adaptations.base import Adaptation, Innovation
-from estimators.models.base import ErrorModel, Linearised
+from estimators.models.base import ErrorModel, Linearised, Observation
 from estimators.solvers.admission import Admission
-from estimators.solvers.joseph import joseph_update, project
+from estimators.solvers.joseph import joseph_update
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["KalmanEstimator", "Observation", "joseph_update"]
 
-#: Of m components and n states: innovation (m,), P H' (n, m), H P H' (m, m) and noise (m, m).
-Observation = tuple[Array, Array, Array, Array]
 
-#: Of `KalmanEstimator`: where none is overridden and nothing adapts, the model may use a measurement in one go.
+#: Of `KalmanEstimator`: what is done with a measurement.
 _HOOKS = ("_observe", "_linearise", "_correct")
 
 
@@ -61,8 +59,10 @@ class KalmanEstimator(Estimator):
         self._skipped = 0
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
-        hooks = all(getattr(type(self), name) is getattr(KalmanEstimator, name) for name in _HOOKS)
-        self._plain = hooks and type(self.adaptation) is Adaptation
+        # Where no hook is in the way, the model may do in one go what is else done step by step.
+        hooks = {name for name in _HOOKS if getattr(type(self), name) is not getattr(KalmanEstimator, name)}
+        self._direct, self._corrects = "_linearise" not in hooks, "_correct" not in hooks
+        self._plain = not hooks and type(self.adaptation) is Adaptation
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
@@ -90,14 +90,10 @@ class KalmanEstimator(Estimator):
 
     def _observe(self, m: Measurement) -> Observation | None:
         """What a measurement says of the state; None where nothing usable; a hook."""
+        if self._direct:
+            return self.model.innovate(m, self.covariance)
         linearised = self._linearise(m)
-        if linearised is None:
-            return None
-        residual, jacobian, noise = linearised
-        d = len(residual)
-        cross, predicted = np.empty((len(self.covariance), d)), np.empty((d, d))
-        project(self.covariance, np.ascontiguousarray(jacobian, dtype=np.float64), cross, predicted)
-        return residual, cross, predicted, noise
+        return None if linearised is None else linearised.project(self.covariance)
 
     def _linearise(self, m: Measurement) -> Linearised | None:
         """The measurement at the present estimate; a hook."""
@@ -127,9 +123,12 @@ class KalmanEstimator(Estimator):
         if inflation != 1.0:
             for matrix in (self.covariance, cross, predicted):
                 matrix *= inflation
-        nis = joseph_update(self.covariance, cross, predicted + chosen, residual, self._correction)
-        if nis >= 0.0:
-            self._correct(self._correction)
+        if self._corrects:
+            nis = self.model.absorb((residual, cross, predicted, chosen), self.covariance, self._correction)
+        else:
+            nis = joseph_update(self.covariance, cross, predicted + chosen, residual, self._correction)
+            if nis >= 0.0:
+                self._correct(self._correction)
         self._note(m, nis, hypot(*residual.tolist()), diagnostics)
 
     def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
