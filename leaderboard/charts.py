@@ -27,7 +27,7 @@ _AXES = (
     ("Down error [m]", 2, 1.0),
     ("Heading error [deg]", 8, np.degrees(1.0)),
 )
-_MOST_DIAGNOSTICS = 2
+_MOST_DIAGNOSTICS = 10
 
 
 def _origin(recording: Recording) -> Array:
@@ -120,7 +120,10 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
 
 
 def _diagnostics(shown: Sequence[tuple[str, Trial, Array]]) -> dict[str, list[Curve]]:
-    """The diagnostics that most estimators give, one panel each; of an array, its mean over the components."""
+    """The diagnostics that most estimators give, one panel each; of an array, its mean over the components.
+
+    Where not all can be shown, those of an instrument or of the motion go before counters.
+    """
     found: dict[str, list[Curve]] = {}
     for label, trial, _ in shown:
         for name, values in trial.diagnostics.items():
@@ -131,4 +134,4 @@ def _diagnostics(shown: Sequence[tuple[str, Trial, Array]]) -> dict[str, list[Cu
                 if np.nanmax(mean) == np.nanmin(mean):
                     continue  # it says nothing over time
                 found.setdefault(name.replace("_", " "), []).append(Curve(label, trial.time, mean))
-    return dict(sorted(found.items(), key=lambda item: -len(item[1]))[:_MOST_DIAGNOSTICS])
+    return dict(sorted(found.items(), key=lambda item: (-len(item[1]), "." not in item[0]))[:_MOST_DIAGNOSTICS])
