@@ -32,7 +32,6 @@ __all__ = [
     "error_cdf",
     "error_over_time",
     "figure",
-    "frame_errors",
     "legend_below",
     "plain_log_ticks",
     "run_chart",
@@ -61,6 +60,7 @@ _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
 INK, GREY, GRID, SHADE, PAPER = "#1b2430", "#66707d", "#dfe3e8", "#eceff3", "#fefefe"
 _DARK = {INK: "#e8ebef", GREY: "#9aa5b1", GRID: "#343c46", SHADE: "#262d36", PAPER: "#161b21"}
 TRUTH = INK
+_LEGEND = 15.0  # characters of a legend that fit into an inch
 _POINTS = 300  # of a curve over time: more cannot be seen
 
 _RC: dict[Any, Any] = {
@@ -386,7 +386,7 @@ def error_over_time(
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
         axes[0].set_title(title)
         axes[-1].set_xlabel(f"Time [{unit}]")
-        legend_below(fig, axes[0])
+        legend_below(fig, axes[0], style)
     return fig
 
 
@@ -475,7 +475,7 @@ def run_chart(
     diagnostics: Mapping[str, Sequence[Curve]] | None = None,
     title: str = "",
 ) -> Figure:
-    """Chart beside the errors over time with their claimed three-sigma bounds, and diagnostics below.
+    """Chart beside the errors over time with their claimed three-sigma bounds; below both, diagnostics in two columns.
 
     Parameters
     ----------
@@ -492,19 +492,22 @@ def run_chart(
         Label of the vertical axis -> curves.
     title : str
     """
-    right = {**errors, **(diagnostics or {})}
+    below = diagnostics or {}
+    top, rows = max(len(errors), 1), -(-len(below) // 2)
     with styled():
-        fig = figure(13.0, max(5.0, 1.0 + 1.45 * len(right)))
-        grid = fig.add_gridspec(max(len(right), 1), 2, width_ratios=(1.0, 1.15))
-        _chart(fig.add_subplot(grid[:, 0]), truth, tracks, style, fixes or {}, title)
+        fig = figure(13.0, max(5.0, 1.0 + 1.45 * (top + rows)))
+        grid = fig.add_gridspec(top + rows, 2, width_ratios=(1.0, 1.15))
+        _chart(fig.add_subplot(grid[:top, 0]), truth, tracks, style, fixes or {}, title)
         chart = fig.axes[0]
         chart.set_anchor("N")
         chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, borderaxespad=0.0)
-        longest = max((float(c.time[-1]) for cs in right.values() for c in cs if len(c.time)), default=1.0)
+        longest = max((float(c.time[-1]) for cs in errors.values() for c in cs if len(c.time)), default=1.0)
         unit, factor = time_unit(longest)
         first: Axes | None = None
-        for row, (label, curves) in enumerate(right.items()):
-            ax = fig.add_subplot(grid[row, 1], sharex=first)
+        places = [(row, 1) for row in range(len(errors))] + [(top + k // 2, k % 2) for k in range(len(below))]
+        lowest = {column: row for row, column in places}
+        for (row, column), (label, curves) in zip(places, [*errors.items(), *below.items()]):
+            ax = fig.add_subplot(grid[row, column], sharex=first)
             first = first or ax
             shade(ax, outages, factor, named=row == 0)
             for c in curves:
@@ -514,18 +517,19 @@ def run_chart(
                     for sign in (1.0, -1.0):
                         ax.plot(c.time * factor, sign * c.bound, color=colour, lw=0.8, ls=(0, (3, 2)), alpha=0.75)
             if label in errors:
-                frame_errors(ax, curves)
+                _frame_errors(ax, curves)
                 ax.axhline(0.0, color=GREY, lw=0.6, zorder=0.5)
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
-            ax.tick_params(labelbottom=row == len(right) - 1)
+            ax.tick_params(labelbottom=row == lowest[column])
+            if row == lowest[column]:
+                ax.set_xlabel(f"Time [{unit}]")
         if first is not None:
             claimed = any(c.bound is not None for curves in errors.values() for c in curves)
             first.set_title("Error; dashed: claimed ±3σ" if claimed else "Error")
-            fig.axes[-1].set_xlabel(f"Time [{unit}]")
     return fig
 
 
-def frame_errors(ax: Axes, curves: Sequence[Curve]) -> None:
+def _frame_errors(ax: Axes, curves: Sequence[Curve]) -> None:
     """One estimator that diverges must not flatten the others: beyond 30 x the best, it leaves the frame."""
     spans = [float(np.nanmax(np.abs(c.values))) for c in curves if np.isfinite(c.values).any()]
     bounds = [
@@ -598,8 +602,18 @@ def plain_log_ticks(axis: Any) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def legend_below(fig: Figure, ax: Axes) -> None:
-    """One legend for all panels, from one of them."""
+def legend_below(fig: Figure, ax: Axes, style: Style | None = None) -> None:
+    """One legend for all panels, from one of them: in the order of the style, or without one the last drawn first."""
     handles, labels = ax.get_legend_handles_labels()
-    if handles:
-        fig.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=min(len(labels), 5))
+    if not handles:
+        return
+    columns = max(1, int(_LEGEND * fig.get_figwidth() / (max(map(len, labels)) + 7)))  # as many as fit side by side
+    pairs = list(zip(labels, handles, strict=True))[::-1]
+    if style is not None:
+        pairs.sort(key=lambda pair: style.order(pair[0]))
+    fig.legend(
+        [handle for _, handle in pairs],
+        [label for label, _ in pairs],
+        loc="outside lower center",
+        ncols=min(len(labels), columns, 5),
+    )

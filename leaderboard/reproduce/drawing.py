@@ -17,7 +17,6 @@ from leaderboard.figures import (
     Curve,
     Style,
     figure,
-    frame_errors,
     legend_below,
     plain_log_ticks,
     shade,
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["Bar", "bars", "curves_over_time"]
 
 _GAP = 5.0  # times the usual spacing: from here on a curve is broken
-_DECADES = 30.0  # largest over smallest value, from where on a logarithmic axis is easier to read
+_DECADES = 30.0  # largest over smallest value, from where on they do not go into one linear frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,22 +82,22 @@ def curves_over_time(
         fullest = max(range(len(axes)), key=lambda i: len(list(panels.values())[i]), default=0)
         for ax, (label, curves) in zip(axes, panels.items(), strict=True):
             shade(ax, outages, factor, named=ax is axes[0])
-            order = sorted(curves, key=lambda c: style.order(c.label))
+            order = sorted(curves, key=_size)  # the smallest on top
             for k in range(len(order) - 1, -1, -1):  # what lies below is wider, so that equal curves are both seen
                 c, (time, values) = order[k], broken(order[k].time, order[k].values)
                 colour, line = style.colour(c.label), style.line(c.label)
-                ax.plot(time * factor, values, color=colour, ls=line, lw=1.0 + 0.6 * k, label=c.label)
-            shown = [c.values[np.isfinite(c.values)] for c in curves]
-            if any((v < 0.0).any() for v in shown):
-                frame_errors(ax, curves)
-                ax.axhline(0.0, color=GREY, lw=0.6, zorder=0.5)
-            elif any(len(v) for v in shown):
-                _frame_magnitudes(ax, [v for v in shown if len(v)])
+                ax.plot(time * factor, values, color=colour, ls=line, lw=1.0 + 0.5 * k, label=c.label)
+            _frame(ax, [v for c in curves if len(v := c.values[np.isfinite(c.values)])])
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
         axes[0].set_title(title)
         axes[-1].set_xlabel(f"Time [{unit}]")
-        legend_below(fig, axes[fullest])
+        legend_below(fig, axes[fullest], style)
     return fig
+
+
+def _size(curve: Curve) -> float:
+    known = curve.values[np.isfinite(curve.values)]
+    return float(np.mean(known**2)) if len(known) else 0.0
 
 
 def broken(time: Array, values: Array) -> tuple[Array, Array]:
@@ -118,11 +117,18 @@ def broken(time: Array, values: Array) -> tuple[Array, Array]:
     return np.insert(t, after, t[after - 1]), np.insert(v, after, np.nan)
 
 
-def _frame_magnitudes(ax: Axes, series: Sequence[Array]) -> None:
-    """From zero; whoever diverges leaves the frame rather than flatten the others."""
-    spans = [float(v.max()) for v in series]
-    limit = max(s for s in spans if s <= _DECADES * max(min(spans), 1e-12))
-    ax.set_ylim(0.0, 1.06 * limit if limit > 0.0 else 1.0)
+def _frame(ax: Axes, series: Sequence[Array]) -> None:
+    """Around zero, or from zero on; whoever diverges from the better half leaves the frame rather than flatten them."""
+    if not series:
+        return
+    spans = sorted(float(np.abs(v).max()) for v in series)
+    usual = max(spans[(len(spans) - 1) // 2], 1e-12)
+    limit = 1.06 * max((s for s in spans if s <= _DECADES * usual), default=1.0) or 1.0
+    if any((v < 0.0).any() for v in series):
+        ax.set_ylim(-limit, limit)
+        ax.axhline(0.0, color=GREY, lw=0.6, zorder=0.5)
+    else:
+        ax.set_ylim(0.0, limit)
 
 
 def bars(panels: Mapping[str, Sequence[Bar]], style: Style, *, title: str = "", zero: bool = False) -> Figure:
@@ -162,7 +168,7 @@ def bars(panels: Mapping[str, Sequence[Bar]], style: Style, *, title: str = "", 
         axes[0].set_yticks(range(len(labels)), labels)
         axes[0].set_ylim(len(labels) - 0.4, -0.6)
         fig.suptitle(title, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
-        _legend(fig)
+        _legend(fig, paper=any(math.isfinite(b.paper[0]) for of in panels.values() for b in of))
     return fig
 
 
@@ -182,7 +188,7 @@ def _bar(ax: Axes, y: int, bar: Bar, style: Style) -> None:
         ax.plot(least, y, "D", ms=6.0, mfc="none", mec=INK, mew=1.2, zorder=5)
 
 
-def _legend(fig: Figure) -> None:
+def _legend(fig: Figure, *, paper: bool) -> None:
     from matplotlib.lines import Line2D
 
     keys = [
@@ -190,4 +196,4 @@ def _legend(fig: Figure) -> None:
         Line2D([], [], color=GREY, marker=".", ms=5, lw=0, alpha=0.5, label="its runs"),
         Line2D([], [], color=INK, marker="D", ms=6, mfc=PAPER, lw=0, label="the paper's"),
     ]
-    fig.legend(handles=keys, loc="outside lower center", ncols=3)
+    fig.legend(handles=keys if paper else keys[:2], loc="outside lower center", ncols=3)

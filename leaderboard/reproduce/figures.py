@@ -83,7 +83,7 @@ class Drawn:
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "number": self.figure.number,
+            "number": _number(self.figure),
             "title": _title(self.figure),
             "file": None if self.path is None else self.path.name,
             "caption": self.caption,
@@ -123,8 +123,13 @@ def write_figures(
     return drawn
 
 
+def _number(entry: Figure) -> str:
+    """With the letter of its part, where it has one."""
+    return f"{entry.number}{entry.part}" if len(entry.part) == 1 else entry.number
+
+
 def _title(entry: Figure) -> str:
-    return f"{entry.what}, {entry.part}" if entry.part else entry.what
+    return f"{entry.what}, {entry.part}" if len(entry.part) > 1 else entry.what
 
 
 class _Sketch:
@@ -158,7 +163,7 @@ class _Sketch:
         return Drawn(entry, path, caption + note, round(width), round(height), missing)
 
     def _heading(self, entry: Figure, runs: str) -> str:
-        number = f", {entry.number}" if entry.number else ""
+        number = f", {_number(entry)}" if entry.number else ""
         return f"Paper {self.paper.key}{number}: {_title(entry)} ({runs})"
 
     # -- one run ---------------------------------------------------------------------------------
