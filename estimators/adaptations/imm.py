@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, log, sqrt
+from math import exp, hypot, log, sqrt
 
 import numpy as np
 
@@ -17,9 +17,11 @@ from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Meas
 __all__ = ["ImmEstimator", "mixture_update"]
 
 
-@kernel("f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@kernel(
+    "UniTuple(f8, 2)(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])"
+)
 def mixture_update(  # type: ignore[no-untyped-def]
-    covariance, cross, predicted, noise, residual, variances, probability, correction
+    covariance, cross, predicted, noise, residual, variances, transition, probability, correction
 ):
     """Kalman update with every noise level, weighed by likelihood and merged by moments, in place.
 
@@ -36,15 +38,21 @@ def mixture_update(  # type: ignore[no-untyped-def]
         H P H' and R.
     residual : (m,) array
         v.
-    variances, probability : (j,) arrays
-        Of each level: its variance in units of R, and its probability, which is updated.
+    variances : (j,) array
+        Of each level, in units of R.
+    transition : (j, j) array
+        Probability to go from level to level since the measurement before.
+    probability : (j,) array
+        Of each level at the measurement before; overwritten by that at this one.
     correction : (n,) array
         Overwritten.
 
     Returns
     -------
-    float
+    nis : float
         Normalised innovation squared of the first level; -1 where an S_j is singular, and nothing is changed.
+    expected : float
+        Mean of the variances.
     """
     n, m = cross.shape
     count = variances.size
@@ -61,7 +69,7 @@ def mixture_update(  # type: ignore[no-untyped-def]
                     x -= L[r, k] * L[c, k]
                 if r == c:
                     if not x > 1e-14 * s:
-                        return -1.0
+                        return -1.0, 0.0
                     L[r, r] = sqrt(x)
                     determinant += log(x)
                 else:
@@ -90,13 +98,17 @@ def mixture_update(  # type: ignore[no-untyped-def]
     best = likelihood.max()
     total = 0.0
     for j in range(count):
-        likelihood[j] = probability[j] * exp(likelihood[j] - best)
+        prior = 0.0
+        for k in range(count):
+            prior += probability[k] * transition[k, j]
+        likelihood[j] = prior * exp(likelihood[j] - best)
         total += likelihood[j]
     if not total > 0.0:
-        return -1.0
-    merged = np.zeros(m)
+        return -1.0, 0.0
+    merged, expected = np.zeros(m), 0.0
     for j in range(count):
         probability[j] = likelihood[j] / total
+        expected += probability[j] * variances[j]
         for r in range(m):
             merged[r] += probability[j] * solved[j, r]
     information = np.zeros((m, m))
@@ -119,7 +131,7 @@ def mixture_update(  # type: ignore[no-untyped-def]
                 x -= half[r, i] * cross[c, i]
             covariance[r, c] = x
             covariance[c, r] = x
-    return distance[0]
+    return distance[0], expected
 
 
 class ImmEstimator(KalmanEstimator):
@@ -172,7 +184,7 @@ class ImmEstimator(KalmanEstimator):
         # The chain's stationary distribution
         values, vectors = np.linalg.eig(self.transition.T)
         first = np.real(vectors[:, int(np.argmax(np.real(values)))])
-        self._probability = dict.fromkeys(self._names, first / first.sum())
+        self._probability = {name: first / first.sum() for name in self._names}
         self._report: dict[str, float | Array] = {}
         self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
         for name in self._names:
@@ -194,21 +206,17 @@ class ImmEstimator(KalmanEstimator):
         if self._prediction.fails(Innovation(m, residual, predicted, noise)):
             super()._take(m, diagnostics, flagged)
             return
-        probability = self._probability[m.instrument] @ self.transition
-        nis = mixture_update(
-            self.covariance, cross, predicted, noise, residual, self._variances, probability, self._correction
-        )
-        if nis < 0.0:
-            self._skipped += 1
-            return
-        self._probability[m.instrument] = probability
-        self._correct(self._correction)
-        expected = sqrt(float(probability @ self._variances))
-        for label, variance in zip(self._labels[m.instrument], noise.diagonal().tolist()):
-            self._report[label] = expected * sqrt(variance)
-        self._report[f"quiet.{m.instrument}"] = float(probability[0])
-        diagnostics[f"innovation.{m.instrument}"] = sqrt(float(residual @ residual))
-        diagnostics[f"nis.{m.instrument}"] = nis
+        probability = self._probability[m.instrument]
+        nis, expected = mixture_update(
+            self.covariance, cross, predicted, noise, residual, self._variances, self.transition, probability,
+            self._correction,
+        )  # fmt: skip
+        if nis >= 0.0:
+            self._correct(self._correction)
+            for label, variance in zip(self._labels[m.instrument], noise.diagonal().tolist()):
+                self._report[label] = sqrt(expected * variance)
+            self._report[f"quiet.{m.instrument}"] = float(probability[0])
+        self._note(m, nis, hypot(*residual.tolist()), diagnostics)
 
 
 def _chain(n: int, stay: float, stay_high: float) -> Array:

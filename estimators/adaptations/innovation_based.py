@@ -11,10 +11,11 @@ from estimators.adaptations.noise import EstimatedNoise, Posterior, Scope
 from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
-__all__ = ["InnovationBased", "Window", "adaptive_window"]
+__all__ = ["InnovationBased", "adaptive_window"]
 
 
-def adaptive_window(variance: float, nominal: float, low: float, high: float, shortest: int, longest: int) -> int:
+@kernel("i8(f8, f8, f8, f8, i8, i8)")
+def adaptive_window(variance, nominal, low, high, shortest, longest):  # type: ignore[no-untyped-def]
     """Length of the window after paper 001, eq. 20: the more the innovations scatter, the longer.
 
     Parameters
@@ -33,54 +34,68 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
     return (shortest + longest) // 2 if variance > low * nominal else shortest
 
 
-@kernel("void(f8[:, ::1], i8, i8, f8[::1])")
-def _sum_before(rows, end, count, total):  # type: ignore[no-untyped-def]
-    """Sum of the ``count`` rows of a ring that end before ``end``."""
-    length = rows.shape[0]
-    for j in range(total.size):
-        total[j] = 0.0
-    for k in range(end - count, end):
-        row = rows[k % length]
-        for j in range(total.size):
-            total[j] += row[j]
+#: Of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
+@kernel("void(f8[:, ::1], i8, f8[::1], f8[::1], f8, f8[:, ::1])")
+def _push(rows, count, innovation, residual, sign, predicted):  # type: ignore[no-untyped-def]
+    """Write the row of one epoch over the oldest."""
+    m, row = innovation.size, rows[count % rows.shape[0]]
+    at = m
+    for i in range(m):
+        row[i] = innovation[i]
+        for j in range(m):
+            row[at] = innovation[i] * innovation[j]
+            row[at + m * m] = residual[i] * residual[j]
+            row[at + 2 * m * m] = sign * predicted[i, j]
+            at += 1
 
 
-class Window:
-    """The last rows of numbers of one instrument, in a ring.
+@kernel("f8(f8[:, ::1], i8, i8, i8)")
+def _sum(rows, count, n, column):  # type: ignore[no-untyped-def]
+    """Sum of a column over the last n of ``count`` rows."""
+    total = 0.0
+    for k in range(count - n, count):
+        total += rows[k % rows.shape[0], column]
+    return total
 
-    Parameters
-    ----------
-    length : int
-        How many are kept.
-    size : int
-        Of a row.
 
-    Attributes
-    ----------
-    count : int
-        Rows added so far.
-    smoothed : list of float or None
-        The last estimate, for eq. 18.
-    """
+@kernel("i8(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8, i8, f8, f8, b1, f8, f8[:, ::1])")
+def _average(  # type: ignore[no-untyped-def]
+    rows, count, predicted, nominal, shortest, longest, low, high, newest, forgetting, estimate
+):
+    """Eqs. 16-20 over the last of ``count`` rows; ``estimate`` is overwritten; returns the length of the window."""
+    m, ring = nominal.shape[0], rows.shape[0]
+    length = shortest
+    if longest > shortest and count > 1:
+        n = min(longest, count, ring)
+        variance, trace = 0.0, 0.0
+        for i in range(m):
+            mean = _sum(rows, count, n, i) / n
+            variance += _sum(rows, count, n, m + i * (m + 1)) / n - mean * mean
+            trace += nominal[i, i] + predicted[i, i]
+        length = adaptive_window(variance, trace, low, high, shortest, longest)
+    n = min(length, count, ring)
+    for i in range(m):
+        for j in range(m):
+            at = m + i * m + j
+            subtracted = n * predicted[i, j] if newest else _sum(rows, count, n, at + 2 * m * m)
+            mean = (_sum(rows, count, n, at + m * m) - subtracted + (length - n) * nominal[i, j]) / length
+            estimate[i, j] += forgetting * (mean - estimate[i, j])
+    return length
 
-    __slots__ = ("_rows", "_total", "count", "length", "smoothed")
 
-    def __init__(self, length: int, size: int):
-        self.length, self.count = length, 0
-        self._rows, self._total = np.zeros((length, size)), np.empty(size)
-        self.smoothed: list[float] | None = None
+class _Window:
+    """The last rows of one instrument, in a ring; how many there ever were; and the last estimate, for eq. 18."""
 
-    def add(self, row: list[float]) -> None:
+    __slots__ = ("count", "estimate", "rows")
+
+    def __init__(self, length: int, m: int):
+        self.rows, self.count = np.zeros((length, m + 3 * m * m)), 0
+        self.estimate: Array | None = None
+
+    def push(self, innovation: Array, residual: Array, sign: float, predicted: Array) -> None:
         """Keep a row; the oldest goes."""
-        self._rows[self.count % self.length] = row
+        _push(self.rows, self.count, innovation, residual, sign, predicted)
         self.count += 1
-
-    def sums(self, n: int) -> tuple[int, list[float]]:
-        """How many the last n are, which may be fewer, and their sum."""
-        n = min(n, self.count, self.length)
-        _sum_before(self._rows, self.count, n, self._total)
-        listed: list[float] = self._total.tolist()
-        return n, listed
 
 
 class InnovationBased(EstimatedNoise):
@@ -141,47 +156,31 @@ class InnovationBased(EstimatedNoise):
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(instruments)
-        self._windows: dict[str, Window] = {}
+        self._windows: dict[str, _Window] = {}
+        self._lengths = {name: f"window.{name}" for name in instruments}
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate."""
         name, nominal = innovation.measurement.instrument, innovation.noise
-        v: list[float] = innovation.residual.tolist()
-        m = len(v)
         window = self._windows.get(name)
         if window is None:
-            window = self._windows[name] = Window(self.longest, m + 3 * (m * m if self.full else m))
+            window = self._windows[name] = _Window(self.longest, len(nominal))
         if self.source == "residual":
             noise = self.bounded(self._mean(name, window, innovation), nominal)
             after = Posterior(innovation, noise)
-            added = [-p for p in self.entries(after.predicted)]  # sums subtract it
-            window.add([*v, *self.squares(innovation.residual), *self.squares(after.residual), *added])
+            window.push(innovation.residual, after.residual, -1.0, after.predicted)
             return noise
-        squares = self.squares(innovation.residual)
-        window.add([*v, *squares, *squares, *self.entries(innovation.predicted)])
+        window.push(innovation.residual, innovation.residual, 1.0, innovation.predicted)
         return self.bounded(self._mean(name, window, innovation), nominal)
 
-    def _mean(self, name: str, window: Window, innovation: Innovation) -> list[float]:
-        """Eqs. 16-18; the rows of a window are v, v v', e e' and H P H' (minus H P+ H' for residuals)."""
-        nominal, now = self.entries(innovation.noise), self.entries(innovation.predicted)
-        m, size = len(innovation.residual), len(nominal)
-        length = self.shortest
-        if self.longest > self.shortest and window.count > 1:
-            n, total = window.sums(self.longest)
-            squares = total[m : m + size : m + 1 if self.full else 1]
-            # Mean of the squares less square of the mean
-            variance = sum(squares) / n - sum(x * x for x in total[:m]) / n**2
-            trace = sum(nominal[:: m + 1] + now[:: m + 1] if self.full else nominal + now)
-            length = adaptive_window(variance, trace, self.low, self.high, self.shortest, self.longest)
-        self.report(f"window.{name}", length)
-        n, total = window.sums(length) if window.count else (0, [0.0] * (m + 3 * size))
-        samples, predicted = total[m + size : m + 2 * size], total[m + 2 * size :]
-        if self.newest and self.source == "innovation":
-            predicted = [n * p for p in now]
-        lacking = length - n
-        mean = [(s - p + lacking * r) / length for s, p, r in zip(samples, predicted, nominal)]
-        if window.smoothed is not None:
-            a = self.forgetting
-            mean = [(1.0 - a) * before + a * new for before, new in zip(window.smoothed, mean)]
-        window.smoothed = mean
-        return mean
+    def _mean(self, name: str, window: _Window, innovation: Innovation) -> Array:
+        """Eqs. 16-20."""
+        forgetting = self.forgetting
+        if window.estimate is None:
+            window.estimate, forgetting = np.zeros_like(innovation.noise), 1.0
+        length = _average(
+            window.rows, window.count, innovation.predicted, innovation.noise, self.shortest, self.longest, self.low,
+            self.high, self.newest and self.source == "innovation", forgetting, window.estimate,
+        )  # fmt: skip
+        self.report(self._lengths[name], length)
+        return window.estimate

@@ -61,6 +61,17 @@ def _scale(noise, f0, f1, f2, product):  # type: ignore[no-untyped-def]
             product[i, j] = noise[i, j] * a * (r0 if j == 0 else r1 if j == 1 else r2)
 
 
+@kernel("void(f8[:, ::1], f8[:, ::1], f8, f8, f8[:, ::1])")
+def _bound(estimate, nominal, low, high, bounded):  # type: ignore[no-untyped-def]
+    for i in range(nominal.shape[0]):
+        bounded[i, i] = sqrt(min(max(estimate[i, i] / nominal[i, i], low), high))
+    for i in range(nominal.shape[0]):
+        for j in range(i):
+            bounded[i, j] = bounded[j, i] = nominal[i, j] * bounded[i, i] * bounded[j, j]
+    for i in range(nominal.shape[0]):
+        bounded[i, i] *= nominal[i, i] * bounded[i, i]
+
+
 class Posterior:
     """What using a measurement with noise R would give, in the measurement's own m components.
 
@@ -90,12 +101,10 @@ class Posterior:
 
 def scaled(noise: Array, factors: list[float]) -> Array:
     """A covariance of up to three components, the variance of the i-th times ``factors[i]``, correlations kept."""
-    if all(f == 1.0 for f in factors):
+    if min(factors) == max(factors) == 1.0:
         return noise
-    if len(factors) == 1:
-        return noise * factors[0]
-    product: Array = np.empty_like(noise)
-    _scale(noise, factors[0], factors[1], factors[-1], product)
+    product: Array = np.empty((len(noise), len(noise)))
+    _scale(noise, *(*factors, 1.0, 1.0)[:3], product)
     return product
 
 
@@ -204,31 +213,20 @@ class EstimatedNoise(NoiseAdaptation):
             return innovation.noise
         return self.estimate(innovation)
 
-    def entries(self, matrix: Array) -> list[float]:
-        """What is estimated of a covariance: its diagonal, or all of it row by row."""
-        listed: list[float] = (matrix.ravel() if self.full else matrix.diagonal()).tolist()
-        return listed
-
-    def squares(self, v: Array) -> list[float]:
-        """`entries` of v v'."""
-        listed: list[float] = v.tolist()
-        return [a * b for a in listed for b in listed] if self.full else [a * a for a in listed]
-
-    def bounded(self, estimate: list[float], nominal: Array) -> Array:
-        """An estimate of R, which may be indefinite, brought within the bounds.
+    def bounded(self, estimate: Array, nominal: Array) -> Array:
+        """An estimate of R, which may be indefinite, brought within the bounds; its diagonal alone, if not ``full``.
 
         Parameters
         ----------
-        estimate : list of float
-            `entries` of the estimate.
-        nominal : (m, m) array
+        estimate, nominal : (m, m) array
         """
         low, high = self.lowest * self.lowest, self.highest * self.highest
         m = len(nominal)
         if self.full and m > 1:
             sigma = np.sqrt(nominal.diagonal())
             unit = sigma[:, None] * sigma
-            values, axes = np.linalg.eigh(np.array(estimate).reshape(m, m) / unit)
-            bounded: Array = (axes * np.clip(values, low, high)) @ axes.T * unit
-            return bounded
-        return scaled(nominal, [min(max(e / n, low), high) for e, n in zip(estimate, nominal.diagonal().tolist())])
+            values, axes = np.linalg.eigh(estimate / unit)
+            return np.asarray((axes * np.clip(values, low, high)) @ axes.T * unit)
+        bounded: Array = np.empty((m, m))
+        _bound(estimate, nominal, low, high, bounded)
+        return bounded

@@ -10,7 +10,7 @@ from estimators.adaptations.base import Innovation
 from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
-__all__ = ["PredictionTest", "chi_square_limits", "standardised_squares"]
+__all__ = ["PredictionTest", "chi_square_limits", "standardised"]
 
 FIXES = ("gnss_position", "gnss_velocity", "terrain_fix")
 LOGS = ("dvl", "speed_log")
@@ -23,13 +23,14 @@ def chi_square_limits(probability: float) -> list[float]:
     return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]
 
 
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
-def standardised_squares(residual, predicted, noise):  # type: ignore[no-untyped-def]
-    """Sum of the squared components of an innovation, each over its variance in ``H P H' + R``."""
-    total = 0.0
-    for i in range(residual.size):
-        total += residual[i] * residual[i] / (predicted[i, i] + noise[i, i])
-    return total
+@kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")
+def standardised(residual, predicted, noise):  # type: ignore[no-untyped-def]
+    """The components of an innovation, each over its sigma in ``H P H' + R``; zeros up to three."""
+    m = residual.size
+    u0 = residual[0] / sqrt(predicted[0, 0] + noise[0, 0])
+    u1 = residual[1] / sqrt(predicted[1, 1] + noise[1, 1]) if m > 1 else 0.0
+    u2 = residual[2] / sqrt(predicted[2, 2] + noise[2, 2]) if m > 2 else 0.0
+    return u0, u1, u2
 
 
 class PredictionTest:
@@ -107,5 +108,6 @@ class PredictionTest:
 
 
 def _squares(innovation: Innovation) -> float:
-    total: float = standardised_squares(innovation.residual, innovation.predicted, innovation.noise)
+    u0, u1, u2 = standardised(innovation.residual, innovation.predicted, innovation.noise)
+    total: float = u0 * u0 + u1 * u1 + u2 * u2
     return total

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import sqrt
 
 from estimators.adaptations.base import Innovation
 from estimators.adaptations.noise import NoiseAdaptation, scaled
+from estimators.adaptations.prediction import standardised
 from simnav.types import Array, Instruments
 
 __all__ = ["EquivalentWeights", "huber", "igg3"]
@@ -67,11 +67,7 @@ class EquivalentWeights(NoiseAdaptation):
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise over the weights; reports the least of them."""
-        predicted = innovation.predicted.diagonal().tolist()
-        noise = innovation.noise.diagonal().tolist()
-        weights = [
-            max(self.weight(v / sqrt(p + r)), self.smallest)
-            for v, p, r in zip(innovation.residual.tolist(), predicted, noise)
-        ]
+        components = standardised(innovation.residual, innovation.predicted, innovation.noise)
+        weights = [max(self.weight(u), self.smallest) for u in components[: len(innovation.residual)]]
         self.report(self._weights[innovation.measurement.instrument], min(weights))
         return scaled(innovation.noise, [1.0 / w for w in weights])

@@ -4,9 +4,19 @@ from __future__ import annotations
 
 from estimators.adaptations.base import Innovation
 from estimators.adaptations.noise import EstimatedNoise, Scope
+from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
 __all__ = ["SageHusa"]
+
+
+@kernel("void(f8[:, ::1], f8, f8[::1], f8[:, ::1])")
+def _fade(estimate, d, innovation, predicted):  # type: ignore[no-untyped-def]
+    """The recursion, in place."""
+    for i in range(innovation.size):
+        for j in range(innovation.size):
+            sample = innovation[i] * innovation[j] - predicted[i, j]
+            estimate[i, j] += d * (sample - estimate[i, j])
 
 
 class SageHusa(EstimatedNoise):
@@ -53,16 +63,15 @@ class SageHusa(EstimatedNoise):
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(instruments)
-        self._estimates: dict[str, tuple[int, list[float]]] = {}
+        self._estimates: dict[str, tuple[int, Array]] = {}
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate, this innovation included."""
         name = innovation.measurement.instrument
-        k, estimate = self._estimates.get(name) or (self.prior, self.entries(innovation.noise))
+        k, estimate = self._estimates.get(name) or (self.prior, innovation.noise.copy())
         k += 1
         b = self.fading
         d = 1.0 / (k + 1) if b == 1.0 else (1.0 - b) / (1.0 - b ** (k + 1))
-        squares, predicted = self.squares(innovation.residual), self.entries(innovation.predicted)
-        estimate = [(1.0 - d) * e + d * (vv - p) for e, vv, p in zip(estimate, squares, predicted)]
+        _fade(estimate, d, innovation.residual, innovation.predicted)
         self._estimates[name] = k, estimate
         return self.bounded(estimate, innovation.noise)

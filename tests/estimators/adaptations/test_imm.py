@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from estimators.adaptations.imm import _chain, mixture_update
-from estimators.solvers.kalman import joseph_update
+from estimators.solvers.joseph import joseph_update
 from simnav.estimator import EstimatorError, make
 
 
@@ -37,8 +37,9 @@ def test_the_merged_update_has_the_moments_of_the_mixture(seed: int, m: int):
 
     got, probability, dx = P.copy(), prior.copy(), np.empty(7)
     cross = np.ascontiguousarray(P @ H.T)
-    nis = mixture_update(got, cross, H @ cross, R, v, levels**2, probability, dx)
+    nis, expected = mixture_update(got, cross, H @ cross, R, v, levels**2, np.eye(len(levels)), probability, dx)
     np.testing.assert_allclose(probability, weights, rtol=1e-9)
+    assert expected == pytest.approx(weights @ levels**2)
     np.testing.assert_allclose(dx, mean, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(got, spread, rtol=1e-8, atol=1e-10)
     assert nis == pytest.approx(v @ np.linalg.solve(H @ P @ H.T + R, v))
@@ -48,17 +49,29 @@ def test_levels_of_no_probability_leave_the_kalman_filter():
     P, H, R, v = problem(9)
     cross = np.ascontiguousarray(P @ H.T)
     mine, plain, dx, expected = P.copy(), P.copy(), np.empty(7), np.empty(7)
-    mixture_update(mine, cross, H @ cross, R, v, np.array([1.0, 100.0]), np.array([1.0, 0.0]), dx)
+    mixture_update(mine, cross, H @ cross, R, v, np.array([1.0, 100.0]), np.eye(2), np.array([1.0, 0.0]), dx)
     joseph_update(plain, cross, H @ cross + R, v, expected)
     np.testing.assert_allclose(mine, plain, atol=1e-12)
     np.testing.assert_allclose(dx, expected)
+
+
+def test_levels_change_by_the_chain_first():
+    """Where the levels are alike, the measurement says nothing of them: what is left is the chain."""
+    P, H, R, v = problem(4)
+    cross = np.ascontiguousarray(P @ H.T)
+    chain, probability = _chain(3, 0.9, 0.6), np.array([0.2, 0.5, 0.3])
+    predicted = probability @ chain
+    mixture_update(P, cross, H @ cross, R, v, np.ones(3), chain, probability, np.empty(7))
+    np.testing.assert_allclose(probability, predicted)
 
 
 def test_a_singular_innovation_covariance_changes_nothing():
     P = np.eye(2)
     H = np.array([[1.0, 0.0], [1.0, 0.0]])
     cross, probability = np.ascontiguousarray(P @ H.T), np.array([0.5, 0.5])
-    nis = mixture_update(P, cross, H @ cross, np.zeros((2, 2)), np.ones(2), np.ones(2), probability, np.empty(2))
+    nis, _ = mixture_update(
+        P, cross, H @ cross, np.zeros((2, 2)), np.ones(2), np.ones(2), np.eye(2), probability, np.empty(2)
+    )
     assert nis == -1.0
     np.testing.assert_array_equal(P, np.eye(2))
     np.testing.assert_array_equal(probability, [0.5, 0.5])
