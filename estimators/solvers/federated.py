@@ -19,7 +19,8 @@ Why a bound: the errors of all local filters together begin with the covariance 
 ``11' (x) Q``. Both are at most ``diag(P_0 / beta_i)`` and ``diag(Q / beta_i)``, and motion and updates, block by block
 and linear, keep it so: the actual joint covariance is at most ``diag(P_i)``, and the fused one, with the weights
 ``W_i = P_f P_i^-1``, at most ``sum W_i P_i W_i' = P_f``. It is exact where all local filters have the same gain, thus
-for sensors of one kind, or with a reset after every measurement. In the tests P_f is up to a quarter above.
+for sensors of one kind, or with a reset after every measurement. In the tests the variances of position are up to a
+quarter above, that of a bias up to twice.
 
 Calibration states belong to the local filter of their sensor. They are not fused; given the common states they are
 independent of the other filters' (which holds exactly at one time only, and is the price of the architecture: with them
