@@ -26,7 +26,7 @@ class GtsamFixedLag(FixedLagEstimator):
     window : int
         Epochs (steps with measurements) that are kept; what is older is marginalised.
     threshold : float
-        Scale of the updates at which a variable is linearised again; 1 is 1 mrad, 10 m, 0.05 m/s; 0: always.
+        Scale of the updates at which a variable is linearised again; 1 is 5 mrad, 10 m, 0.05 m/s; 0: always.
     iterations : int
         Most updates of the solver in a step.
     """

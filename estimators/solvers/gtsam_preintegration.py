@@ -21,6 +21,7 @@ odometry", IEEE Trans. Robotics 33(1), 2017.
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,9 @@ __all__ = ["Preintegration", "imu_pieces"]
 LEAST_WALK, LEAST_GYROSCOPE, LEAST_ACCELEROMETER = 1e-9, 1e-20, 1e-16
 #: GTSAM's integration covariance [m^2/s]; it keeps a factor of a single sample invertible: 1 um in a second.
 INTEGRATION = 1e-12
+#: A stretch without data is integrated in at least so many parts of at most this length [s]: of a single one the noise
+#: of velocity and position would be the same.
+HELD_PARTS, HELD_PART = 4, 0.1
 
 
 @kernel("UniTuple(i8, 2)(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8, f8[:, ::1])")
@@ -238,7 +242,10 @@ class Preintegration:
         force = 2.0 * np.cross(w, speed) + np.cross(w, np.cross(w, place)) - self._frame.gravity(place)
         p.setGyroscopeCovariance(self._white[0] + HELD_ATTITUDE**2 * np.eye(3))
         p.setAccelerometerCovariance(self._white[1] + HELD_VELOCITY**2 * np.eye(3))
-        self._measurements.integrateMeasurement(back @ force + self._hat[3:], back @ w + self._hat[:3], dt)
+        force, rate = back @ force + self._hat[3:], back @ w + self._hat[:3]
+        parts = max(HELD_PARTS, ceil(dt / HELD_PART))
+        for _ in range(parts):
+            self._measurements.integrateMeasurement(force, rate, dt / parts)
         p.setGyroscopeCovariance(self._white[0])
         p.setAccelerometerCovariance(self._white[1])
         self.held += dt

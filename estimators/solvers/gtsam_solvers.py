@@ -40,7 +40,7 @@ __all__ = ["BatchEstimator", "FixedLagEstimator", "GncEstimator", "GtsamEstimato
 LONGEST = 2.0
 #: Linear update at which a variable is linearised again: pose (rotation [rad], position [m]), velocity [m/s],
 #: bias (accelerometers [m/s^2], gyroscopes [rad/s]). Everything is linear in position, nearly so in the biases.
-THRESHOLDS = {"x": [1e-3] * 3 + [10.0] * 3, "v": [0.05] * 3, "b": [0.02] * 3 + [1e-3] * 3}
+THRESHOLDS = {"x": [5e-3] * 3 + [10.0] * 3, "v": [0.05] * 3, "b": [0.02] * 3 + [1e-3] * 3}
 
 
 #: Least linear update that is handed on in back-substitution, of rotations [rad] as of positions [m]; GTSAM's 1e-3
