@@ -11,6 +11,7 @@ import numpy as np
 from estimators.adaptations.base import Innovation
 from estimators.adaptations.noise import NoiseAdaptation, Posterior
 from estimators.adaptations.robust import igg3
+from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
 __all__ = ["FACTORS", "AdaptiveFactor", "exponential", "three_segment", "two_segment"]
@@ -46,6 +47,16 @@ FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
     "three-segment": three_segment,
     "exponential": exponential,
 }
+
+
+@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
+def _printed_residual(residual, predicted, noise):  # type: ignore[no-untyped-def]
+    """Eq. 31: v'v / sqrt(tr S)."""
+    square, trace = 0.0, 0.0
+    for i in range(residual.size):
+        square += residual[i] * residual[i]
+        trace += predicted[i, i] + noise[i, i]
+    return square / sqrt(trace)
 
 
 class _Preset(NamedTuple):
@@ -138,9 +149,7 @@ class AdaptiveFactor(NoiseAdaptation):
         """The noise, over the factor where R is the target; sets the inflation of P."""
         name = innovation.measurement.instrument
         if self.printed and self.statistic == "residual":
-            v = innovation.residual
-            trace = sum(innovation.predicted.diagonal().tolist() + innovation.noise.diagonal().tolist())
-            statistic = float(np.dot(v, v)) / sqrt(trace)
+            statistic = _printed_residual(innovation.residual, innovation.predicted, innovation.noise)
         else:
             posterior = Posterior(innovation, innovation.noise)
             if posterior.nis < 0.0:  # singular: the solver leaves it out
