@@ -1,4 +1,9 @@
-"""What an adaptation costs: every row beside the plain EKF, over two minutes of the open sea (four instruments)."""
+"""What an adaptation costs: every row beside the plain EKF, over two minutes of the open sea (four instruments).
+
+Compared are whole updates, the IMU's second included. The plain EKF takes a measurement in one kernel; a filter that
+adapts takes it in two, with the adaptation in Python between them: half of what the rows cost beyond the plain filter is
+that division, which the row ``fading-ekf`` (P times a number) shows alone.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +65,5 @@ def test_within_one_and_a_half_times_the_plain_filter(benchmark, recording: Reco
     if benchmark.enabled:
         benchmark.extra_info.update(ratios)
         benchmark.extra_info["ekf_us"] = 1e6 * best["ekf"]
-    # Correntropy needs the posterior of every measurement, at times more than once: 1.7.
-    limits = dict.fromkeys(ROWS, 1.5) | {"mckf": 2.0}
-    slow = {name: r for name, r in ratios.items() if r > (limits[name] if benchmark.enabled else 3.0)}
+    slow = {name: r for name, r in ratios.items() if r > (1.5 if benchmark.enabled else 3.0)}
     assert not slow, slow
