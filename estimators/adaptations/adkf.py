@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation, Posterior
+from estimators.adaptations.noise import NoiseAdaptation, Posterior, normalised_square
 from estimators.adaptations.robust import igg3
 from simnav.compiled import kernel
 from simnav.types import Array, Instruments
@@ -151,10 +151,11 @@ class AdaptiveFactor(NoiseAdaptation):
         if self.printed and self.statistic == "residual":
             statistic = _printed_residual(innovation.residual, innovation.predicted, innovation.noise)
         else:
-            posterior = Posterior(innovation, innovation.noise)
-            if posterior.nis < 0.0:  # singular: the solver leaves it out
+            nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
+            if nis < 0.0:  # singular: the solver leaves it out
                 return innovation.noise
-            statistic = self._statistic(innovation, posterior)
+            residual = self.statistic == "residual"
+            statistic = sqrt(nis / len(innovation.residual)) if residual else self._statistic(innovation)
         factor = max(self.factor(statistic, self.c0, self.c1), self.SMALLEST)
         if self.target == "P":
             self.inflation = self._prediction.limited(1.0 / factor, innovation)
@@ -163,10 +164,8 @@ class AdaptiveFactor(NoiseAdaptation):
             return innovation.noise
         return innovation.noise / factor
 
-    def _statistic(self, innovation: Innovation, posterior: Posterior) -> float:
-        m = len(innovation.residual)
-        if self.statistic == "residual":
-            return sqrt(posterior.nis / m)
+    def _statistic(self, innovation: Innovation) -> float:
+        m, posterior = len(innovation.residual), Posterior(innovation, innovation.noise)
         # y = S^-1 v = R^-1 e, and S^-1 H P H' = R^-1 H P+ H'
         solved = np.linalg.solve(innovation.noise, np.column_stack((posterior.residual, posterior.predicted)))
         y = solved[:, 0]

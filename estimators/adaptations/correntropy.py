@@ -108,7 +108,7 @@ class MaximumCorrentropy(NoiseAdaptation):
     def choose(self, innovation: Innovation) -> Array:
         """The noise over the weights; reports the least of them."""
         nominal = innovation.noise
-        noise: Array = np.empty_like(nominal)
+        noise: Array = np.empty((len(nominal), len(nominal)))
         least = correntropy_noise(
             innovation.residual, innovation.predicted, nominal, self.bandwidth, self.smallest, self.iterations,
             self.begin == "update", noise,

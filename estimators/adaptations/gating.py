@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation, Posterior
+from estimators.adaptations.noise import NoiseAdaptation, normalised_square
 from estimators.adaptations.prediction import chi_square_limits
 from simnav.types import Array, Instruments
 
@@ -43,7 +43,7 @@ class ChiSquareGate(NoiseAdaptation):
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The nominal noise, or None."""
-        nis = Posterior(innovation, innovation.noise).nis
+        nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
         name, time = innovation.measurement.instrument, innovation.measurement.time
         if nis <= self._limits[len(innovation.residual)]:
             self._failing.pop(name, None)

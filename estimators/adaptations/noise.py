@@ -14,7 +14,7 @@ from estimators.solvers.joseph import joseph_update
 from simnav.compiled import kernel
 from simnav.types import KINDS, Array, Instruments
 
-__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "posterior", "scaled"]
+__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "normalised_square", "posterior", "scaled"]
 
 Scope = Literal["fixes", "all"]
 
@@ -52,6 +52,13 @@ def posterior(innovation, predicted, noise, residual, after):  # type: ignore[no
     return nis
 
 
+@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
+def normalised_square(innovation, predicted, noise):  # type: ignore[no-untyped-def]
+    """Normalised innovation squared ``v' S^-1 v``, ``S = H P H' + R``; -1 where S is singular."""
+    m = innovation.size
+    return posterior(innovation, predicted, noise, np.empty(m), np.empty((m, m)))
+
+
 @kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")
 def _scale(noise, f0, f1, f2, product):  # type: ignore[no-untyped-def]
     r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
@@ -70,6 +77,12 @@ def _bound(estimate, nominal, low, high, bounded):  # type: ignore[no-untyped-de
             bounded[i, j] = bounded[j, i] = nominal[i, j] * bounded[i, i] * bounded[j, j]
     for i in range(nominal.shape[0]):
         bounded[i, i] *= nominal[i, i] * bounded[i, i]
+
+
+@kernel("UniTuple(f8, 3)(f8[:, ::1])")
+def _sigmas(noise):  # type: ignore[no-untyped-def]
+    m = noise.shape[0]
+    return sqrt(noise[0, 0]), sqrt(noise[1, 1]) if m > 1 else 0.0, sqrt(noise[2, 2]) if m > 2 else 0.0
 
 
 class Posterior:
@@ -162,8 +175,7 @@ class NoiseAdaptation(Adaptation):
             noise = self.choose(innovation)
         if noise is not None and noise is not self._reported.get(name):
             self._reported[name] = noise
-            for label, variance in zip(self._labels[name], noise.diagonal().tolist()):
-                self._report[label] = sqrt(variance)
+            self._report.update(zip(self._labels[name], _sigmas(noise)))
         return noise
 
     def diagnostics(self) -> dict[str, float | Array]:

@@ -72,7 +72,8 @@ class PredictionTest:
         group = self._group.get(name)
         if group is None:
             return False
-        if _squares(innovation) <= self._limits[len(innovation.residual)]:
+        u0, u1, u2 = standardised(innovation.residual, innovation.predicted, innovation.noise)
+        if u0 * u0 + u1 * u1 + u2 * u2 <= self._limits[len(innovation.residual)]:
             self._failures[name] = 0, time
             self._blamed = 0
             return False
@@ -91,7 +92,8 @@ class PredictionTest:
         self._blamed += 1
         if (self._blamed - 1) % (self.together * len(self._group)):
             return 1.0
-        return self.limited(0.5 * sqrt(_squares(innovation) / len(innovation.residual)), innovation)
+        components = standardised(innovation.residual, innovation.predicted, innovation.noise)
+        return self.limited(0.5 * sqrt(sum(u * u for u in components) / len(innovation.residual)), innovation)
 
     def limited(self, inflation: float, innovation: Innovation) -> float:
         """An inflation that leaves P sound: what nothing observes would else grow without end.
@@ -105,9 +107,3 @@ class PredictionTest:
             self._first = np.maximum(variances, 1e-30)
         grown = float(np.max(variances / self._first))
         return max(1.0, min(inflation, self.LARGEST, self.TOTAL / grown))
-
-
-def _squares(innovation: Innovation) -> float:
-    u0, u1, u2 = standardised(innovation.residual, innovation.predicted, innovation.noise)
-    total: float = u0 * u0 + u1 * u1 + u2 * u2
-    return total

@@ -50,7 +50,7 @@ class EquivalentWeights(NoiseAdaptation):
     Parameters
     ----------
     weight : callable
-        Of the standardised innovation; in [0, 1].
+        Of the standardised innovation; in [0, 1], and no larger for a larger one.
     smallest : float
         Least weight.
     """
@@ -68,6 +68,9 @@ class EquivalentWeights(NoiseAdaptation):
     def choose(self, innovation: Innovation) -> Array:
         """The noise over the weights; reports the least of them."""
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
+        least = max(self.weight(max(map(abs, components))), self.smallest)
+        self.report(self._weights[innovation.measurement.instrument], least)
+        if least == 1.0:
+            return innovation.noise
         weights = [max(self.weight(u), self.smallest) for u in components[: len(innovation.residual)]]
-        self.report(self._weights[innovation.measurement.instrument], min(weights))
         return scaled(innovation.noise, [1.0 / w for w in weights])

@@ -105,7 +105,7 @@ class VariationalBayes(EstimatedNoise):
         name, nominal = innovation.measurement.instrument, innovation.noise
         shape, scales = self._gammas.get(name) or (0.5 * self.prior, np.full(len(nominal), 0.5 * self.prior))
         shape, scales = self.forgetting * shape + 0.5, self.forgetting * scales
-        noise: Array = np.empty_like(nominal)
+        noise: Array = np.empty((len(nominal), len(nominal)))
         variational_noise(
             innovation.residual, innovation.predicted, nominal, shape, self.iterations, self.lowest**2, self.highest**2,
             scales, noise,
