@@ -29,7 +29,7 @@ from typing import Any, Literal
 import numpy as np
 
 from estimators.models.suitable import require_inertial_aids
-from estimators.solvers.admission import Admission
+from estimators.solvers.admission import LATE, Admission
 from estimators.solvers.gtsam_graph import InertialGraph
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
@@ -462,8 +462,8 @@ class _Step:
         self.observed: list[tuple[Measurement, Array, int]] = []
 
     def extend(self) -> None:
-        """Make a node of where the motion has led, unless it is one."""
-        if self._graph.motion.elapsed > 0.0:
+        """Make a node of where the motion has led, unless it is next to one: a factor has its length in its noise."""
+        if self._graph.motion.elapsed > LATE:
             factor, values = self._graph.extend()
             self.motions.push_back(factor)
             self.values.insert(values)
