@@ -29,7 +29,7 @@ from math import sqrt
 
 import numpy as np
 
-from estimators.solvers.kalman import joseph_update
+from estimators.solvers.joseph import joseph_update
 from simnav.compiled import kernel
 
 __all__ = ["chain_cost", "solve_chain"]

@@ -45,9 +45,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.adaptations.base import Adaptation
+from estimators.models.base import Observation
 from estimators.models.inertial import InertialModel
 from estimators.models.propagation import propagate_covariance
-from estimators.solvers.kalman import KalmanEstimator, Observation
+from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import UnsuitableScenario
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 

@@ -1,13 +1,12 @@
 """The error-state extended Kalman filter with feedback, over any model.
 
 Every measurement is used at its own time of validity: the state is propagated to it, inside the step. The covariance is
-updated in Joseph's form, which stays symmetric and positive semi-definite for any gain.
+updated in Joseph's form (`estimators.solvers.joseph`).
 
 Measurements that cannot be used are counted, in the diagnostic ``skipped``: values that mean nothing (not finite, not
 on Earth), those older than the state, repetitions, and innovations whose covariance is singular.
 
-Source: P. D. Groves 2013, sections 3.2 and 3.4.3; G. J. Bierman, *Factorization Methods for Discrete Sequential
-Estimation*, 1977, for Joseph's form.
+Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 """
 
 from __future__ import annotations
@@ -23,8 +22,7 @@ from estimators.solvers.joseph import joseph_update
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
-__all__ = ["KalmanEstimator", "Observation", "joseph_update"]
-
+__all__ = ["KalmanEstimator"]
 
 #: Of `KalmanEstimator`: what is done with a measurement.
 _HOOKS = ("_observe", "_linearise", "_correct")

@@ -24,7 +24,7 @@ Choices (``ALGORITHMS.md`` leaves them open; paper 000 compares with a UKF and g
   motion lack the process noise, and the innovation's covariance would lack H Q H'.
 - They are drawn once between measurements, not at every IMU sample: the motion of minutes is nearly linear in its
   errors, and the RMSE is the same.
-- The update of the covariance is Joseph's (`estimators.solvers.kalman.joseph_update`), and the square root accepts a
+- The update of the covariance is Joseph's (`estimators.solvers.joseph.joseph_update`), and the square root accepts a
   semi-definite matrix, so that a state known exactly does no harm.
 """
 
@@ -35,8 +35,9 @@ from math import sqrt
 import numpy as np
 
 from estimators.adaptations.base import Adaptation
+from estimators.models.base import Observation
 from estimators.models.points import PointModel
-from estimators.solvers.kalman import KalmanEstimator, Observation
+from estimators.solvers.kalman import KalmanEstimator
 from simnav.compiled import kernel
 from simnav.types import Array, InitialState, Instruments, Measurement
 

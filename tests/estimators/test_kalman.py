@@ -13,7 +13,8 @@ from scipy.stats import chi2
 from estimators.adaptations.base import Adaptation, Innovation
 from estimators.ekf import Ekf
 from estimators.models.base import ErrorModel, Linearised
-from estimators.solvers.kalman import KalmanEstimator, joseph_update
+from estimators.solvers.joseph import joseph_update
+from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import UnsuitableScenario, make, names
 from simnav.recording import Recording
 from simnav.scenario import load
