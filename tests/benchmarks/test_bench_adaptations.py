@@ -1,8 +1,8 @@
 """What an adaptation costs: every row beside the plain EKF, over two minutes of the open sea (four instruments).
 
 Compared are whole updates, the IMU's second included. The plain EKF takes a measurement in one kernel; a filter that
-adapts takes it in two, with the adaptation in Python between them. More than half of what the rows cost beyond the plain
-filter is that division: see ``fading-ekf``, which only multiplies P by a number.
+adapts takes it in two, with the adaptation in Python between them. More than half of what the rows cost beyond the
+plain filter is that division: see ``fading-ekf``, which only multiplies P by a number.
 """
 
 from __future__ import annotations
