@@ -15,7 +15,7 @@ Source: F. Dellaert and others, GTSAM 4.3.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from simnav.compiled import kernel
 from simnav.rotation import rpy_from_dcm
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
-__all__ = ["InertialGraph", "observe_tangent"]
+__all__ = ["InertialGraph", "Observation", "observe_tangent"]
 
 #: Correlations of less than this between the groups of a prior are left out.
 LEAST_CORRELATION = 1e-2
@@ -87,6 +87,24 @@ def observe_tangent(  # type: ignore[no-untyped-def]
     return d
 
 
+class Observation(NamedTuple):
+    """A measurement on a node, as it takes to make its factor.
+
+    Attributes
+    ----------
+    measurement : Measurement
+    noise : (m, m) array
+    node : int
+    rate : (3,) array
+        Body rate there, as measured [rad/s].
+    """
+
+    measurement: Measurement
+    noise: Array
+    node: int
+    rate: Array
+
+
 class InertialGraph:
     """Makes the nodes and factors of a run; the newest node, and what happened since, is at hand.
 
@@ -97,8 +115,6 @@ class InertialGraph:
         From the newest node on.
     node : int
         Number of the newest node.
-    times : list of float
-        Of all nodes.
     start_covariance : (15, 15) array
         Of node 0's variables.
     """
@@ -117,7 +133,7 @@ class InertialGraph:
         bias = gtsam.imuBias.ConstantBias()
         self.motion = Preintegration(self.model._noise, np.diag(covariance)[9:], frame, start.time)
         self.motion.begin(state, bias)
-        self.node, self.times, self._rates = 0, [start.time], [np.zeros(3)]
+        self.node, self._rate = 0, np.zeros(3)
         self._aid = {name: (code, np.array(arm)) for name, (code, arm, _, _) in self.model.aid_parameters.items()}
         inverse = np.linalg.inv(self._error_map(state))
         self.start_covariance = inverse @ covariance @ inverse.T
@@ -174,8 +190,7 @@ class InertialGraph:
         state = motion.predict()
         factor = motion.factor(self.keys(self.node), self.keys(self.node + 1))
         self.node += 1
-        self.times.append(motion.time)
-        self._rates.append(motion.rate)
+        self._rate = motion.rate
         motion.begin(state, motion.bias)
         return factor, self.values(self.node, state, motion.bias)
 
@@ -189,10 +204,15 @@ class InertialGraph:
         model.raw_rate[:] = self.motion.rate
         return model.measure(measurement)
 
-    def aid(self, measurement: Measurement, noise: Array, node: int) -> Any:
-        """The factor of a measurement on a node, with its (m, m) noise."""
+    def observe(self, measurement: Measurement, noise: Array) -> Observation:
+        """A measurement on the newest node, with its (m, m) noise."""
+        return Observation(measurement, noise, self.node, self._rate)
+
+    def aid(self, observation: Observation) -> Any:
+        """The factor of a measurement."""
         import gtsam
 
+        measurement, noise, node, rate = observation
         name, value = measurement.instrument, np.array(measurement.value, dtype=np.float64)
         code, arm = self._aid[name]
         if measurement.kind == "gnss_position":
@@ -200,7 +220,7 @@ class InertialGraph:
             gaussian = gtsam.noiseModel.Gaussian.Covariance(turn @ noise @ turn.T)
             return gtsam.GPSFactorArm(self.keys(node)[0], self.frame.local(value), arm, gaussian)
         x, v, b = self.keys(node)
-        origin, axes, rate, m = self.frame.origin, self.frame.axes, self._rates[node], len(noise)
+        origin, axes, m = self.frame.origin, self.frame.axes, len(noise)
         moving = measurement.kind in ("gnss_velocity", "dvl", "speed_log")
         levered = moving and bool(np.any(arm))
         still, unbiased = np.zeros(3), np.zeros(6)

@@ -30,7 +30,7 @@ import numpy as np
 
 from estimators.models.suitable import require_inertial_aids
 from estimators.solvers.admission import LATE, Admission
-from estimators.solvers.gtsam_graph import InertialGraph
+from estimators.solvers.gtsam_graph import InertialGraph, Observation
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
@@ -109,7 +109,8 @@ class GtsamEstimator(Estimator):
             self._epoch += 1
             diagnostics.update(self._take(step))
         diagnostics |= {"skipped": float(self._admission.skipped), "restarts": float(self._restarts)}
-        self._ends.append((measurements.time, graph.node))
+        if self.every_step:
+            self._ends.append((measurements.time, graph.node))
         estimate = graph.estimate(self._covariance)
         estimate.diagnostics = diagnostics
         return estimate
@@ -149,8 +150,10 @@ class GtsamEstimator(Estimator):
         graph.motion.revise(state, bias)
         self._covariance = covariance
         self._keep(step, found)
-        for k, (m, _, _) in enumerate(step.observed):
-            diagnostics[f"residual.{m.instrument}"] = float(np.sqrt(max(0.0, 2.0 * step.aids.at(k).error(found))))
+        for k, observation in enumerate(step.observed):
+            diagnostics[f"residual.{observation.measurement.instrument}"] = float(
+                np.sqrt(max(0.0, 2.0 * step.aids.at(k).error(found)))
+            )
         return diagnostics
 
     def _isam2_parameters(self) -> Any:
@@ -320,7 +323,7 @@ class BatchEstimator(FixedLagEstimator):
         self._factors, self._start = gtsam.NonlinearFactorGraph(), gtsam.Values(values)
         self._factors.push_back(prior)
         self._aiding: list[int] = []
-        self._observed: list[tuple[Measurement, Array, int]] = []
+        self._observed: list[Observation] = []
         super()._begin(prior, values)
 
     def _keep(self, step: _Step, found: Any) -> None:
@@ -412,10 +415,11 @@ class GncEstimator(BatchEstimator):
         weighted = gtsam.NonlinearFactorGraph()
         for k in sorted(set(range(self._factors.size())) - set(self._aiding)):
             weighted.push_back(self._factors.at(k))
-        for (measurement, noise, node), weight in zip(self._observed, found, strict=True):
+        self.weights = []
+        for observation, weight in zip(self._observed, found.tolist(), strict=True):
+            self.weights.append((observation.measurement.instrument, observation.measurement.time, weight))
             if weight > LEAST_WEIGHT:
-                weighted.push_back(self.graph.aid(measurement, noise / weight, node))
-        self.weights = [(m.instrument, m.time, float(w)) for (m, _, _), w in zip(self._observed, found, strict=True)]
+                weighted.push_back(self.graph.aid(observation._replace(noise=observation.noise / weight)))
         return gtsam.LevenbergMarquardtOptimizer(weighted, values, self._parameters()).optimize()
 
     def _exposed(self, values: Any) -> tuple[Any, list[int]]:
@@ -459,7 +463,7 @@ class _Step:
             gtsam.NonlinearFactorGraph(),
             gtsam.Values(),
         )
-        self.observed: list[tuple[Measurement, Array, int]] = []
+        self.observed: list[Observation] = []
 
     def extend(self) -> None:
         """Make a node of where the motion has led, unless it is next to one: a factor has its length in its noise."""
@@ -470,9 +474,9 @@ class _Step:
 
     def observe(self, measurement: Measurement, noise: Array) -> None:
         """Attach a measurement to the newest node."""
-        node = self._graph.node
-        self.aids.push_back(self._graph.aid(measurement, noise, node))
-        self.observed.append((measurement, noise, node))
+        observation = self._graph.observe(measurement, noise)
+        self.aids.push_back(self._graph.aid(observation))
+        self.observed.append(observation)
 
     def drop_aids(self) -> None:
         """Leave the measurements out."""
