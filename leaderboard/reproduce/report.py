@@ -149,7 +149,8 @@ def _ours(f: Finding) -> str:
         return tables.interval(f.ours.value, f.ours.low, f.ours.high)
     if f.ours.value > 2.0:  # no gain of a few per cent any more
         return f"worse by a factor of {tables.interval(f.ours.value, f.ours.low, f.ours.high)}"
-    value, low, high = (1.0 - x for x in (f.ours.value, f.ours.high, f.ours.low))
+    # Rounded here, and added to zero, so that there is no -0.0.
+    value, low, high = (round(1.0 - x, 3) + 0.0 for x in (f.ours.value, f.ours.high, f.ours.low))
     if low != low or high != high:
         return tables.percent(value)
     return f"{tables.percent(value)} [{100.0 * low:.1f}, {100.0 * high:.1f}]"
