@@ -102,8 +102,8 @@ class Features:
         self._motion = Motion(instruments)
         self._recent: dict[str, tuple[float, float]] = {}
 
-    def observe(self, innovation: Innovation) -> Array | None:
-        """See an innovation; the (1, n) inputs where it is a fix of GNSS, else None."""
+    def observe(self, innovation: Innovation) -> list[float] | None:
+        """See an innovation; the n inputs where it is a fix of GNSS, else None."""
         m = innovation.measurement
         if m.kind != "gnss_position":
             self._motion.observe(innovation)
@@ -113,7 +113,7 @@ class Features:
         mean += (1.0 - exp(-max(m.time - before, 0.0) / self.MEMORY)) * (now - mean)
         self._recent[m.instrument] = m.time, mean
         known = {"innovation": now, "recent_innovations": mean}
-        return np.array([[known[n] if n in known else getattr(self._motion, n) for n in self._names]])
+        return [known[n] if n in known else getattr(self._motion, n) for n in self._names]
 
 
 class Anfis(NoiseAdaptation):
@@ -150,7 +150,7 @@ class Anfis(NoiseAdaptation):
         """Begin a run."""
         super().reset(instruments)
         self._inputs = Features(self.features, instruments)
-        self._seen: Array | None = None
+        self._seen: list[float] | None = None
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """The noise to use; compass and log are watched on the way."""
@@ -161,7 +161,7 @@ class Anfis(NoiseAdaptation):
         """The noise scaled by the network, for a fix; the nominal noise for anything else."""
         if self._seen is None:
             return innovation.noise
-        factor = exp(float(self.parameters.log_factor(self._seen)[0]))
+        factor = exp(self.parameters.log_factor_of(self._seen))
         return innovation.noise * min(max(factor, self.lowest**2), self.highest**2)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -66,6 +67,19 @@ class Parameters:
         """(k,) logarithms of the variance over the datasheet's, of (k, n) inputs."""
         bounded: Array = np.clip(self.network(self.scale(x)), 0.0, self.largest)
         return bounded
+
+    def log_factor_of(self, row: list[float]) -> float:
+        """`log_factor` of one row of inputs, quicker."""
+        scaled = [
+            (min(max(typical if x != x else x, low), high) - low) / (high - low)
+            for x, (low, high, typical) in zip(row, self._ranges)
+        ]
+        return min(max(self.network.single(scaled), 0.0), self.largest)
+
+    @cached_property
+    def _ranges(self) -> list[list[float]]:
+        ranges: list[list[float]] = np.column_stack([self.low, self.high, self.typical]).tolist()
+        return ranges
 
     def save(self, path: Path) -> None:
         """Write the file; OSError where that cannot be."""

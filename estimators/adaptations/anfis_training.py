@@ -169,7 +169,7 @@ class _Teacher(Adaptation):
     def __init__(self, recording: Recording):
         stream = recording.data.aids["gnss"]
         self._factors = dict(zip(stream.time.tolist(), log_factors(recording, stream).tolist()))
-        self.inputs: dict[str, list[Array]] = {name: [] for name in FEATURES}
+        self.inputs: dict[str, list[list[float]]] = {name: [] for name in FEATURES}
         self.outputs: list[float] = []
 
     def reset(self, instruments: Instruments) -> None:
@@ -223,7 +223,7 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
     from estimators.solvers.kalman import KalmanEstimator
     from simnav.source import record
 
-    inputs: dict[str, list[Array]] = {name: [] for name in FEATURES}
+    inputs: dict[str, list[list[float]]] = {name: [] for name in FEATURES}
     outputs: list[float] = []
     done = 0
     for seed in seeds:
@@ -242,7 +242,7 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
             done += 1
             if told is not None:
                 told(done)
-    return Data({name: np.concatenate(rows) for name, rows in inputs.items()}, np.array(outputs))
+    return Data({name: np.array(rows) for name, rows in inputs.items()}, np.array(outputs))
 
 
 def train(

@@ -13,6 +13,9 @@ Cybernetics 23(3), 1993, section III:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from math import exp
+from operator import mul
 
 import numpy as np
 
@@ -62,14 +65,15 @@ class Sugeno:
     def weights(self, x: Array) -> Array:
         """Layers 2 and 3: (k, m**n) normalised strengths of (k, n) inputs.
 
-        By logarithms, so that an input far from all memberships still belongs to the nearest.
+        The sum over all rules of products is the product of the sums: so the grades of each input may be normalised by
+        themselves; by the largest first, so that an input far from all memberships still belongs to the nearest.
         """
         logs = -0.5 * ((x[:, :, None] - self.centres) / self.widths) ** 2
-        strength: Array = logs[:, 0]
-        for i in range(1, logs.shape[1]):
-            strength = (strength[:, :, None] + logs[:, i, None, :]).reshape(len(x), -1)
-        strength = np.exp(strength - strength.max(axis=1, keepdims=True))
-        strength /= strength.sum(axis=1, keepdims=True)
+        shares = np.exp(logs - logs.max(axis=2, keepdims=True))
+        shares /= shares.sum(axis=2, keepdims=True)
+        strength: Array = shares[:, 0]
+        for i in range(1, shares.shape[1]):
+            strength = (strength[:, :, None] * shares[:, i, None, :]).reshape(len(x), -1)
         return strength
 
     def rules(self, x: Array) -> Array:
@@ -81,3 +85,20 @@ class Sugeno:
         """Layers 4 and 5: (k,) outputs of (k, n) inputs."""
         output: Array = np.einsum("kr,kr->k", self.weights(x), self.rules(x))
         return output
+
+    def single(self, x: list[float]) -> float:
+        """The output of one input: the same, for the most part in plain floats, which are quicker for so few."""
+        values: list[float] = (self.consequents @ [*x, 1.0]).tolist()
+        for value, memberships in zip(reversed(x), reversed(self._premises)):
+            logs = [((value - centre) / width) ** 2 for centre, width in memberships]
+            nearest = min(logs)
+            shares = [exp(0.5 * (nearest - log)) for log in logs]
+            total, m = sum(shares), len(shares)
+            values = [sum(map(mul, values[k : k + m], shares)) / total for k in range(0, len(values), m)]
+        return values[0]
+
+    @cached_property
+    def _premises(self) -> list[list[list[float]]]:
+        """Centre and width of each membership of each input."""
+        listed: list[list[list[float]]] = np.stack([self.centres, self.widths], axis=2).tolist()
+        return listed

@@ -83,21 +83,24 @@ def test_features_of_the_innovation():
     second = features.observe(innovation("gnss", 2.0, 0.0, [0.0, 0.0]))
     assert first is not None
     assert second is not None
-    np.testing.assert_allclose(first[0, :2], np.log(3.0))
-    np.testing.assert_allclose(second[0, :2], [0.0, np.log(3.0) * np.exp(-0.1)])
-    assert np.isnan(first[0, 2])  # no compass yet
+    np.testing.assert_allclose(first[:2], np.log(3.0))
+    np.testing.assert_allclose(second[:2], [0.0, np.log(3.0) * np.exp(-0.1)])
+    assert np.isnan(first[2])  # no compass yet
 
 
 def test_inputs_are_clipped_to_training_and_unknown_ones_typical():
     rng = np.random.default_rng(1)
     grid = Sugeno.grid(3)
     network = replace(grid, consequents=rng.random(grid.consequents.shape))
-    p = Parameters("motion", np.array([1.0, 0.0, 0.0]), np.array([9.0, 0.1, 0.2]), np.array([5.0, 0.02, 0.01]), 9.0, network)  # fmt: skip
+    low, high, typical = np.array([1.0, 0.0, 0.0]), np.array([9.0, 0.1, 0.2]), np.array([5.0, 0.02, 0.01])
+    p = Parameters("motion", low, high, typical, 9.0, network)
     np.testing.assert_allclose(p.scale(np.array([[5.0, 0.1, 0.05]])), [[0.5, 1.0, 0.25]])
     far, edge = np.array([[90.0, 7.0, -1.0]]), np.array([[9.0, 0.1, 0.0]])
     assert p.log_factor(far) == p.log_factor(edge)
     assert p.log_factor(np.full((1, 3), np.nan)) == p.log_factor(p.typical[None])
     assert replace(p, largest=0.1).log_factor(edge) == 0.1
+    for row in (far, edge, np.array([[np.nan, 0.05, 0.03]])):
+        assert p.log_factor_of(row[0].tolist()) == pytest.approx(p.log_factor(row)[0], rel=1e-12)
 
 
 # The adaptation
