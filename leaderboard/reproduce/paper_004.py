@@ -96,7 +96,7 @@ PAPER = Paper(
     title="AUV navigation with a federated filter, with graphs, and smoothed",
     citation="'Post-processing algorithm based on factor graph optimization for AUV integrated navigation'; simulation "
     "and semi-physical experiment",
-    runs=8,
+    runs=6,
     full=100,
     methods=(
         Method("Federated KF", ("federated",)),
