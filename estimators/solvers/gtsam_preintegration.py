@@ -42,6 +42,7 @@ INTEGRATION = 1e-12
 #: A stretch without data is integrated in at least so many parts of at most this length [s]: of a single one the noise
 #: of velocity and position would be the same.
 HELD_PARTS, HELD_PART = 4, 0.1
+_EYE = np.eye(3)
 
 
 @kernel("UniTuple(i8, 2)(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8, f8[:, ::1])")
@@ -158,8 +159,8 @@ class Preintegration:
     def __init__(self, densities: Array, variance: Array, frame: TangentFrame, time: float):
         self._noise, self._frame = densities, frame
         self._walk = (
-            max(float(densities[3]), LEAST_WALK * float(variance[0]), LEAST_WALK * LEAST_GYROSCOPE),
-            max(float(densities[5]), LEAST_WALK * float(variance[3]), LEAST_WALK * LEAST_ACCELEROMETER),
+            max(float(densities[3]), LEAST_WALK * float(variance[0]), LEAST_WALK * LEAST_GYROSCOPE) * _EYE,
+            max(float(densities[5]), LEAST_WALK * float(variance[3]), LEAST_WALK * LEAST_ACCELEROMETER) * _EYE,
         )
         self._clock, self._memory, self._turn = np.zeros(14), np.zeros(6), np.zeros(3)
         self._clock[0], self._clock[1] = time, -1e9
@@ -197,20 +198,22 @@ class Preintegration:
         turning = noise[6] * turn + noise[7] * (turn.sum() - turn)
         self._white = (
             np.diag(np.maximum(noise[0] + turning, LEAST_GYROSCOPE)),
-            max(float(noise[1]), LEAST_ACCELEROMETER) * np.eye(3),
+            max(float(noise[1]), LEAST_ACCELEROMETER) * _EYE,
         )
         self._params = p = gtsam.PreintegrationCombinedParams(self._frame.gravity(state.position()))
         p.setOmegaCoriolis(self._frame.rotation)
         p.setGyroscopeCovariance(self._white[0])
         p.setAccelerometerCovariance(self._white[1])
-        p.setIntegrationCovariance(INTEGRATION * np.eye(3))
-        p.setBiasOmegaCovariance(self._walk[0] * np.eye(3))
-        p.setBiasAccCovariance(self._walk[1] * np.eye(3))
+        p.setIntegrationCovariance(INTEGRATION * _EYE)
+        p.setBiasOmegaCovariance(self._walk[0])
+        p.setBiasAccCovariance(self._walk[1])
         self._measurements = gtsam.PreintegratedCombinedMeasurementsG(p, bias)
+        self._end: Any = state
 
     def revise(self, state: Any, bias: Any) -> None:
         """The node has moved; what was integrated stays, about the former bias."""
         self.state, self.bias = state, bias
+        self._end = state if self._measurements.deltaTij() == 0.0 else None
 
     def advance(self, until: float) -> None:
         """Integrate up to a time."""
@@ -229,6 +232,7 @@ class Preintegration:
                 self._hold(dt)
             else:
                 integrate(forces[k], rates[k], dt)
+            self._end = None
         self.elapsed += elapsed
         used = pieces[:, 7] == 0.0
         mean = (rates[used] - self._hat[:3]).T @ pieces[used, 0] / elapsed
@@ -240,8 +244,8 @@ class Preintegration:
         back = state.pose().rotation().matrix().T
         place, speed = state.position(), state.velocity()
         force = 2.0 * np.cross(w, speed) + np.cross(w, np.cross(w, place)) - self._frame.gravity(place)
-        p.setGyroscopeCovariance(self._white[0] + HELD_ATTITUDE**2 * np.eye(3))
-        p.setAccelerometerCovariance(self._white[1] + HELD_VELOCITY**2 * np.eye(3))
+        p.setGyroscopeCovariance(self._white[0] + HELD_ATTITUDE**2 * _EYE)
+        p.setAccelerometerCovariance(self._white[1] + HELD_VELOCITY**2 * _EYE)
         force, rate = back @ force + self._hat[3:], back @ w + self._hat[:3]
         parts = max(HELD_PARTS, ceil(dt / HELD_PART))
         for _ in range(parts):
@@ -252,11 +256,11 @@ class Preintegration:
 
     def predict(self) -> Any:
         """The gtsam.NavState at the end."""
-        if self._measurements.deltaTij() == 0.0:
-            return self.state
-        end = self._measurements.predict(self.state, self.bias)
-        self._params.n_gravity = self._frame.gravity(0.5 * (self.state.position() + end.position()))
-        return self._measurements.predict(self.state, self.bias)
+        if self._end is None:
+            end = self._measurements.predict(self.state, self.bias)
+            self._params.n_gravity = self._frame.gravity(0.5 * (self.state.position() + end.position()))
+            self._end = self._measurements.predict(self.state, self.bias)
+        return self._end
 
     def factor(self, begin: tuple[int, int, int], end: tuple[int, int, int]) -> Any:
         """The factor between two nodes, each given by the keys of pose, velocity and bias."""
