@@ -20,6 +20,7 @@ __all__ = [
     "dcm_from_quaternion",
     "dcm_from_rotation_vector",
     "dcm_from_rpy",
+    "left_jacobian",
     "quaternion_from_dcm",
     "rotation_coefficients",
     "rotation_vector_from_dcm",
@@ -141,6 +142,34 @@ def rotation_vector_from_dcm(dcm: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         factor = np.where(sine > 1e-12, 2.0 * half / sine, 2.0)
     return factor * q[..., 1:]
+
+
+def left_jacobian(rotation: Array) -> Array:
+    """Left Jacobian of SO(3): ``exp((phi + d) x) = exp((J d) x) exp(phi x)`` to first order in d.
+
+    Parameters
+    ----------
+    rotation : (3,) array
+        phi [rad].
+
+    Returns
+    -------
+    (3, 3) array
+        J. Sola, Deray and Atchuthan, *A micro Lie theory*, 2018, eq. 145.
+    """
+    x, y, z = rotation.tolist()
+    angle2 = x * x + y * y + z * z
+    if angle2 < 1e-6:
+        a, b = 0.5 - angle2 / 24.0, 1.0 / 6.0 - angle2 / 120.0
+    else:
+        angle = sqrt(angle2)
+        a, b = (1.0 - cos(angle)) / angle2, (angle - sin(angle)) / (angle2 * angle)
+    one = 1.0 - b * angle2  # [phi x]^2 = phi phi' - |phi|^2 I
+    return np.array([
+        [one + b * x * x, b * x * y - a * z, b * x * z + a * y],
+        [b * x * y + a * z, one + b * y * y, b * y * z - a * x],
+        [b * x * z - a * y, b * y * z + a * x, one + b * z * z],
+    ])  # fmt: skip
 
 
 def quaternion_from_dcm(dcm: Array) -> Array:

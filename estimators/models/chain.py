@@ -306,6 +306,10 @@ class Chain(ABC):
     def retract(self, step: Array) -> None:
         """Add a (K, n) step to the nodes and to the shifts of the motion factors; take it off the prior's."""
 
+    def turned(self, covariance: Array, shift: Array) -> Array:
+        """A covariance about a state, about another that is away by a (n,) shift; a hook, as `less`."""
+        return covariance
+
     def less(self, shift: Array, step: Array) -> Array:
         """A (n,) shift as seen from where a step leads; a hook for those whose errors do not simply subtract."""
         return shift - step

@@ -22,7 +22,7 @@ from estimators.models.inertial import InertialModel
 from estimators.models.measurements import observe_inertial
 from estimators.models.propagation import correct_inertial
 from simnav.compiled import kernel
-from simnav.rotation import cross, rotation_coefficients
+from simnav.rotation import cross, left_jacobian, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["InertialChain"]
@@ -200,6 +200,16 @@ class InertialChain(Chain):
             m["begin_shift"], m["end_shift"],
         )  # fmt: skip
         self.prior_shift = self.less(self.prior_shift, step[0])
+
+    def turned(self, covariance: Array, shift: Array) -> Array:
+        """``J P J'`` with the left Jacobian of the rotation."""
+        rotation = shift[6:9]
+        if float(rotation @ rotation) < 1e-14:
+            return covariance
+        J, P = left_jacobian(rotation), covariance.copy()
+        P[6:9] = J @ P[6:9]
+        P[:, 6:9] = P[:, 6:9] @ J.T
+        return P
 
     def less(self, shift: Array, step: Array) -> Array:
         """Rotations compose."""

@@ -42,9 +42,8 @@ import numpy as np
 
 from estimators.adaptations.base import Adaptation
 from estimators.models.inertial import InertialModel
-from estimators.solvers.iterated import left_jacobian
 from estimators.solvers.kalman import KalmanEstimator
-from simnav.rotation import skew
+from simnav.rotation import left_jacobian, skew
 from simnav.types import Array
 
 __all__ = ["InvariantKalmanEstimator"]

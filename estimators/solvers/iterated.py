@@ -17,7 +17,7 @@ Source: A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, sect
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -25,37 +25,10 @@ from estimators.adaptations.base import Adaptation, Innovation
 from estimators.models.base import ErrorModel
 from estimators.solvers.joseph import joseph_update
 from estimators.solvers.kalman import KalmanEstimator
+from simnav.rotation import left_jacobian
 from simnav.types import Array, Measurement
 
-__all__ = ["IteratedKalmanEstimator", "left_jacobian"]
-
-
-def left_jacobian(rotation: Array) -> Array:
-    """Left Jacobian of SO(3): ``exp((phi + d) x) = exp((J d) x) exp(phi x)`` to first order in d.
-
-    Parameters
-    ----------
-    rotation : (3,) array
-        phi [rad].
-
-    Returns
-    -------
-    (3, 3) array
-        Sola, Deray and Atchuthan, *A micro Lie theory*, 2018, eq. 145.
-    """
-    x, y, z = rotation.tolist()
-    angle2 = x * x + y * y + z * z
-    if angle2 < 1e-6:
-        a, b = 0.5 - angle2 / 24.0, 1.0 / 6.0 - angle2 / 120.0
-    else:
-        angle = sqrt(angle2)
-        a, b = (1.0 - cos(angle)) / angle2, (angle - sin(angle)) / (angle2 * angle)
-    one = 1.0 - b * angle2  # [phi x]^2 = phi phi' - |phi|^2 I
-    return np.array([
-        [one + b * x * x, b * x * y - a * z, b * x * z + a * y],
-        [b * x * y + a * z, one + b * y * y, b * y * z - a * x],
-        [b * x * z - a * y, b * y * z + a * x, one + b * z * z],
-    ])  # fmt: skip
+__all__ = ["IteratedKalmanEstimator"]
 
 
 class IteratedKalmanEstimator(KalmanEstimator):

@@ -269,8 +269,8 @@ class WindowEstimator(Estimator):
         motions, aids = chain.motions, chain.aids
         count = len(chain.nodes)
         size: float = solve_chain(
-            chain.prior, chain.prior_shift, motions["jacobian"], motions["noise"], motions["residual"],
-            motions["weight"], aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"],
+            chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
+            motions["jacobian"], motions["noise"], motions["residual"], motions["weight"], aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"],
             aids["noise"], aids["weight"], damping, *(a[:count] for a in self._work),
         )  # fmt: skip
         return size
@@ -294,7 +294,8 @@ class WindowEstimator(Estimator):
             leaving += self._epochs.popleft()
         if leaving:
             predicted, predicted_shift, _, _, step = self._work
-            chain.set_prior(predicted[leaving], chain.less(predicted_shift[leaving], step[leaving]))
+            mean = predicted_shift[leaving]
+            chain.set_prior(chain.turned(predicted[leaving], mean), chain.less(mean, step[leaving]))
             chain.drop(leaving)
 
     def _make_room(self, count: int) -> None:

@@ -11,8 +11,7 @@ from scipy.optimize import least_squares
 
 from estimators.ekf import Ekf
 from estimators.iterated import IteratedEkf
-from estimators.solvers.iterated import left_jacobian
-from simnav.rotation import rotation_vector_from_dcm, skew
+from simnav.rotation import left_jacobian, rotation_vector_from_dcm, skew
 from simnav.types import Datasheet, Instruments, Measurement, Measurements
 
 ARM = np.array([30.0, 4.0, -10.0])
