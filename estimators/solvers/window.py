@@ -270,8 +270,9 @@ class WindowEstimator(Estimator):
         count = len(chain.nodes)
         size: float = solve_chain(
             chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
-            motions["jacobian"], motions["noise"], motions["residual"], motions["weight"], aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"],
-            aids["noise"], aids["weight"], damping, *(a[:count] for a in self._work),
+            motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
+            aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
+            aids["weight"], damping, *(a[:count] for a in self._work),
         )  # fmt: skip
         return size
 
