@@ -39,7 +39,7 @@ class DynamicCovarianceScaling(MEstimator):
     efficiency : float
         On Gaussian noise.
     smallest : float
-        Least weight (`MEstimator`).
+        Least weight (`RobustWeighting`).
     """
 
     def __init__(self, phi: float = 0.0, efficiency: float = 0.95, smallest: float = 1e-3):

@@ -20,7 +20,8 @@ from typing import Literal
 import numpy as np
 
 from estimators.adaptations.m_estimators import constants, geman_mcclure, truncated
-from estimators.adaptations.weighting import Factors, Weighting
+from estimators.adaptations.robust_weighting import RobustWeighting
+from estimators.adaptations.weighting import Factors
 from simnav.types import Array, Instruments
 
 __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncated"]
@@ -42,7 +43,7 @@ def softened_geman_mcclure(square: Array, mu: float) -> Array:
     return weight
 
 
-class GraduatedNonConvexity(Weighting):
+class GraduatedNonConvexity(RobustWeighting):
     """The weighting of the module.
 
     Parameters
@@ -54,7 +55,7 @@ class GraduatedNonConvexity(Weighting):
         On Gaussian noise, of the hard cost; c follows. For truncated least squares and 95 %, c^2 is near the 99 %
         quantile of chi-square.
     smallest : float
-        Least weight (`estimators.adaptations.m_estimators.MEstimator`).
+        Least weight (`RobustWeighting`).
     """
 
     def __init__(
@@ -68,32 +69,35 @@ class GraduatedNonConvexity(Weighting):
             raise ValueError(f"cost = {cost!r}: it must be 'tls' or 'gm'")
         if not growth > 1.0:
             raise ValueError(f"growth = {growth:g}: it must be above 1")
-        if not 0.0 <= smallest <= 1.0:
-            raise ValueError(f"smallest = {smallest:g}: it must lie in [0, 1]")
-        self.cost, self.growth, self.smallest = cost, growth, smallest
+        super().__init__(smallest)
+        self.cost, self.growth = cost, growth
         tuned = constants(truncated if cost == "tls" else geman_mcclure, efficiency)
         self._scale = np.array([1.0, *tuned]) ** -2.0
         self._soft = softened_truncated if cost == "tls" else softened_geman_mcclure
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
+        super().reset(instruments)
         self._mu = self._hard = HARD if self.cost == "tls" else 1.0
         self._seen = self._newest = -np.inf
+        self._fresh = True
 
-    def weigh(self, factors: Factors) -> bool:
+    def begin(self) -> None:
+        """An epoch begins."""
+        self._seen, self._fresh = self._newest, True
+
+    def choose(self, factors: Factors) -> bool:
         """Set the weights of the measurements; False while the cost hardens."""
-        if factors.iteration == 0:
-            self._seen = self._newest
-            return False
         square = factors.norm * factors.norm * self._scale[factors.components]
-        if factors.iteration == 1:
-            self._begin(factors, square)
+        if self._fresh:
+            self._fresh = False
+            self._soften(factors, square)
         elif self._mu != self._hard:
             self._harden()
-        np.maximum(self._soft(square, self._mu), self.smallest, out=factors.weight)
+        factors.weight[:] = self._soft(square, self._mu)
         return self._mu == self._hard
 
-    def _begin(self, factors: Factors, square: Array) -> None:
+    def _soften(self, factors: Factors, square: Array) -> None:
         """Choose the epoch's first mu."""
         self._mu = self._hard
         new = factors.time > self._seen

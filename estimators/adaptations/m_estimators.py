@@ -16,7 +16,7 @@ components of a measurement keeps it invariant to rotations of its axes; the pri
 chi distributed: the constants listed are those of 95 % efficiency (`efficiency`).
 
 Huber's cost alone is convex. The others redescend, and what the iteration finds depends on where it begins: here at
-the weights of the epoch before, with new measurements at full weight (`MEstimator`).
+the weights of the epoch before, with new measurements at full weight (`RobustWeighting`).
 
 Source: P. J. Huber, *Robust Statistics*, 1981; Z. Zhang, "Parameter estimation techniques: a tutorial with application
 to conic fitting", *Image and Vision Computing* 15, 1997, table 1. Eq. 21 of paper 000 calls Geman-McClure what is
@@ -30,7 +30,8 @@ from functools import cache
 
 import numpy as np
 
-from estimators.adaptations.weighting import Factors, Weighting
+from estimators.adaptations.robust_weighting import RobustWeighting
+from estimators.adaptations.weighting import Factors
 from simnav.types import Array
 
 __all__ = ["MEstimator", "cauchy", "constants", "efficiency", "geman_mcclure", "huber", "truncated", "tukey"]
@@ -117,12 +118,8 @@ def constants(weight: WeightFunction, wanted: float = 0.95) -> tuple[float, floa
     return solve(1), solve(2), solve(3)
 
 
-class MEstimator(Weighting):
-    """Weighs each measurement by a function of its whitened norm; motion counts in full.
-
-    A new measurement counts in full at an epoch's first iteration and is weighed by what is then left of its residual.
-    So one that contradicts a window that is sure is suppressed, and one that corrects a window that is unsure, as
-    after an outage, is not: whitened by R alone, its residual before the solution would look like an outlier's.
+class MEstimator(RobustWeighting):
+    """Weighs each measurement by a function of its whitened norm.
 
     Parameters
     ----------
@@ -131,22 +128,17 @@ class MEstimator(Weighting):
     constants : (3,) sequence of float
         c of measurements of 1, 2 and 3 components.
     smallest : float
-        Least weight. A redescending function can lock a window out that is wrong itself: the good measurements then
-        have no weight, and nothing pulls it back. With 0.001, an error of 30 sigma pulls by 0.03 sigma, and many
-        good measurements together bring the window back, if slowly. 0 is the literature's form.
+        Least weight (`RobustWeighting`).
     """
 
     def __init__(self, weight: WeightFunction, constants: tuple[float, float, float], smallest: float = 1e-3):
         if not min(constants) > 0.0:
             raise ValueError(f"constants = {constants}: they must be above 0")
-        if not 0.0 <= smallest <= 1.0:
-            raise ValueError(f"smallest = {smallest:g}: it must lie in [0, 1]")
-        self.weight, self.smallest = weight, smallest
+        super().__init__(smallest)
+        self.weight = weight
         self._scale = 1.0 / np.array([1.0, *constants])
 
-    def weigh(self, factors: Factors) -> bool:
+    def choose(self, factors: Factors) -> bool:
         """Set the weights of the measurements."""
-        if factors.iteration == 0:
-            return False
-        np.maximum(self.weight(factors.norm * self._scale[factors.components]), self.smallest, out=factors.weight)
+        factors.weight[:] = self.weight(factors.norm * self._scale[factors.components])
         return True

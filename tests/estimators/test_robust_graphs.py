@@ -138,6 +138,25 @@ def test_a_window_that_is_wrong_is_not_locked_out_for_ever(misled, run_over, nam
     assert np.all((np.diff(north) < -5.0) | (north[1:] < 5.0))
 
 
+@pytest.fixture(scope="module")
+def disturbed(recording_of):
+    """0.3 m/s^2 on an accelerometer for 30 s, 300 times its datasheet, and then an outlier in every tenth fix."""
+    recording = recording_of(4, 120.0)
+    imu = recording.data.imu
+    force = imu.specific_force.copy()
+    force[(imu.time > 30.0) & (imu.time <= 60.0), 0] += 0.3
+    recording = replace(recording, data=replace(recording.data, imu=replace(imu, specific_force=force)))
+    spoil(recording, 0.1, 4)
+    return recording
+
+
+@pytest.mark.parametrize("name", [n for n in PLAIN if n != "ga-fgo-paper"])
+def test_a_disturbed_imu_does_not_lock_the_aids_out(disturbed, run_over, name: str):
+    """Fixes and DVL disagree with the motion, and it is the motion that is weighed down."""
+    errors, _ = run_over(make(name), disturbed)
+    assert np.hypot(errors[29:, 0], errors[29:, 1]).max() < 15.0
+
+
 @pytest.mark.parametrize("name", ALL)
 def test_nothing_but_outliers_and_absurd_values(recording_of, name: str):
     """Every fix wrong by 40 m in its own direction, some not finite: valid estimates, checked by the trial."""

@@ -30,6 +30,7 @@ from estimators.adaptations.m_estimators import (
     tukey,
 )
 from estimators.adaptations.max_mixture import MaxMixture
+from estimators.adaptations.robust_weighting import weigh_motion
 from estimators.adaptations.switchable_constraints import SwitchableConstraints
 from estimators.adaptations.weighting import Factors, Weighting
 from simnav.types import Datasheet, Instruments
@@ -221,6 +222,17 @@ def test_weights_do_not_depend_on_the_axes_or_the_unit(name: str):
         found.append(f.weight)
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
     np.testing.assert_allclose(found[2], found[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("n", [3, 9, 15, 22])
+def test_motion_counts_in_full_up_to_the_quantile_and_then_as_noisy_as_it_shows(n: int):
+    limit = chi.ppf(0.999, n)
+    motion = np.zeros((4, n))
+    motion[:, 0] = np.array([0.0, 0.99, 2.0, 100.0]) * limit
+    f = factors(along(np.ones(4)), motion=motion)
+    weigh_motion(f)
+    np.testing.assert_allclose(f.motion_weight, [1.0, 1.0, 0.25, 1e-4], rtol=0.02)
+    np.testing.assert_allclose((f.motion_weight**0.5 * f.motion_norm)[2:], limit, rtol=0.01)
 
 
 # Dynamic covariance scaling and switchable constraints
