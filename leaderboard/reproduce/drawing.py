@@ -82,7 +82,7 @@ def curves_over_time(
         fullest = max(range(len(axes)), key=lambda i: len(list(panels.values())[i]), default=0)
         for ax, (label, curves) in zip(axes, panels.items(), strict=True):
             shade(ax, outages, factor, named=ax is axes[0])
-            order = sorted(curves, key=_size)  # the smallest on top
+            order = sorted(curves, key=_layer)
             for k in range(len(order) - 1, -1, -1):  # what lies below is wider, so that equal curves are both seen
                 c, (time, values) = order[k], broken(order[k].time, order[k].values)
                 colour, line = style.colour(c.label), style.line(c.label)
@@ -95,9 +95,10 @@ def curves_over_time(
     return fig
 
 
-def _size(curve: Curve) -> float:
+def _layer(curve: Curve) -> tuple[bool, float]:
+    """From the top: the truth, then the smallest."""
     known = curve.values[np.isfinite(curve.values)]
-    return float(np.mean(known**2)) if len(known) else 0.0
+    return curve.label != "truth", float(np.mean(known**2)) if len(known) else 0.0
 
 
 def broken(time: Array, values: Array) -> tuple[Array, Array]:
