@@ -40,6 +40,7 @@ _KNOWN = (
     "lack the "
     "current and the biases that ours estimate"
 )
+_PRESENT = "a network that sees the present innovation alone cannot tell a noisy stretch from chance"
 _NOISIER = "how much the noise grows decides it, and is ours"
 _FAST = (
     "how much a window saves goes with the length of the run and with the solver; a block-tridiagonal one takes the "
@@ -151,8 +152,12 @@ PAPER = Paper(
         Table(
             "Beyond the paper: CM, fixes five times as noisy as they should be for two stretches of 150 s",
             (
-                Gain(_NOISY, "ANFIS-FGO", "EKF", "horizontal_rmse", 0.30, derived=True, higher=_NOISIER),
-                Gain(_NOISY, "ANFIS-FGO", "FGO", "horizontal_rmse", 0.10, derived=True, higher=_NOISIER),
+                Gain(
+                    _NOISY, "ANFIS-FGO", "EKF", "horizontal_rmse", 0.30, derived=True, lower=_PRESENT, higher=_NOISIER
+                ),
+                Gain(
+                    _NOISY, "ANFIS-FGO", "FGO", "horizontal_rmse", 0.10, derived=True, lower=_PRESENT, higher=_NOISIER
+                ),
                 *(Value(_NOISY, m, "horizontal_rmse") for m in (*_METHODS, "ANFIS-FGO, motion alone")),
             ),
         ),
