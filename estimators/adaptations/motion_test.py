@@ -46,10 +46,13 @@ class MotionTest:
         self._blamed: list[tuple[float, float]] = []
         self._tested = -np.inf
         self._asking: tuple[float, float] | None = None
+        self._weight = self._motion_weight = np.empty(0)
         self._fresh = True
 
-    def begin(self) -> None:
+    def begin(self, factors: Factors) -> None:
         """An epoch begins."""
+        if self._asking is not None:  # the last one ended before the answer
+            factors.motion_weight[:] = 1.0
         self._fresh, self._asking = True, None
 
     def judge(self, factors: Factors) -> bool:
@@ -62,25 +65,34 @@ class MotionTest:
         """
         if not self._is_fix:
             return True
-        if self._fresh:
-            self._fresh = False
-            self._suspect(factors)
-        elif self._asking is not None:
-            self._answer(factors)
+        asked, self._asking = self._asking, None
+        if asked is not None:
+            if not self._agree(factors, *asked):
+                # What was weighed here took the motion for the outlier: back to where the question was asked.
+                count = min(len(factors.weight), len(self._weight))
+                factors.weight[:count] = self._weight[:count]
+                factors.motion_weight[:] = self._motion_weight
+                return False
+            if self._blamed and asked[0] <= self._blamed[-1][1]:
+                self._blamed.pop()
+            self._blamed.append(asked)
+        suspected = self._suspect(factors) if self._fresh else None
+        self._fresh = False
         for start, end in self._blamed:
             factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
-        if self._asking is None:
+        if suspected is None:
             return True
-        start, end = self._asking
+        start, end = self._asking = suspected
+        self._weight, self._motion_weight = factors.weight.copy(), factors.motion_weight.copy()
         factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
         factors.motion_weight[(factors.motion_time >= start) & (factors.motion_time <= end)] = LOOSE
         return False
 
-    def _suspect(self, factors: Factors) -> None:
-        """Test the new measurements, as the window fits them with full weight."""
+    def _suspect(self, factors: Factors) -> tuple[float, float] | None:
+        """Test the new measurements, as the window fits them with full weight; the time in which motion is suspect."""
         new = np.flatnonzero(factors.time > self._tested)
         if not len(new):
-            return
+            return None
         self._tested = now = float(factors.time[new].max())
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
         for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
@@ -93,18 +105,16 @@ class MotionTest:
         self._blamed = [span for span in self._blamed if span[1] >= factors.time[0]]
         failing = {n: f for n, f in self._failures.items() if now - f[2] <= self.recent}
         if self._blamed and now - self._blamed[-1][1] <= self.recent and failing:
-            self._asking = self._blamed[-1][0], now
-        else:
-            failing = {n: f for n, f in failing.items() if f[0] >= self.together}
-            if len({self._is_fix[name] for name in failing}) == 2:
-                self._asking = min(since for _, since, _ in failing.values()), now
+            return self._blamed[-1][0], now
+        failing = {n: f for n, f in failing.items() if f[0] >= self.together}
+        if len({self._is_fix[name] for name in failing}) < 2:
+            return None
+        return min(since for _, since, _ in failing.values()), now
 
-    def _answer(self, factors: Factors) -> None:
-        """Blame the motion if, without it, fixes and logs agree."""
+    def _agree(self, factors: Factors, start: float, end: float) -> bool:
+        """Whether a fix and a log fit, as the window is without its motion."""
         from scipy.special import chdtri
 
-        assert self._asking is not None
-        (start, end), self._asking = self._asking, None
         asked = (factors.time >= start) & (factors.time <= end)
         agreeing = set()
         for i, name in enumerate(factors.names):
@@ -114,7 +124,4 @@ class MotionTest:
                 continue
             if float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.probability):
                 agreeing.add(self._is_fix[name])
-        if len(agreeing) == 2:
-            if self._blamed and start <= self._blamed[-1][1]:
-                self._blamed.pop()
-            self._blamed.append((start, end))
+        return len(agreeing) == 2

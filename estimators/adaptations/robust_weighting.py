@@ -58,7 +58,7 @@ class RobustWeighting(Weighting):
     def weigh(self, factors: Factors) -> bool:
         """Set the weights of the measurements and of motion."""
         if factors.iteration == 0:
-            self._test.begin()
+            self._test.begin(factors)
             self.begin()
             return False
         settled = self.choose(factors)

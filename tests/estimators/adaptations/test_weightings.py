@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -505,3 +506,62 @@ def test_a_clean_regression_loses_little(name: str):
 def test_settings_that_cannot_be(make, message: str):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+# Whose fault it is
+
+
+def asked(agree: bool) -> tuple[MEstimator, list[Factors]]:
+    """Three epochs in which fix and DVL fail, and what follows at the third when motion has been loosened."""
+    weighting = MEstimator(tukey, constants(tukey))
+    weighting.reset(SHEETS)
+    seen = []
+    for epoch in (1, 2, 3):
+        instrument = np.tile([0, 1], epoch)
+        f = factors(along(np.full(2 * epoch, 40.0)), ("gnss", "dvl"), instrument, motion=np.zeros((epoch, 15)))
+        f.time[:] = np.repeat(np.arange(1.0, epoch + 1.0), 2)
+        f.motion_time[:] = np.arange(1.0, epoch + 1.0)
+        for k in range(6):
+            f.iteration = k
+            settled = weighting.weigh(f)
+            if not settled and k == 1:
+                seen.append(replace(f, weight=f.weight.copy(), motion_weight=f.motion_weight.copy()))
+                norm, motion = (1.0, 1e3) if agree else (20.0, 1e3)
+                f.norm[:], f.motion_norm[:] = norm, motion
+            if settled:
+                break
+        seen.append(f)
+    return weighting, seen
+
+
+def test_fixes_and_logs_that_fail_together_are_asked():
+    _, seen = asked(agree=True)
+    first, second, asking, _ = seen
+    for f in (first, second):
+        assert f.weight.max() == 1e-3
+        assert f.motion_weight.min() == 1.0
+    assert asking.weight.min() == 1.0
+    assert asking.motion_weight.max() == 1e-6
+
+
+def test_the_motion_is_blamed_where_they_agree():
+    blamed = asked(agree=True)[1][-1]
+    assert blamed.weight.min() == 1.0
+    assert blamed.motion_weight.max() == pytest.approx((chi.ppf(0.999, 15) / 1e3) ** 2, rel=0.02)
+
+
+def test_the_measurements_are_blamed_where_they_do_not():
+    denied = asked(agree=False)[1][-1]
+    assert denied.iteration == 3  # one to ask, one back
+    assert denied.weight.max() == 1e-3
+
+
+def test_nobody_is_asked_where_there_is_no_log():
+    weighting = MEstimator(tukey, constants(tukey))
+    weighting.reset(Instruments([SHEETS["gnss"]]))
+    for epoch in range(1, 8):
+        f = factors(along(np.full(epoch, 40.0)), iteration=0)
+        weighting.weigh(f)
+        f.iteration = 1
+        assert weighting.weigh(f) is True
+        assert f.weight.max() == 1e-3
