@@ -3,7 +3,7 @@
 With measurements alone being weighed, a motion that is wrong (a disturbed IMU) is not seen as such: no measurement
 fits, none is believed, and the window follows the IMU to wherever it goes. In a graph, motion is a factor like any
 other, and is weighed too, as in paper 000 (`weigh_motion`). And where fixes and logs contradict the motion together,
-they are asked whether they agree with each other (`estimators.adaptations.motion_test`).
+they are asked whether they agree with each other (`estimators.adaptations.fault_isolation`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from abc import abstractmethod
 
 import numpy as np
 
-from estimators.adaptations.motion_test import MotionTest
+from estimators.adaptations.fault_isolation import MotionTest
 from estimators.adaptations.weighting import Factors, Weighting
 from simnav.types import Instruments
 

@@ -1,4 +1,4 @@
-"""Whose fault it is, in a window: if fixes and logs agree with each other and not with the motion, the motion's.
+"""Fault isolation in a window: if fixes and logs agree with each other and not with the motion, it is the motion's.
 
 A weighting that gives less weight to what does not fit is lost when it is the motion that is wrong (a disturbed IMU):
 nothing fits, nothing is believed, and nothing brings the window back. As in a filter
