@@ -46,7 +46,7 @@ class Factors:
     motion_weight : (N,) array
         Likewise, of Q^-1.
     iteration : int
-        0 at the first of an epoch.
+        0 at the first of an epoch; a step that was taken back is not asked about, and leaves a gap.
     """
 
     names: tuple[str, ...]

@@ -38,7 +38,7 @@ __all__ = ["WindowEstimator"]
 CHECKED_STEP = 1.0
 #: Damping that a rejected step starts with, and by how much it changes.
 FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
-#: A measurement whose weight is less than this is reported as faulty.
+#: A measurement of no more than this weight is reported as faulty.
 FAULTY_WEIGHT = 0.5
 
 
@@ -180,7 +180,7 @@ class WindowEstimator(Estimator):
             for index, time, norm, weight in zip(*newest):
                 name = chain.names[index]
                 diagnostics[f"residual.{name}"], diagnostics[f"weight.{name}"] = norm, weight
-                if weight < FAULTY_WEIGHT:
+                if weight <= FAULTY_WEIGHT:
                     flagged.append((name, time))
         if len(chain.motions):
             diagnostics["residual.motion"] = float(chain.motions["norm"][-1])
