@@ -32,7 +32,7 @@ leaderboard: $(VENV)/installed
 	$(BIN)/simnav leaderboard $(RESULTS) --output $(SITE)
 
 test: $(VENV)/installed-test
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=2 --dist=loadfile
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=2 --dist=worksteal
 
 bench: $(VENV)/installed-test
 	$(BIN)/simnav warmup

@@ -45,9 +45,9 @@ def spoil(recording: Recording, share: float, seed: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def clean_scores():
-    """RMSE of each row over seeds of a matched scenario without faults."""
+    """RMSE over seeds of a matched scenario without faults, of what `test_clean_cost` does not hold: printed forms."""
     scenario = load("open-sea").model_copy(update={"duration": 240.0})
-    found = {name: [] for name in ALL}
+    found = {name: [] for name in ("ga-fgo-paper", "sw-fgo-paper")}
     for seed in range(3):
         recording = record(scenario, 500 + seed)
         for name, rows in found.items():
@@ -58,12 +58,10 @@ def clean_scores():
     return {name: np.sqrt(np.mean(np.square(rows), axis=0)) for name, rows in found.items()}
 
 
-@pytest.mark.parametrize("name", PLAIN)
-def test_robustness_costs_little_where_nothing_is_wrong(clean_scores, name: str):
-    """At 95 % efficiency an RMSE is 2.6 % above the plain window's on average."""
-    ratio = clean_scores[name] / clean_scores[PLAIN[name]]
-    assert np.hypot(*clean_scores[name][:2]) < 1.05 * np.hypot(*clean_scores[PLAIN[name]][:2])
-    assert ratio.max() < 1.1, dict(zip(SCORES, ratio.round(3)))
+def test_printed_weights_cost_little_where_nothing_is_wrong(clean_scores):
+    ours, plain = clean_scores["ga-fgo-paper"], clean_scores["sw-fgo-paper"]
+    assert np.hypot(*ours[:2]) < 1.05 * np.hypot(*plain[:2])
+    assert (ours / plain).max() < 1.1, dict(zip(SCORES, (ours / plain).round(3)))
 
 
 @pytest.fixture(scope="module", params=[0.05, 0.2], ids=["5 %", "20 %"])
