@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,6 +27,9 @@ def _command(
     runs: Annotated[
         int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [few: ends within minutes]")
     ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option("--method", "-m", help="Only what is about these methods. [all]")
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of results, tables, figures, page. [reproduced/PAPER]")
     ] = None,
@@ -35,11 +39,13 @@ def _command(
 ) -> None:
     """Run a paper's comparison again: ours beside theirs, row by row; started again, it goes on where it was."""
     with session(json, debug) as out:
-        run(out, paper, runs, output, workers)
+        run(out, paper, runs, output, workers, method or ())
 
 
-def run(out: Output, key: str, runs: int | None, output: Path | None, workers: int) -> None:
-    """Reproduce a paper and show it."""
+def run(
+    out: Output, key: str, runs: int | None, output: Path | None, workers: int, methods: Sequence[str] = ()
+) -> None:
+    """Reproduce a paper and show it; all of it, or what is about some of its methods."""
     from leaderboard.campaign import CampaignError
     from leaderboard.reproduce import figures, page, paper, report
     from leaderboard.reproduce.comparison import RULES
@@ -48,6 +54,8 @@ def run(out: Output, key: str, runs: int | None, output: Path | None, workers: i
 
     with mistakes(ValueError):
         chosen = paper.load(key)
+        if methods:
+            chosen = chosen.only(methods)
     folder = absolute(output or Path("reproduced") / key)
     begun: list[str] = []
     with out.progress("starting") as bar:

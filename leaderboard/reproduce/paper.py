@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Literal
 
@@ -249,6 +249,29 @@ class Paper:
     def method(self, name: str) -> Method:
         """The method of that name."""
         return next(m for m in self.methods if m.name == name)
+
+    def only(self, names: Collection[str]) -> Paper:
+        """The part of it that is about these methods and no others: what is costly can be left out of a long run.
+
+        Raises
+        ------
+        ValueError
+            If there is no such method, or no row is left; one sentence.
+        """
+        known = [m.name for m in self.methods]
+        for name in names:
+            if name not in known:
+                raise ValueError(f"paper {self.key} has no method {name!r}; it has {', '.join(known)}")
+
+        def about(row: Row) -> bool:
+            return row.method in names and (not isinstance(row, Gain) or row.than in names)
+
+        tables = tuple(replace(t, rows=rows) for t in self.tables if (rows := tuple(filter(about, t.rows))))
+        if not tables:
+            raise ValueError(f"paper {self.key} has no row that is about {' and '.join(names)} alone")
+        figures = tuple(f for f in self.figures if set(f.methods) <= set(names))
+        methods = tuple(m for m in self.methods if m.name in names)
+        return replace(self, methods=methods, tables=tables, figures=figures)
 
     def scenario(self, name: str) -> Scenario:
         """A scenario of the catalogue, or a variant of one."""

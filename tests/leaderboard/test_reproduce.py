@@ -542,3 +542,14 @@ def test_tables_hold_every_figure_of_the_papers(tmp_path):
         assert f"{len(findings)} not there yet" in summary(nothing)
         with write_csv(nothing, tmp_path / "t.csv").open(encoding="utf-8") as file:
             assert len(file.readlines()) == len(findings) + 1
+
+
+def test_a_paper_can_be_cut_to_some_methods():
+    """So that a comparison of two quick filters can have its 200 runs."""
+    whole = papers.load("002")
+    part = whole.only(["EKF", "UKF"])
+    assert {m.name for m in part.methods} == {"EKF", "UKF"}
+    assert 0 < len(list(part.rows())) < len(list(whole.rows()))
+    assert set().union(*part.participants().values()) == {"EKF", "UKF"}
+    with pytest.raises(ValueError, match=r"no method 'PF'; it has GNSS alone, EKF"):
+        whole.only(["PF"])
