@@ -5,12 +5,13 @@ nothing fits, nothing is believed, and nothing brings the window back. As in a f
 (`estimators.adaptations.prediction`, after paper 003), suspicion falls on the motion where fixes and logs fail their
 chi-square tests together, several times running. But a filter cannot tell that from two instruments that are wrong at
 once. A window can ask: with the motion of that time all but taken away for one iteration, measurements that are right
-agree with each other, and measurements that are wrong still do not.
+agree with each other, and measurements that are wrong still do not. Only those that agree are then believed in full.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimators.adaptations.prediction import FIXES, LOGS, chi_square_limits
 from estimators.adaptations.weighting import Factors
@@ -43,7 +44,7 @@ class MotionTest:
         if len(set(self._is_fix.values())) < 2:
             self._is_fix = {}  # nobody to ask
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
-        self._blamed: list[tuple[float, float]] = []
+        self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
         self._tested = -np.inf
         self._asking: tuple[float, float] | None = None
         self._weight = self._motion_weight = np.empty(0)
@@ -67,7 +68,8 @@ class MotionTest:
             return True
         asked, self._asking = self._asking, None
         if asked is not None:
-            if not self._agree(factors, *asked):
+            agreeing = self._agreeing(factors, *asked)
+            if agreeing is None:
                 # What was weighed here took the motion for the outlier: back to where the question was asked.
                 count = min(len(factors.weight), len(self._weight))
                 factors.weight[:count] = self._weight[:count]
@@ -75,11 +77,11 @@ class MotionTest:
                 return False
             if self._blamed and asked[0] <= self._blamed[-1][1]:
                 self._blamed.pop()
-            self._blamed.append(asked)
+            self._blamed.append((*asked, agreeing))
         suspected = self._suspect(factors) if self._fresh else None
         self._fresh = False
-        for start, end in self._blamed:
-            factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
+        for start, end, agreeing in self._blamed:
+            factors.weight[(factors.time >= start) & (factors.time <= end) & agreeing[factors.instrument]] = 1.0
         if suspected is None:
             return True
         start, end = self._asking = suspected
@@ -111,17 +113,16 @@ class MotionTest:
             return None
         return min(since for _, since, _ in failing.values()), now
 
-    def _agree(self, factors: Factors, start: float, end: float) -> bool:
-        """Whether a fix and a log fit, as the window is without its motion."""
+    def _agreeing(self, factors: Factors, start: float, end: float) -> NDArray[np.bool_] | None:
+        """Which instruments fit, as the window is without its motion; None unless a fix and a log are among them."""
         from scipy.special import chdtri
 
         asked = (factors.time >= start) & (factors.time <= end)
-        agreeing = set()
+        agreeing, kinds = np.zeros(len(factors.names), dtype=bool), set()
         for i, name in enumerate(factors.names):
             its = asked & (factors.instrument == i)
             freedom = int(factors.components[its].sum())
-            if not freedom or name not in self._is_fix:
-                continue
-            if float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.probability):
-                agreeing.add(self._is_fix[name])
-        return len(agreeing) == 2
+            if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.probability):
+                agreeing[i] = True
+                kinds.add(self._is_fix.get(name))
+        return agreeing if kinds >= {True, False} else None
