@@ -200,7 +200,7 @@ class ImmEstimator(KalmanEstimator):
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         observation = self._observe(m)
         if observation is None:
-            self._skipped += 1
+            self._admission.skipped += 1
             return
         residual, cross, predicted, noise = observation
         if self._prediction.fails(Innovation(m, residual, predicted, noise)):

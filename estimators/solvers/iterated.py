@@ -67,7 +67,7 @@ class IteratedKalmanEstimator(KalmanEstimator):
         model, P = self.model, self.covariance
         linearised = model.measure(m)
         if linearised is None:
-            self._skipped += 1
+            self._admission.skipped += 1
             return
         before = model.snapshot()
         first, jacobian, noise = linearised
@@ -88,7 +88,7 @@ class IteratedKalmanEstimator(KalmanEstimator):
             nis = joseph_update(posterior, cross, predicted + chosen, residual, correction)
             if nis < 0.0 or not np.isfinite(correction).all():
                 model.restore(before)
-                self._skipped += 1
+                self._admission.skipped += 1
                 return
             if count == 1:
                 first_nis = nis

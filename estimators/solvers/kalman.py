@@ -54,7 +54,6 @@ class KalmanEstimator(Estimator):
         self._names = [name for name, sheet in instruments.items() if self.model.observes(sheet)]
         self._admission = Admission(instruments, self._names)
         self._correction = np.empty(self.model.size)
-        self._skipped = 0
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         # Where no hook is in the way, the model may do in one go what is else done step by step.
@@ -72,7 +71,7 @@ class KalmanEstimator(Estimator):
             self._propagate(min(m.time, measurements.time))
             self._take(m, diagnostics, flagged)
         self._propagate(measurements.time)
-        diagnostics["skipped"] = float(self._admission.skipped + self._skipped)
+        diagnostics["skipped"] = float(self._admission.skipped)
         diagnostics.update(self.adaptation.diagnostics())
         estimate = self._estimate()
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
@@ -110,7 +109,7 @@ class KalmanEstimator(Estimator):
                 return
         observation = self._observe(m)
         if observation is None:
-            self._skipped += 1
+            self._admission.skipped += 1
             return
         residual, cross, predicted, noise = observation
         chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, self.covariance, cross))
@@ -132,7 +131,7 @@ class KalmanEstimator(Estimator):
     def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
         """Note the innovation of a measurement, or that it was skipped (``nis`` below 0)."""
         if nis < 0.0:
-            self._skipped += 1
+            self._admission.skipped += 1
             return
         innovation, normalised = self._keys[m.instrument]
         diagnostics[innovation], diagnostics[normalised] = size, nis

@@ -210,10 +210,11 @@ class WindowEstimator(Estimator):
         moved = np.zeros(chain.size)
         damping, settled, solved = 0.0, True, 0
         saved: list[Array] | None = None
-        cost = self._linearise()
+        self._linearise()
         while solved < self.iterations:
-            if saved is None and self.weighting is not None:
-                settled = self.weighting.weigh(self._factors(solved))
+            if saved is None:
+                if self.weighting is not None:
+                    settled = self.weighting.weigh(self._factors(solved))
                 cost = self._cost()
             size = self._solve(damping)
             solved += 1
@@ -221,7 +222,8 @@ class WindowEstimator(Estimator):
                 chain.detach(attached)
                 self._admission.skipped += attached
                 attached = 0
-                cost, size = self._linearise(), self._solve(0.0)
+                self._linearise()
+                cost, size = self._cost(), self._solve(0.0)
                 if not isfinite(size):
                     raise FloatingPointError(f"the window at {chain.time:g} s has no finite solution")
             saved = chain.copy_states() if size > CHECKED_STEP else None
@@ -229,32 +231,33 @@ class WindowEstimator(Estimator):
             moved += step[-1]
             if size < self.tolerance and settled:
                 break
-            now = self._linearise()
-            if saved is not None and now > cost * (1.0 + 1e-9):
+            self._linearise()
+            if saved is not None and self._cost() > cost * (1.0 + 1e-9):
                 chain.restore_states(saved)
                 moved -= step[-1]
                 damping = max(FIRST_DAMPING, DAMPING_FACTOR * damping)
-                cost = self._linearise()
+                self._linearise()
             else:
-                saved, cost = None, now
+                saved = None
                 damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
+        else:
+            cost = self._cost()
         if damping > 0.0:  # the covariances and the prior are those without it
             self._solve(0.0)
             step[:] = 0.0
         self.covariance = filtered[-1].copy()
         return solved, cost, moved, attached
 
-    def _linearise(self) -> float:
-        """Linearise all factors; their cost with the weights that they have."""
+    def _linearise(self) -> None:
+        """Linearise and whiten all factors."""
         self.chain.linearise_motion()
         self.chain.linearise_aids()
         motions, aids = self.chain.motions, self.chain.aids
         chain_cost(motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
         chain_cost(aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
-        return self._cost()
 
     def _cost(self) -> float:
-        """Half the weighted sum of squares."""
+        """Half the sum of squares of all factors, with the weights that they have."""
         chain = self.chain
         total = 0.0
         for factors in (chain.motions, chain.aids):
