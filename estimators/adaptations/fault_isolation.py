@@ -92,11 +92,13 @@ class MotionTest:
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
         """Test the new measurements, as the window fits them with full weight; the time in which motion is suspect."""
-        new = np.flatnonzero(factors.time > self._tested)
-        if not len(new):
+        new = slice(int(np.searchsorted(factors.time, self._tested, side="right")), None)
+        if not len(factors.time[new]):
             return None
-        self._tested = now = float(factors.time[new].max())
+        self._tested = now = float(factors.time[-1])
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
+        if not (self._failures or self._blamed or failed.any()):
+            return None
         for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
             name = factors.names[i]
             if not fails:

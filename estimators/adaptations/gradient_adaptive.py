@@ -34,12 +34,12 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimators.adaptations.weighting import Factors, Weighting
+from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
-__all__ = ["GradientAdaptive", "Shape", "middles"]
+__all__ = ["GradientAdaptive", "Shape", "medians"]
 
 #: a, c and w_min of eq. 21.
 Shape = tuple[float, float, float]
@@ -48,32 +48,32 @@ Shape = tuple[float, float, float]
 _CHI_MEDIAN = np.array([1.0, 0.674490, 1.177410, 1.538172])
 
 
-def middles(group: NDArray[np.intp], groups: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where the medians of groups are, once the values are ordered by group and value.
+@kernel("void(f8[::1], i8[::1], i8, f8[::1])")
+def medians(values, group, fewest, out):  # type: ignore[no-untyped-def]
+    """Medians of groups.
 
     Parameters
     ----------
+    values : (M,) array
     group : (M,) array of int
-        Of each value, below ``groups``; M > 0.
-    groups : int
-
-    Returns
-    -------
-    lower, upper : (groups,) array of int
-        The median is the mean of the ordered values at both; of a group without values it is any.
-
-    Examples
-    --------
-    >>> values, group = np.array([3.0, 1.0, 2.0, 5.0, 8.0]), np.array([0, 0, 0, 1, 1])
-    >>> lower, upper = middles(group, 2)
-    >>> ordered = values[np.lexsort((values, group))]
-    >>> 0.5 * (ordered[lower] + ordered[upper])
-    array([2. , 6.5])
+        Of each value, below G.
+    fewest : int
+        A group of fewer has the median 1; at least 1.
+    out : (G,) array
+        Overwritten.
     """
-    counts = np.bincount(group, minlength=groups)
-    ends = counts.cumsum()
-    twice = 2 * ends - counts - 1
-    return np.maximum(twice // 2, 0), np.minimum((twice + 1) // 2, len(group) - 1)
+    members = np.empty(values.size)
+    for g in range(out.size):
+        count = 0
+        for i in range(values.size):
+            if group[i] == g:
+                members[count] = values[i]
+                count += 1
+        if count < fewest:
+            out[g] = 1.0
+        else:
+            ordered = np.sort(members[:count])
+            out[g] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
 
 class GradientAdaptive(Weighting):
@@ -116,48 +116,34 @@ class GradientAdaptive(Weighting):
         """Begin a run."""
         self._kinds = {name: sheet.kind for name, sheet in instruments.items()}
         self._names: tuple[str, ...] = ()
-        self._group = np.empty(0, np.intp)
         self._scales = np.ones(1)
+        if self.preset == "paper":
+            self._kappa, self._kappa_motion, self._floor, self._least = np.full(4, 1.4826), 1.4826, 0.0, 1
+        else:
+            self._kappa, self._kappa_motion, self._floor, self._least = 1.0 / _CHI_MEDIAN, 3.0**-0.5, 1.0, self.fewest
 
     def weigh(self, factors: Factors) -> bool:
         """Set the weights of the measurements and of motion."""
-        count = len(factors.weight)
-        if count + len(factors.motion_weight) == 0:
-            return True
-        if factors.iteration == 0 or len(self._group) != count + len(factors.motion_weight):
-            self._arrange(factors)
-        if self.preset == "paper":
-            norm = np.concatenate((_rows(factors.residual), _rows(factors.motion_residual[:, :9])))
-        else:
-            norm = np.concatenate((factors.norm, factors.motion_norm * (3.0 / factors.motion_residual.shape[1]) ** 0.5))
-        scaled = norm * self._kappa
-        ordered = scaled[np.lexsort((scaled, self._group))]
-        self._scales = np.maximum(0.5 * (ordered[self._lower] + ordered[self._upper]), self._floor)
-        self._scales[self._few] = 1.0
-        ratio = norm / (self._shapes[:, 1] * (self._scales + self.epsilon))[self._group]
-        weight = np.minimum(np.maximum(self._a / (1.0 + ratio * ratio), self._least), 1.0)
-        factors.weight[:] = weight[:count]
-        factors.motion_weight[:] = weight[count:]
-        return True
-
-    def _arrange(self, factors: Factors) -> None:
-        """Spread the constants over an epoch's factors, motion being one more instrument."""
         if factors.names != self._names:
             self._names = factors.names
             gnss = ("gnss_position", "gnss_velocity")
             shapes = [self._gnss if self._kinds[n] in gnss else self._other for n in factors.names]
             self._shapes = np.array([*shapes, self._motion], dtype=np.float64)
-        motions = len(factors.motion_weight)
-        self._group = np.concatenate((factors.instrument, np.full(motions, len(self._names))))
-        self._a, _, self._least = self._shapes[self._group].T
-        groups = len(self._shapes)
-        self._lower, self._upper = middles(self._group, groups)
+            self._scales = np.ones(len(self._shapes))
         if self.preset == "paper":
-            self._kappa, self._floor, fewest = np.full(len(self._group), 1.4826), 0.0, 1
+            norm, motion = _rows(factors.residual), _rows(factors.motion_residual[:, :9])
         else:
-            self._kappa = 1.0 / np.concatenate((_CHI_MEDIAN[factors.components], np.full(motions, 3.0**0.5)))
-            self._floor, fewest = 1.0, self.fewest
-        self._few = np.bincount(self._group, minlength=groups) < fewest
+            norm, motion = factors.norm, factors.motion_norm * (3.0 / factors.motion_residual.shape[1]) ** 0.5
+        instrument, scales = factors.instrument, self._scales
+        medians(norm * self._kappa[factors.components], instrument, self._least, scales[:-1])
+        medians(motion * self._kappa_motion, np.zeros(len(motion), np.int64), self._least, scales[-1:])
+        np.maximum(scales, self._floor, out=scales)
+        a, c, least = self._shapes.T
+        reach = c * (scales + self.epsilon)
+        for r, which, weight in ((norm, instrument, factors.weight), (motion, -1, factors.motion_weight)):
+            ratio = r / reach[which]
+            weight[:] = np.minimum(np.maximum(a[which] / (1.0 + ratio * ratio), least[which]), 1.0)
+        return True
 
     def diagnostics(self) -> dict[str, float | Array]:
         """``scale.<instrument>`` and ``scale.motion``: s, in sigma or as the preset has it."""

@@ -9,6 +9,7 @@ they are asked whether they agree with each other (`estimators.adaptations.fault
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cache
 
 import numpy as np
 
@@ -19,14 +20,19 @@ from simnav.types import Instruments
 __all__ = ["RobustWeighting", "weigh_motion"]
 
 
+@cache
+def _quantile(n: int) -> float:
+    """99.9 % quantile of chi of n components (Wilson and Hilferty 1931)."""
+    return float(n**0.5 * (1.0 - 2.0 / (9.0 * n) + 3.0902 * (2.0 / (9.0 * n)) ** 0.5) ** 1.5)
+
+
 def weigh_motion(factors: Factors) -> None:
     """Weigh motion by ``min(1, (c/r)^2)`` of its whitened norm r, c being the 99.9 % quantile of chi of n components.
 
     The noise believed of a motion grows to what its residual shows. On sound data the weights are 1: the residuals of
-    motion in a window are smaller than its noise. The quantile is Wilson and Hilferty's (1931).
+    motion in a window are smaller than its noise.
     """
-    n = factors.motion_residual.shape[1]
-    quantile = n**0.5 * (1.0 - 2.0 / (9.0 * n) + 3.0902 * (2.0 / (9.0 * n)) ** 0.5) ** 1.5
+    quantile = _quantile(factors.motion_residual.shape[1])
     u = quantile / np.maximum(factors.motion_norm, quantile)
     np.multiply(u, u, out=factors.motion_weight)
 

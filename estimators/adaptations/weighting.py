@@ -25,7 +25,7 @@ class Factors:
     components : (M,) array of int
         Of the measurement, 1 to 3.
     time : (M,) array
-        Of validity [s].
+        Of validity [s], in ascending order.
     residual : (M, 3) array
         Measured minus predicted, in the units of ``KINDS[kind].errors``; zero beyond the components.
     noise : (M, 3, 3) array

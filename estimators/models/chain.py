@@ -25,6 +25,8 @@ from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, I
 
 __all__ = ["Chain", "Columns", "whitening"]
 
+_UNIT = np.eye(3)
+
 
 @kernel("void(f8[:, ::1], f8[:, ::1])")
 def whitening(covariance, whitener):  # type: ignore[no-untyped-def]
@@ -86,13 +88,21 @@ class Columns:
             for name, what in columns.items()
         }
         self._first = self._last = 0
+        self._views: dict[str, Any] = {}
 
     def __len__(self) -> int:
         return self._last - self._first
 
     def __getitem__(self, name: str) -> Any:
         """A view of a column, (rows, ...)."""
-        return self._columns[name][self._first : self._last]
+        view = self._views.get(name)
+        if view is None:
+            view = self._views[name] = self._columns[name][self._first : self._last]
+        return view
+
+    def newest(self, name: str) -> Any:
+        """A view of the last row's entry in a column."""
+        return self._columns[name][self._last - 1]
 
     def append(self, **values: Any) -> None:
         """Add a row; what is not given keeps any value."""
@@ -101,14 +111,17 @@ class Columns:
         for name, value in values.items():
             self._columns[name][self._last] = value
         self._last += 1
+        self._views.clear()
 
     def drop(self, count: int) -> None:
         """Take ``count`` rows off the front."""
         self._first += count
+        self._views.clear()
 
     def pop(self, count: int) -> None:
         """Take ``count`` rows off the end."""
         self._last -= count
+        self._views.clear()
 
     def _make_room(self) -> None:
         """Move the rows to the front; twice the space where they fill more than half of it."""
@@ -180,6 +193,7 @@ class Chain(ABC):
             whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
         )  # fmt: skip
         self.base = 0
+        self._identity = np.eye(n)
         self._append_node()
         self._pending()
         self.set_prior(covariance, np.zeros(n))
@@ -191,7 +205,7 @@ class Chain(ABC):
 
     def _pending(self) -> None:
         """Motion since the newest node: none."""
-        self._transition, self._noise = np.eye(self.size), np.zeros((self.size, self.size))
+        self._transition, self._noise = self._identity.copy(), np.zeros_like(self._identity)
         self.ahead = 0.0
 
     def set_prior(self, covariance: Array, shift: Array) -> None:
@@ -224,12 +238,11 @@ class Chain(ABC):
 
     def extend(self) -> None:
         """Make the front a node, with the motion since the newest one as its factor."""
-        whitener = np.empty((self.size, self.size))
-        whitening(self._noise, whitener)
         self.motions.append(
-            transition=self._transition, noise=self._noise, whitener=whitener, begin_shift=0.0, end_shift=0.0,
-            time=self.front.time, weight=1.0,
+            transition=self._transition, noise=self._noise, begin_shift=0.0, end_shift=0.0, time=self.front.time,
+            weight=1.0,
         )  # fmt: skip
+        whitening(self._noise, self.motions.newest("whitener"))
         self._append_node()
         self._pending()
 
@@ -247,20 +260,20 @@ class Chain(ABC):
 
     def attach(self, measurement: Measurement, noise: Array) -> None:
         """Make a measurement with the (m, m) noise a factor on the newest node."""
-        m = len(noise)
-        full, whitener, value = np.eye(3), np.zeros((3, 3)), np.zeros(3)
-        full[:m, :m] = noise
-        whitening(full, whitener)
-        value[: len(measurement.value)] = measurement.value
-        self.aids.append(
+        m, aids = len(noise), self.aids
+        aids.append(
             node=self.base + len(self.nodes) - 1, instrument=self._index[measurement.instrument], components=m,
-            time=measurement.time, value=value, noise=full, whitener=whitener, weight=1.0,
+            time=measurement.time, value=0.0, noise=_UNIT, weight=1.0,
         )  # fmt: skip
+        full = aids.newest("noise")
+        full[:m, :m] = noise
+        whitening(full, aids.newest("whitener"))
+        aids.newest("value")[: len(measurement.value)] = measurement.value
 
     def settle(self, moved: Array) -> None:
         """Set the front to the newest node, or, where it has run ahead of it, by how much that was ``moved``."""
         if self.ahead == 0.0:
-            self.front.restore([self.nodes[name][-1] for name in self.front.state])
+            self.front.restore([self.nodes.newest(name) for name in self.front.state])
         else:
             self.front.correct(self._transition @ moved)
 

@@ -220,7 +220,8 @@ class InertialModel(ErrorModel):
         """Take an error, or several in columns, through the last propagation, in place."""
         m = len(self.transition)
         error[:m] = self.transition @ error[:m]
-        error.T[..., m:] *= np.exp(-self._decay * elapsed)
+        if len(self._decay):
+            error.T[..., m:] *= np.exp(-self._decay * elapsed)
 
     @property
     def held(self) -> float:

@@ -22,7 +22,7 @@ from estimators.models.inertial import InertialModel
 from estimators.models.measurements import observe_inertial
 from estimators.models.propagation import correct_inertial
 from simnav.compiled import kernel
-from simnav.rotation import cross, left_jacobian, rotation_coefficients
+from simnav.rotation import cross, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["InertialChain"]
@@ -46,12 +46,31 @@ def _compose(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
     return a0 + b0 + 0.5 * x0 + t * y0, a1 + b1 + 0.5 * x1 + t * y1, a2 + b2 + 0.5 * x2 + t * y2
 
 
-def _composed(a: Array, b: Array) -> Array:
-    """`_compose` of arrays."""
-    x = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-    d = a - b
-    y = np.array([d[1] * x[2] - d[2] * x[1], d[2] * x[0] - d[0] * x[2], d[0] * x[1] - d[1] * x[0]])
-    return a + b + 0.5 * x + y / 12.0
+@kernel("void(f8[::1], f8[::1], f8[::1])")
+def _less(shift, step, out):  # type: ignore[no-untyped-def]
+    for j in range(shift.size):
+        out[j] = shift[j] - step[j]
+    out[6], out[7], out[8] = _compose(shift[6], shift[7], shift[8], -step[6], -step[7], -step[8])
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8[:, ::1])")
+def _turn_covariance(P, shift, out):  # type: ignore[no-untyped-def]
+    p0, p1, p2 = shift[6], shift[7], shift[8]
+    angle2 = p0 * p0 + p1 * p1 + p2 * p2
+    sine, a = rotation_coefficients(angle2)
+    b = 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
+    n = P.shape[0]
+    out[:] = P
+    for side in range(2):
+        for i in range(n):
+            v0, v1, v2 = (out[6, i], out[7, i], out[8, i]) if side == 0 else (out[i, 6], out[i, 7], out[i, 8])
+            x0, x1, x2 = cross(p0, p1, p2, v0, v1, v2)
+            y0, y1, y2 = cross(p0, p1, p2, x0, x1, x2)
+            v0, v1, v2 = v0 + a * x0 + b * y0, v1 + a * x1 + b * y1, v2 + a * x2 + b * y2
+            if side == 0:
+                out[6, i], out[7, i], out[8, i] = v0, v1, v2
+            else:
+                out[i, 6], out[i, 7], out[i, 8] = v0, v1, v2
 
 
 @kernel("void(f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
@@ -202,17 +221,13 @@ class InertialChain(Chain):
         self.prior_shift = self.less(self.prior_shift, step[0])
 
     def turned(self, covariance: Array, shift: Array) -> Array:
-        """``J P J'`` with the left Jacobian of the rotation."""
-        rotation = shift[6:9]
-        if float(rotation @ rotation) < 1e-14:
-            return covariance
-        J, P = left_jacobian(rotation), covariance.copy()
-        P[6:9] = J @ P[6:9]
-        P[:, 6:9] = P[:, 6:9] @ J.T
-        return P
+        """``J P J'`` with the left Jacobian of the rotation (`simnav.rotation.left_jacobian`)."""
+        turned = np.empty_like(covariance)
+        _turn_covariance(covariance, shift, turned)
+        return turned
 
     def less(self, shift: Array, step: Array) -> Array:
         """Rotations compose."""
-        rest = shift - step
-        rest[6:9] = _composed(shift[6:9], -step[6:9])
+        rest = np.empty_like(shift)
+        _less(shift, step, rest)
         return rest

@@ -17,7 +17,8 @@ magnitude below P), and a state without process noise has no Q^-1 at all. So
 - P_k and d_k before node k's own measurements are the prior that marginalising all nodes before k leaves;
 - P at the newest node, after its measurements, is its covariance;
 - the backward pass needs no inverse: with a the adjoint after a node's measurements, ``dx = d + P a``, and through them
-  ``a <- a + H' S^-1 (v - H P a)``, through the motion ``a <- F' a``.
+  ``a <- a + H' S^-1 (v - H P a)``, through the motion ``a <- F' a``;
+- damping is a measurement of each component to be zero.
 
 Sources: B. M. Bell, "The iterated Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994; for the
 backward pass G. J. Bierman, "Fixed interval smoothing with discrete measurements", Int. J. Control 18(1), 1973.
@@ -29,7 +30,6 @@ from math import sqrt
 
 import numpy as np
 
-from estimators.solvers.joseph import joseph_update
 from simnav.compiled import kernel
 
 __all__ = ["chain_cost", "solve_chain"]
@@ -69,28 +69,75 @@ def _predict(P, F, Q, weight, work, turned, out):  # type: ignore[no-untyped-def
 
 
 @kernel()
-def _damp(P, damping, gains):  # type: ignore[no-untyped-def]
-    """Measure each component of a step as zero, one by one; gains[i] is ``P e_i / s``, gains[n + i] ``P e_i``."""
+def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-def]
+    """Take m measurements with the covariance ``R / weight`` into P and d; False, and nothing done, if S is singular.
+
+    With ``L L' = S = H P H' + R / weight`` they are left white: ``U = L^-1 H P``, ``G = L^-1 H`` and
+    ``y = L^-1 (r - H d)``, so that ``d + U' y`` and ``P - U' U`` are the update.
+    """
     n = P.shape[0]
-    variance = np.empty(n)
-    for i in range(n):
-        variance[i] = P[i, i]
-    for i in range(n):
-        for j in range(n):
-            gains[i, j] = 0.0
-            gains[n + i, j] = P[i, j]
-        s = P[i, i] + variance[i] / damping
-        if s > 0.0:
+    for a in range(m):
+        y[a] = r[a]
+        for c in range(n):
+            U[a, c] = 0.0
+        for c in range(n):  # few are not zero
+            x = H[a, c]
+            G[a, c] = x
+            if x != 0.0:
+                y[a] -= x * d[c]
+                for j in range(n):
+                    U[a, j] += x * P[c, j]
+    for a in range(m):
+        for b in range(a + 1):
+            x = 0.5 * (R[a, b] + R[b, a]) / weight
+            for c in range(n):
+                if H[b, c] != 0.0:
+                    x += H[b, c] * U[a, c]
+            variance = x
+            for k in range(b):
+                x -= L[a, k] * L[b, k]
+            if b < a:
+                L[a, b] = x / L[b, b]
+            elif x > 1e-14 * variance:
+                L[a, a] = sqrt(x)
+            else:
+                return False
+    for a in range(m):
+        for b in range(a):
+            x = L[a, b]
+            y[a] -= x * y[b]
+            for c in range(n):
+                U[a, c] -= x * U[b, c]
+                G[a, c] -= x * G[b, c]
+        x = 1.0 / L[a, a]
+        y[a] *= x
+        for c in range(n):
+            U[a, c] *= x
+            G[a, c] *= x
+    for a in range(m):
+        for i in range(n):
+            d[i] += U[a, i] * y[a]
+            x = U[a, i]
             for j in range(n):
-                gains[i, j] = P[i, j] / s
-            for r in range(n):
-                for c in range(n):
-                    P[r, c] -= gains[i, r] * gains[n + i, c]
+                P[i, j] -= x * U[a, j]
+    return True
+
+
+@kernel()
+def _return(adjoint, U, G, y, m):  # type: ignore[no-untyped-def]
+    """Take the adjoint back through m measurements: ``a + G' (y - U a)``."""
+    n = adjoint.size
+    for a in range(m):
+        for c in range(n):
+            y[a] -= U[a, c] * adjoint[c]
+    for a in range(m):
+        for c in range(n):
+            adjoint[c] += G[a, c] * y[a]
 
 
 @kernel(
     "f8(f8[:, ::1], f8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], i8, i8[::1], f8[:, :, ::1], "
-    "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])"
+    "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])",
 )
 def solve_chain(  # type: ignore[no-untyped-def]
     prior, prior_shift, transition, noise, error, motion_weight,
@@ -136,33 +183,22 @@ def solve_chain(  # type: ignore[no-untyped-def]
     """
     count, n = step.shape
     total = node.size
-    work, turned = np.empty((n, n)), np.empty((n, n))
-    cross1, cross2, cross3 = np.empty((n, 1)), np.empty((n, 2)), np.empty((n, 3))
-    S1, S2, S3 = np.empty((1, 1)), np.empty((2, 2)), np.empty((3, 3))
-    v1, v2, v3 = np.empty(1), np.empty(2), np.empty(3)
-    correction = np.empty(n)
-    crosses = np.empty((total, 3, n))
-    spreads = np.empty((total, 3, 3))
+    work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((3, 3))
+    crosses, whites = np.empty((total, 3, n)), np.empty((total, 3, n))
     innovations = np.empty((total, 3))
     used = np.zeros(total, dtype=np.bool_)
-    damps = damping > 0.0
-    gains = np.empty((count if damps else 0, 2 * n, n))
-    damped_shift = np.empty((count if damps else 0, n))
-    begin = np.empty(count + 1, dtype=np.int64)
-    i = 0
-    for k in range(count):
-        begin[k] = i
-        while i < total and node[i] - base == k:
-            i += 1
-    begin[count] = i
+    damps = count if damping > 0.0 else 0
+    damp_crosses, damp_whites = np.empty((damps, n, 1, n)), np.empty((damps, n, 1, n))
+    damp_innovations = np.empty((damps, n, 1))
+    damp_used = np.zeros((damps, n), dtype=np.bool_)
+    unit, zero, variance = np.zeros((1, n)), np.zeros(1), np.empty((n, 1, 1))
 
+    i = 0
     for k in range(count):
         P, d = predicted[k], predicted_shift[k]
         if k == 0:
-            for r in range(n):
-                d[r] = prior_shift[r]
-                for c in range(n):
-                    P[r, c] = prior[r, c]
+            P[:] = prior
+            d[:] = prior_shift
         else:
             _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], work, turned, P)
             for r in range(n):
@@ -171,116 +207,56 @@ def solve_chain(  # type: ignore[no-untyped-def]
                     x += transition[k - 1, r, c] * filtered_shift[k - 1, c]
                 d[r] = x
         P, d = filtered[k], filtered_shift[k]
-        for r in range(n):
-            d[r] = predicted_shift[k, r]
-            for c in range(n):
-                P[r, c] = predicted[k, r, c]
+        P[:] = predicted[k]
+        d[:] = predicted_shift[k]
         if damps:
-            _damp(P, damping, gains[k])
-            for i in range(n):
-                x = d[i]
-                damped_shift[k, i] = x
-                for r in range(n):
-                    d[r] -= gains[k, i, r] * x
-        for i in range(begin[k], begin[k + 1]):
-            m = components[i]
-            if m == 0 or not aid_weight[i] > LEAST_WEIGHT:
-                continue
-            cross, S, v = (cross1, S1, v1) if m == 1 else ((cross2, S2, v2) if m == 2 else (cross3, S3, v3))
-            for a in range(m):
-                for r in range(n):
-                    crosses[i, a, r] = 0.0
-                for c in range(n):  # few are not zero
-                    x = jacobian[i, a, c]
-                    if x != 0.0:
-                        for r in range(n):
-                            crosses[i, a, r] += x * P[c, r]
-                for r in range(n):
-                    cross[r, a] = crosses[i, a, r]
-            for a in range(m):
-                x = residual[i, a]
-                for c in range(n):
-                    x -= jacobian[i, a, c] * d[c]
-                v[a] = x
-                innovations[i, a] = x
-                for b in range(a + 1):
-                    x = 0.5 * (aid_noise[i, a, b] + aid_noise[i, b, a]) / aid_weight[i]
-                    for c in range(n):
-                        x += jacobian[i, b, c] * crosses[i, a, c]
-                    S[a, b] = x
-                    S[b, a] = x
-                    spreads[i, a, b] = x
-                    spreads[i, b, a] = x
-            if joseph_update(P, cross, S, v, correction) >= 0.0:
-                used[i] = True
-                for r in range(n):
-                    d[r] += correction[r]
+            for r in range(n):
+                variance[r, 0, 0] = P[r, r]
+            for r in range(n):
+                unit[0, r] = 1.0
+                damp_used[k, r] = _absorb(
+                    P, d, unit, zero, variance[r], damping, 1, L,
+                    damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r],
+                )  # fmt: skip
+                unit[0, r] = 0.0
+        while i < total and node[i] - base == k:
+            if components[i] > 0 and aid_weight[i] > LEAST_WEIGHT:
+                used[i] = _absorb(
+                    P, d, jacobian[i], residual[i], aid_noise[i], aid_weight[i], components[i], L,
+                    crosses[i], whites[i], innovations[i],
+                )  # fmt: skip
+            i += 1
 
     adjoint, after = np.zeros(n), np.empty(n)
     largest = 0.0
+    i = total - 1
     for k in range(count - 1, -1, -1):
         if k < count - 1:
-            for c in range(n):
-                after[c] = 0.0
+            after[:] = 0.0
             for r in range(n):
                 x = adjoint[r]
                 for c in range(n):
                     after[c] += transition[k, r, c] * x
             adjoint[:] = after
         for r in range(n):
-            x = filtered_shift[k, r]
-            for c in range(n):
-                x += filtered[k, r, c] * adjoint[c]
-            step[k, r] = x
+            step[k, r] = filtered_shift[k, r]
+        for c in range(n):
+            x = adjoint[c]
+            for r in range(n):
+                step[k, r] += filtered[k, c, r] * x
+        for r in range(n):
             if filtered[k, r, r] > 0.0:
-                size = abs(x) / sqrt(filtered[k, r, r])
-                if not size <= largest:
+                size = abs(step[k, r]) / sqrt(filtered[k, r, r])
+                if size > largest or size != size:
                     largest = size
-        for i in range(begin[k + 1] - 1, begin[k] - 1, -1):
-            if not used[i]:
-                continue
-            m = components[i]
-            # S^-1 (v - H P a) by Cholesky; 3 components at most.
-            y0, y1, y2 = innovations[i, 0], 0.0, 0.0
-            for c in range(n):
-                y0 -= crosses[i, 0, c] * adjoint[c]
-            l00 = sqrt(spreads[i, 0, 0])
-            y0 /= l00
-            l10, l11, l20, l21, l22 = 0.0, 1.0, 0.0, 0.0, 1.0
-            if m > 1:
-                y1 = innovations[i, 1]
-                for c in range(n):
-                    y1 -= crosses[i, 1, c] * adjoint[c]
-                l10 = spreads[i, 1, 0] / l00
-                l11 = sqrt(spreads[i, 1, 1] - l10 * l10)
-                y1 = (y1 - l10 * y0) / l11
-            if m > 2:
-                y2 = innovations[i, 2]
-                for c in range(n):
-                    y2 -= crosses[i, 2, c] * adjoint[c]
-                l20 = spreads[i, 2, 0] / l00
-                l21 = (spreads[i, 2, 1] - l20 * l10) / l11
-                l22 = sqrt(spreads[i, 2, 2] - l20 * l20 - l21 * l21)
-                y2 = (y2 - l20 * y0 - l21 * y1) / l22
-                y2 /= l22
-            if m > 1:
-                y1 = (y1 - l21 * y2) / l11
-            y0 = (y0 - l10 * y1 - l20 * y2) / l00
-            for c in range(n):
-                x = jacobian[i, 0, c] * y0
-                if m > 1:
-                    x += jacobian[i, 1, c] * y1
-                if m > 2:
-                    x += jacobian[i, 2, c] * y2
-                adjoint[c] += x
+        while i >= 0 and node[i] - base == k:
+            if used[i]:
+                _return(adjoint, crosses[i], whites[i], innovations[i], components[i])
+            i -= 1
         if damps:
-            for i in range(n - 1, -1, -1):
-                # Innovation -d_i; H P a is P e_i times a; what is left is S^-1 of both, with gain = P e_i / S.
-                x = -damped_shift[k, i]
-                for c in range(n):
-                    x -= gains[k, n + i, c] * adjoint[c]
-                if gains[k, n + i, i] > 0.0:
-                    adjoint[i] += x * gains[k, i, i] / gains[k, n + i, i]
+            for r in range(n - 1, -1, -1):
+                if damp_used[k, r]:
+                    _return(adjoint, damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r], 1)
     return largest
 
 

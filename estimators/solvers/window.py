@@ -2,16 +2,18 @@
 
 Every time of a measurement is a node of the graph (`estimators.models.chain`), every measurement and every stretch of
 motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares: linearise,
-weigh, solve (`estimators.solvers.block_tridiagonal`), retract, until a step is small. A step that raises the cost is
-taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what they say of the node that
-is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L. Matthies, G. Sukhatme, "Sliding
-window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So nothing is lost but the freedom
-to linearise or weigh it anew, and a window of one epoch is an iterated EKF.
+weigh, solve (`estimators.solvers.block_tridiagonal`), retract, until the next step would be small. A step that raises
+the cost is taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what they say of the
+node that is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L. Matthies, G. Sukhatme,
+"Sliding window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So nothing is lost but
+the freedom to linearise or weigh it anew, and a window of one epoch is an iterated EKF.
 
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
 innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
 
-Sources: paper 000, section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); paper 001, section 2.
+Sources: paper 000, section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); paper 001, section 2;
+for the test of convergence by contraction, which an epoch inherits with a doubt (a factor of 2) from the one before,
+E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996, section IV.8.
 Eq. 15 of paper 001 takes the inverse of the window's prior for the newest covariance; it is that of the oldest state.
 The newest one is the last block of the elimination.
 """
@@ -20,7 +22,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from math import hypot, isfinite
+from math import hypot, inf, isfinite
 
 import numpy as np
 
@@ -55,7 +57,8 @@ class WindowEstimator(Estimator):
     window : int or None
         Epochs (steps that bring measurements) in the window; None: all of them.
     tolerance : float
-        Largest component of a step, in its sigmas, at which the nodes have converged.
+        Largest component of a step, in its sigmas, at which the nodes have converged; the step need not be taken where
+        the contraction from step to step, also of the epochs before, says that it would be smaller.
     iterations : int
         Most steps an epoch.
     every_sample : bool
@@ -100,6 +103,7 @@ class WindowEstimator(Estimator):
                 what.reset(instruments)
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
         self._capacity = self._counted = 0
+        self._contraction = 1.0
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
         self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
@@ -208,14 +212,12 @@ class WindowEstimator(Estimator):
         self._make_room(len(chain.nodes))
         filtered, step = self._work[2][: len(chain.nodes)], self._work[4][: len(chain.nodes)]
         moved = np.zeros(chain.size)
-        damping, settled, solved = 0.0, True, 0
+        damping, settled, solved, before = 0.0, True, 0, inf
         saved: list[Array] | None = None
         self._linearise()
         while solved < self.iterations:
-            if saved is None:
-                if self.weighting is not None:
-                    settled = self.weighting.weigh(self._factors(solved))
-                cost = self._cost()
+            if saved is None and self.weighting is not None:
+                settled = self.weighting.weigh(self._factors(solved))
             size = self._solve(damping)
             solved += 1
             if not isfinite(size):
@@ -223,13 +225,20 @@ class WindowEstimator(Estimator):
                 self._admission.skipped += attached
                 attached = 0
                 self._linearise()
-                cost, size = self._cost(), self._solve(0.0)
+                size = self._solve(0.0)
                 if not isfinite(size):
                     raise FloatingPointError(f"the window at {chain.time:g} s has no finite solution")
+            contraction = self._contraction_at(solved, size, before, damping)
+            converged = settled and (
+                size < self.tolerance or (size <= CHECKED_STEP and contraction * size < self.tolerance)
+            )
+            before = size
+            if converged or solved == self.iterations or size > CHECKED_STEP:
+                cost = self._cost()
             saved = chain.copy_states() if size > CHECKED_STEP else None
             chain.retract(step)
             moved += step[-1]
-            if size < self.tolerance and settled:
+            if converged:
                 break
             self._linearise()
             if saved is not None and self._cost() > cost * (1.0 + 1e-9):
@@ -240,13 +249,21 @@ class WindowEstimator(Estimator):
             else:
                 saved = None
                 damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
-        else:
-            cost = self._cost()
         if damping > 0.0:  # the covariances and the prior are those without it
             self._solve(0.0)
             step[:] = 0.0
         self.covariance = filtered[-1].copy()
         return solved, cost, moved, attached
+
+    def _contraction_at(self, solved: int, size: float, before: float, damping: float) -> float:
+        """By how much the next step is smaller than this one, if as in the last two or in the epoch before, or so."""
+        if solved == 1:
+            self._contraction = min(1.0, 2.0 * self._contraction)
+            return self._contraction
+        contraction = min(1.0, size / before) if damping == 0.0 and before > 0.0 else 1.0
+        if solved == 2:
+            self._contraction = contraction
+        return contraction
 
     def _linearise(self) -> None:
         """Linearise and whiten all factors."""

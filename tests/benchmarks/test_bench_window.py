@@ -80,27 +80,28 @@ def test_an_epoch_of_isam2(benchmark, recording: Recording):
 def test_ours_costs_a_fifth_of_gtsams(benchmark, recording: Recording):
     """The same window, nodes, factors and data; medians of an epoch, rounds side by side.
 
-    Like for like, GTSAM linearises the window anew at each of two iterations, as ours does. As the row comes it
-    linearises only what has moved, which is most of what an incremental solver has to offer, and does not converge as
-    far.
+    Both as the rows come: ours takes a second step where the first does not settle it, GTSAM linearises only what has
+    moved, which is most of what an incremental solver has to offer. And like for like: both linearise the window anew
+    at each of two iterations.
     """
-    like = ("gtsam-fixed-lag", {"threshold": 0.0, "iterations": 2})
-    estimators = [filled(name, parameters, recording) for name, parameters in (OURS, like, THEIRS)]
+    ours, theirs = OURS[1] | {"tolerance": 1e-4}, {"threshold": 0.0, "iterations": 2}
+    rows = (OURS, THEIRS, (OURS[0], ours), (THEIRS[0], theirs))
+    estimators = [filled(name, parameters, recording) for name, parameters in rows]
     steps = list(recording.steps())[21 : 21 + EPOCHS]
-    seconds, iterations = np.empty((3, EPOCHS)), np.empty((3, EPOCHS))
+    seconds, iterations = np.empty((4, EPOCHS)), np.empty((4, EPOCHS))
     for k, packet in enumerate(steps):
         for i, estimator in enumerate(estimators):
             begun = process_time()
             estimate = estimator.update(packet)
             seconds[i, k], iterations[i, k] = process_time() - begun, estimate.diagnostics["iterations"]
-    own, alike, lazy = 1e3 * np.median(seconds, axis=1)
-    benchmark.extra_info.update(ours_ms=own, gtsam_ms=alike, gtsam_incremental_ms=lazy, factor=alike / own)
-    print(f"\nours {own:.2f} ms, GTSAM {alike:.2f} ms: {alike / own:.1f} times")
-    print(f"GTSAM, incremental, {lazy:.2f} ms: {lazy / own:.1f} times")
+    own, incremental, own_twice, twice = 1e3 * np.median(seconds, axis=1)
+    benchmark.extra_info.update(ours_ms=own, gtsam_ms=incremental, ours_twice_ms=own_twice, gtsam_twice_ms=twice)
+    print(f"\nas they come: ours {own:.2f} ms, GTSAM {incremental:.2f} ms, {incremental / own:.1f} times")
+    print(f"two iterations: ours {own_twice:.2f} ms, GTSAM {twice:.2f} ms, {twice / own_twice:.1f} times")
     benchmark.pedantic(lambda: None, rounds=1)
-    assert np.median(iterations[0]) >= np.median(iterations[1])
-    assert alike > 5.0 * own
-    assert lazy > own
+    assert np.median(iterations[2]) >= np.median(iterations[3])
+    assert twice > 5.0 * own_twice
+    assert incremental > own
 
 
 def test_cost_against_the_length_of_the_window(benchmark, recording: Recording):
