@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from estimators.adaptations.anfis import Anfis
 from estimators.adaptations.anfis_file import FeatureSet
 from estimators.ship_ekf import ShipEkf
@@ -27,12 +29,8 @@ class AnfisFgo(ShipFgo):
         Parameter file that `simnav train anfis` wrote; empty for the one that comes with the package.
     lowest, highest : float
         Bounds of the sigma in units of the datasheet's.
-    window : int
-        Epochs in the window.
-    tolerance : float
-        Largest component of a step, in its sigmas, at which the nodes have converged.
-    iterations : int
-        Most iterations an epoch.
+    window, tolerance, iterations, acceleration, turn_rate_deg, turn_time, current, current_time, sway
+        As for ``ship-fgo``.
     """
 
     def __init__(
@@ -41,11 +39,9 @@ class AnfisFgo(ShipFgo):
         file: str = "",
         lowest: float = 1.0,
         highest: float = 30.0,
-        window: int = 20,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
+        **options: Any,
     ):
-        super().__init__(window, tolerance, iterations)
+        super().__init__(**options)
         self.adaptation = Anfis(features, file, lowest, highest)
 
 
@@ -57,16 +53,8 @@ class AnfisFgoMotion(AnfisFgo):
     network can learn no more than the mean.
     """
 
-    def __init__(
-        self,
-        file: str = "",
-        lowest: float = 1.0,
-        highest: float = 30.0,
-        window: int = 20,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
-    ):
-        super().__init__("motion", file, lowest, highest, window, tolerance, iterations)
+    def __init__(self, file: str = "", lowest: float = 1.0, highest: float = 30.0, **options: Any):
+        super().__init__("motion", file, lowest, highest, **options)
 
 
 @register("anfis-ekf")

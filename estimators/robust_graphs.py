@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from estimators.adaptations.dynamic_covariance_scaling import DynamicCovarianceScaling
 from estimators.adaptations.gradient_adaptive import GradientAdaptive, Shape
@@ -14,6 +14,7 @@ from estimators.adaptations.weighting import Weighting
 from estimators.models.nine_state import NineStateModel
 from estimators.sliding_window import AidedWindow, InertialWindow
 from simnav.estimator import register
+from simnav.types import Array
 
 __all__ = [
     "CauchyFgo",
@@ -33,79 +34,55 @@ __all__ = [
 class _Robust(AidedWindow):
     """A window with a weighting, over the inertial model or, without an IMU, the ship model."""
 
-    def __init__(self, weighting: Weighting, window: int, tolerance: float, iterations: int):
-        super().__init__(weighting=weighting, window=window, tolerance=tolerance, iterations=iterations)
+    def __init__(self, weighting: Weighting, *, tolerance: float = 0.05, **options: Any):
+        super().__init__(weighting=weighting, tolerance=tolerance, **options)
 
 
-@register("huber-fgo")
-class HuberFgo(_Robust):
-    """Sliding window with Huber's weights: a residual beyond c sigma pulls no harder than one of c sigma.
-
-    See `estimators.adaptations.m_estimators`; ``window``, ``tolerance`` and ``iterations`` as for ``sw-fgo``.
+class _MEstimation(_Robust):
+    """An M-estimator (`estimators.adaptations.m_estimators`).
 
     Parameters
     ----------
     efficiency : float
-        On Gaussian noise; c follows, for each number of components.
+        On Gaussian noise; the function's constant follows, for each number of components.
+    smallest : float
+        Least weight (`estimators.adaptations.robust_weighting`).
+    window, tolerance, iterations
+        As for ``sw-fgo``.
     """
 
-    def __init__(self, efficiency: float = 0.95, window: int = 20, tolerance: float = 0.05, iterations: int = 10):
-        super().__init__(MEstimator(huber, constants(huber, efficiency)), window, tolerance, iterations)
+    function: ClassVar[staticmethod[[Array], Array]]
+
+    def __init__(self, efficiency: float = 0.95, smallest: float = 1e-3, **options: Any):
+        super().__init__(MEstimator(self.function, constants(self.function, efficiency), smallest), **options)
+
+
+@register("huber-fgo")
+class HuberFgo(_MEstimation):
+    """Sliding window with Huber's weights: a residual beyond c sigma pulls no harder than one of c sigma."""
+
+    function = staticmethod(huber)
 
 
 @register("tukey-fgo")
-class TukeyFgo(_Robust):
-    """Sliding window with Tukey's biweight: a residual beyond c sigma counts for next to nothing.
+class TukeyFgo(_MEstimation):
+    """Sliding window with Tukey's biweight: a residual beyond c sigma counts for next to nothing."""
 
-    See `estimators.adaptations.m_estimators`, and ``huber-fgo`` for the parameters.
-    """
-
-    def __init__(
-        self,
-        efficiency: float = 0.95,
-        smallest: float = 1e-3,
-        window: int = 20,
-        tolerance: float = 0.05,
-        iterations: int = 10,
-    ):
-        super().__init__(MEstimator(tukey, constants(tukey, efficiency), smallest), window, tolerance, iterations)
+    function = staticmethod(tukey)
 
 
 @register("cauchy-fgo")
-class CauchyFgo(_Robust):
-    """Sliding window with Cauchy's weights, which fall with the square of the residual.
+class CauchyFgo(_MEstimation):
+    """Sliding window with Cauchy's weights, which fall with the square of the residual."""
 
-    See `estimators.adaptations.m_estimators`, and ``huber-fgo`` for the parameters.
-    """
-
-    def __init__(
-        self,
-        efficiency: float = 0.95,
-        smallest: float = 1e-3,
-        window: int = 20,
-        tolerance: float = 0.05,
-        iterations: int = 10,
-    ):
-        super().__init__(MEstimator(cauchy, constants(cauchy, efficiency), smallest), window, tolerance, iterations)
+    function = staticmethod(cauchy)
 
 
 @register("gm-fgo")
-class GmFgo(_Robust):
-    """Sliding window with Geman and McClure's weights, which fall with the fourth power of the residual.
+class GmFgo(_MEstimation):
+    """Sliding window with Geman and McClure's weights, which fall with the fourth power of the residual."""
 
-    See `estimators.adaptations.m_estimators`, and ``huber-fgo`` for the parameters.
-    """
-
-    def __init__(
-        self,
-        efficiency: float = 0.95,
-        smallest: float = 1e-3,
-        window: int = 20,
-        tolerance: float = 0.05,
-        iterations: int = 10,
-    ):
-        tuned = constants(geman_mcclure, efficiency)
-        super().__init__(MEstimator(geman_mcclure, tuned, smallest), window, tolerance, iterations)
+    function = staticmethod(geman_mcclure)
 
 
 @register("dcs-fgo")
@@ -120,11 +97,9 @@ class DcsFgo(_Robust):
         phi: float = 0.0,
         efficiency: float = 0.95,
         smallest: float = 1e-3,
-        window: int = 20,
-        tolerance: float = 0.05,
-        iterations: int = 10,
+        **options: Any,
     ):
-        super().__init__(DynamicCovarianceScaling(phi, efficiency, smallest), window, tolerance, iterations)
+        super().__init__(DynamicCovarianceScaling(phi, efficiency, smallest), **options)
 
 
 @register("switchable-fgo")
@@ -138,11 +113,9 @@ class SwitchableFgo(_Robust):
         self,
         sigma: float = 0.3,
         smallest: float = 1e-3,
-        window: int = 20,
-        tolerance: float = 0.05,
-        iterations: int = 10,
+        **options: Any,
     ):
-        super().__init__(SwitchableConstraints(sigma, smallest), window, tolerance, iterations)
+        super().__init__(SwitchableConstraints(sigma, smallest), **options)
 
 
 @register("gnc-fgo")
@@ -158,11 +131,11 @@ class GncFgo(_Robust):
         growth: float = 3.0,
         efficiency: float = 0.95,
         smallest: float = 1e-3,
-        window: int = 20,
-        tolerance: float = 0.05,
+        *,
         iterations: int = 15,
+        **options: Any,
     ):
-        super().__init__(GraduatedNonConvexity(cost, growth, efficiency, smallest), window, tolerance, iterations)
+        super().__init__(GraduatedNonConvexity(cost, growth, efficiency, smallest), iterations=iterations, **options)
 
 
 @register("max-mixture-fgo")
@@ -176,11 +149,9 @@ class MaxMixtureFgo(_Robust):
         self,
         spread: float = 10.0,
         probability: float = 0.05,
-        window: int = 20,
-        tolerance: float = 0.05,
-        iterations: int = 10,
+        **options: Any,
     ):
-        super().__init__(MaxMixture(spread, probability), window, tolerance, iterations)
+        super().__init__(MaxMixture(spread, probability), **options)
 
 
 @register("ga-fgo")
@@ -196,11 +167,9 @@ class GaFgo(_Robust):
         motion: Shape = (2.0, 1.0, 0.3),
         other: Shape = (2.0, 2.0, 0.3),
         epsilon: float = 0.1,
-        window: int = 20,
-        tolerance: float = 0.05,
-        iterations: int = 10,
+        **options: Any,
     ):
-        super().__init__(GradientAdaptive("default", gnss, motion, other, epsilon), window, tolerance, iterations)
+        super().__init__(GradientAdaptive("default", gnss, motion, other, epsilon), **options)
 
 
 class _Paper(InertialWindow):
@@ -226,15 +195,15 @@ class _Paper(InertialWindow):
         sigma_gnss_horizontal: float = 2.5,
         sigma_gnss_vertical: float = 5.0,
         sigma_dvl: float = 0.1,
-        window: int = 20,
+        *,
         tolerance: float = 1e-6,
-        iterations: int = 10,
+        **options: Any,
     ):
         front = NineStateModel(
             sigma_position, sigma_velocity, sigma_attitude_deg,
             sigma_gnss_horizontal, sigma_gnss_vertical, sigma_dvl,
         )  # fmt: skip
-        super().__init__(front, weighting=self._weighting(), window=window, tolerance=tolerance, iterations=iterations)
+        super().__init__(front, weighting=self._weighting(), tolerance=tolerance, **options)
 
     def _weighting(self) -> Weighting | None:
         """None: every factor counts in full."""

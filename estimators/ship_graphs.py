@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import radians
+from typing import Any
 
 from estimators.models.ship import ShipModel, require_ship_aids
 from estimators.models.ship_chain import ShipChain
@@ -15,6 +16,32 @@ __all__ = ["ShipFgo", "ShipFgoFull"]
 
 
 class _ShipGraph(WindowEstimator):
+    """What both share.
+
+    Parameters
+    ----------
+    window, tolerance, iterations
+        As for `WindowEstimator`.
+    acceleration, turn_rate_deg, turn_time, current, current_time, sway : float
+        Of the model, as for ``ship-ekf``.
+    """
+
+    def __init__(
+        self,
+        window: int | None,
+        tolerance: float,
+        iterations: int,
+        *,
+        acceleration: float = 0.05,
+        turn_rate_deg: float = 0.6,
+        turn_time: float = 10.0,
+        current: float = 0.3,
+        current_time: float = 3600.0,
+        sway: float = 0.2,
+    ):
+        model = ShipModel(acceleration, radians(turn_rate_deg), turn_time, current, current_time, sway)
+        super().__init__(ShipChain(model), window=window, tolerance=tolerance, iterations=iterations)
+
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs a heading, and a position or a speed."""
         require_ship_aids(instruments, self.name)
@@ -42,20 +69,8 @@ class ShipFgo(_ShipGraph):
         Of the model, as for ``ship-ekf``.
     """
 
-    def __init__(
-        self,
-        window: int = 20,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
-        acceleration: float = 0.05,
-        turn_rate_deg: float = 0.6,
-        turn_time: float = 10.0,
-        current: float = 0.3,
-        current_time: float = 3600.0,
-        sway: float = 0.2,
-    ):
-        model = ShipModel(acceleration, radians(turn_rate_deg), turn_time, current, current_time, sway)
-        super().__init__(ShipChain(model), window=window, tolerance=tolerance, iterations=iterations)
+    def __init__(self, *, window: int = 20, tolerance: float = 1e-3, iterations: int = 10, **model: Any):
+        super().__init__(window, tolerance, iterations, **model)
 
 
 @register("ship-fgo-full")
@@ -78,16 +93,5 @@ class ShipFgoFull(FullGraph, _ShipGraph):
 
     slow = True
 
-    def __init__(
-        self,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
-        acceleration: float = 0.05,
-        turn_rate_deg: float = 0.6,
-        turn_time: float = 10.0,
-        current: float = 0.3,
-        current_time: float = 3600.0,
-        sway: float = 0.2,
-    ):
-        model = ShipModel(acceleration, radians(turn_rate_deg), turn_time, current, current_time, sway)
-        super().__init__(ShipChain(model), window=None, tolerance=tolerance, iterations=iterations)
+    def __init__(self, *, tolerance: float = 1e-3, iterations: int = 10, **model: Any):
+        super().__init__(None, tolerance, iterations, **model)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from estimators.adaptations.base import Adaptation
 from estimators.adaptations.innovation_based import InnovationBased
 from estimators.adaptations.weighting import Weighting
@@ -23,7 +25,7 @@ class InertialWindow(WindowEstimator):
     Parameters
     ----------
     front : InertialModel
-    adaptation, weighting, window, tolerance, iterations, every_sample
+    adaptation, weighting, window, tolerance, iterations
         As for `WindowEstimator`.
     """
 
@@ -32,12 +34,9 @@ class InertialWindow(WindowEstimator):
         front: InertialModel,
         adaptation: Adaptation | None = None,
         weighting: Weighting | None = None,
-        window: int | None = 20,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
-        every_sample: bool = False,
+        **options: Any,
     ):
-        super().__init__(InertialChain(front), adaptation, weighting, window, tolerance, iterations, every_sample)
+        super().__init__(InertialChain(front), adaptation, weighting, **options)
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and at least one aiding instrument."""
@@ -56,15 +55,8 @@ class AidedWindow(WindowEstimator):
         As for `WindowEstimator`.
     """
 
-    def __init__(
-        self,
-        adaptation: Adaptation | None = None,
-        weighting: Weighting | None = None,
-        window: int | None = 20,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
-    ):
-        super().__init__(InertialChain(InertialModel()), adaptation, weighting, window, tolerance, iterations)
+    def __init__(self, adaptation: Adaptation | None = None, weighting: Weighting | None = None, **options: Any):
+        super().__init__(InertialChain(InertialModel()), adaptation, weighting, **options)
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and another instrument, or what the ship model needs."""
@@ -82,22 +74,22 @@ class SwFgo(InertialWindow):
 
     Parameters
     ----------
+    calibrate : bool
+        False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
     window : int
         Epochs in the window (steps that bring measurements).
     tolerance : float
         Largest component of a step, in its sigmas, at which the nodes have converged.
     iterations : int
         Most Gauss-Newton steps an epoch.
-    calibrate : bool
-        False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
     """
 
-    def __init__(self, window: int = 20, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
-        super().__init__(InertialModel(calibrate), window=window, tolerance=tolerance, iterations=iterations)
+    def __init__(self, calibrate: bool = True, **options: Any):
+        super().__init__(InertialModel(calibrate), **options)
 
 
 @register("fgo-unsimplified")
-class FgoUnsimplified(InertialWindow):
+class FgoUnsimplified(SwFgo):
     """The sliding window with a node for every IMU sample: paper 004's graph without the equivalent IMU factor.
 
     The same estimate as ``sw-fgo`` at many times its cost, which is what it is for. A shorter window keeps that
@@ -105,16 +97,15 @@ class FgoUnsimplified(InertialWindow):
 
     Parameters
     ----------
-    window, tolerance, iterations, calibrate
+    window, calibrate, tolerance, iterations
         As for `SwFgo`.
     """
 
     slow = True
+    every_sample = True
 
-    def __init__(self, window: int = 5, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
-        super().__init__(
-            InertialModel(calibrate), window=window, tolerance=tolerance, iterations=iterations, every_sample=True
-        )
+    def __init__(self, window: int = 5, calibrate: bool = True, **options: Any):
+        super().__init__(calibrate, window=window, **options)
 
 
 @register("fgo-full")
@@ -123,13 +114,13 @@ class FgoFull(FullGraph, InertialWindow):
 
     Parameters
     ----------
-    tolerance, iterations, calibrate
+    calibrate, tolerance, iterations
         As for `SwFgo`.
     """
 
     slow = True
 
-    def __init__(self, tolerance: float = 1e-3, iterations: int = 10, calibrate: bool = True):
+    def __init__(self, calibrate: bool = True, tolerance: float = 1e-3, iterations: int = 10):
         super().__init__(InertialModel(calibrate), window=None, tolerance=tolerance, iterations=iterations)
 
 
@@ -154,12 +145,10 @@ class IaeFgo(AidedWindow):
         forgetting: float = 0.9,
         lowest: float = 1.0,
         highest: float = 30.0,
-        window: int = 20,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
+        **options: Any,
     ):
         noise = InnovationBased("innovation", shortest, longest, low, high, forgetting, lowest=lowest, highest=highest)
-        super().__init__(noise, window=window, tolerance=tolerance, iterations=iterations)
+        super().__init__(noise, **options)
 
 
 @register("iae-fgo-fixed")
@@ -184,11 +173,9 @@ class IaeFgoFixed(AidedWindow):
         forgetting: float = 0.9,
         lowest: float = 1.0,
         highest: float = 30.0,
-        window: int = 20,
-        tolerance: float = 1e-3,
-        iterations: int = 10,
+        **options: Any,
     ):
         noise = InnovationBased(
             "innovation", innovations, innovations, forgetting=forgetting, lowest=lowest, highest=highest
         )
-        super().__init__(noise, window=window, tolerance=tolerance, iterations=iterations)
+        super().__init__(noise, **options)

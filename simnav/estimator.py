@@ -10,6 +10,7 @@ Entry points are loaded when a name is first asked for; one that fails is named 
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
 import importlib.util
 import inspect
@@ -270,11 +271,12 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
     """
     cls = find(name_or_path)
     known = {p.name: p for p in _parameters(cls)}
-    try:
-        hints = typing.get_type_hints(cls.__init__)
-    except Exception:  # an annotation that cannot be resolved: the defaults decide
-        hints = {}
-    open_ended = any(p.kind is p.VAR_KEYWORD for p in inspect.signature(cls).parameters.values())
+    hints: dict[str, Any] = {}
+    constructors = _constructors(cls)
+    for constructor in reversed(constructors):
+        with contextlib.suppress(Exception):  # an annotation that cannot be resolved: the defaults decide
+            hints |= typing.get_type_hints(constructor)
+    open_ended = bool(constructors) and _open(constructors[-1])
     values: dict[str, Any] = {}
     for key, value in parameters.items():
         if key not in known and not open_ended:
@@ -292,10 +294,29 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
 
 
 def _parameters(cls: type[Estimator]) -> list[inspect.Parameter]:
-    if cls.__init__ is object.__init__:
-        return []
-    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    return [p for p in inspect.signature(cls).parameters.values() if p.kind in kinds]
+    """Of its constructor; where that takes ``**``, also those of its bases' that can be given by name only."""
+    found: dict[str, inspect.Parameter] = {}
+    kinds = [inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD]
+    for constructor in _constructors(cls):
+        own = list(inspect.signature(constructor).parameters.values())[1:]
+        found |= {p.name: p for p in own if p.kind in kinds and p.name not in found}
+        kinds = kinds[:1]
+    return list(found.values())
+
+
+def _constructors(cls: type[Estimator]) -> list[Callable[..., Any]]:
+    """Its constructor, and that of the next base that has one for as long as it takes ``**``."""
+    found = []
+    for base in cls.__mro__[:-1]:
+        if "__init__" in vars(base):
+            found.append(vars(base)["__init__"])
+            if not _open(found[-1]):
+                break
+    return found
+
+
+def _open(constructor: Callable[..., Any]) -> bool:
+    return any(p.kind is p.VAR_KEYWORD for p in inspect.signature(constructor).parameters.values())
 
 
 def _discover() -> None:

@@ -23,6 +23,7 @@ from __future__ import annotations
 import contextlib
 from collections import deque
 from math import hypot, inf, isfinite
+from typing import ClassVar
 
 import numpy as np
 
@@ -61,9 +62,6 @@ class WindowEstimator(Estimator):
         the contraction from step to step, also of the epochs before, says that it would be smaller.
     iterations : int
         Most steps an epoch.
-    every_sample : bool
-        A node for every IMU sample, instead of one preintegrated factor between measurements (paper 004's un-simplified
-        graph).
 
     Attributes
     ----------
@@ -71,15 +69,19 @@ class WindowEstimator(Estimator):
         Of the newest node.
     """
 
+    #: A node for every IMU sample, instead of one preintegrated factor between measurements (paper 004's un-simplified
+    #: graph).
+    every_sample: ClassVar[bool] = False
+
     def __init__(
         self,
         chain: Chain,
         adaptation: Adaptation | None = None,
         weighting: Weighting | None = None,
+        *,
         window: int | None = 20,
         tolerance: float = 1e-3,
         iterations: int = 10,
-        every_sample: bool = False,
     ):
         if window is not None and window < 1:
             raise ValueError(f"window is {window}; it must hold at least 1 epoch")
@@ -91,7 +93,6 @@ class WindowEstimator(Estimator):
         self.adaptation = adaptation
         self.weighting = weighting
         self.window, self.tolerance, self.iterations = window, tolerance, iterations
-        self.every_sample = every_sample
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""

@@ -140,6 +140,53 @@ def test_bad_parameters_are_a_sentence(given: dict[str, Any], message: str):
     assert "\n" not in str(caught.value)
 
 
+class Wide(Plain):
+    """Takes what its bases take by name."""
+
+    def __init__(self, *, width: float = 1.0, gate: float = 5.0, **options: Any):
+        super().__init__(gate, **options)
+        self.width = width
+
+
+class Wider(Wide):
+    """One more."""
+
+    def __init__(self, depth: int = 2, **options: Any):
+        super().__init__(**options)
+        self.depth = depth
+
+
+class Open(Estimator):
+    """Takes anything."""
+
+    def __init__(self, **options: Any):
+        self.options = options
+
+    def reset(self, start, instruments):
+        pass
+
+    def update(self, measurements):
+        return Estimate(measurements.time)
+
+
+def test_a_constructor_with_stars_has_the_parameters_that_its_bases_take_by_name_only():
+    register("wider")(Wider)
+    assert [(p.name, p.default) for p in describe("wider").parameters] == [("depth", 2), ("width", 1.0), ("gate", 5.0)]
+    made = make("wider", depth="3", width="2", gate="4")
+    assert (made.depth, made.width, made.values[0]) == (3, 2.0, 4.0)
+    assert type(made.width) is float
+    with pytest.raises(EstimatorError, match="no parameter 'widht'; did you mean 'width'"):
+        make("wider", widht="2")
+    with pytest.raises(EstimatorError, match="no parameter 'window'"):  # Plain's, but not by name only
+        make("wider", window="2")
+
+
+def test_a_constructor_that_takes_anything_is_given_it():
+    register("open")(Open)
+    assert describe("open").parameters == ()
+    assert make("open", depth="3").options == {"depth": 3}
+
+
 def test_an_estimator_without_parameters_says_so():
     with pytest.raises(EstimatorError, match=r"has no parameter 'gate'; it takes none"):
         make("inertial", gate="3")
