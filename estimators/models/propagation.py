@@ -27,6 +27,7 @@ __all__ = [
     "accumulate_error",
     "advance_inertial",
     "correct_inertial",
+    "next_stretch",
     "propagate_covariance",
     "propagate_inertial",
 ]
@@ -189,6 +190,61 @@ def accumulate_error(blocks, count, noise, transition, process_noise):  # type: 
             process_noise[i, j] = M[i, 15 + j]
 
 
+@kernel()
+def next_stretch(clock, time, interval, rate, force, i, t, until, nominal):  # type: ignore[no-untyped-def]
+    """The stretch from a time on in which one sample holds, or none.
+
+    Parameters
+    ----------
+    clock : (15,) array
+        As of `advance_inertial`; what it says of samples is updated.
+    time, interval, rate, force
+        The samples at hand.
+    i : int
+        Index of the first that may not be used up.
+    t, until, nominal : float
+        Start of the stretch, its latest end, and the nominal interval [s].
+
+    Returns
+    -------
+    i : int
+    stop : float
+        End of the stretch.
+    whole : float
+        Interval of the sample if it is used up then, else 0.
+    hold : bool
+        Whether there is no sample for it.
+    """
+    eps = 1e-7
+    n = time.size
+    while i < n and (
+        time[i] <= t + eps or not _usable(rate[i, 0], rate[i, 1], rate[i, 2], force[i, 0], force[i, 1], force[i, 2])
+    ):
+        i += 1
+    hold, whole, stop = False, 0.0, until
+    if i < n and time[i] - interval[i] <= t + 0.5 * nominal:
+        stop = min(time[i], until)
+        started = time[i] - interval[i]
+        if t <= started + eps or clock[1] < started - 0.5 * nominal:
+            adjacent = clock[1] >= started - 0.5 * nominal
+            for r in range(3):
+                clock[9 + r] = clock[3 + r] if adjacent else rate[i, r]
+        ahead = (stop - started) / interval[i] - 0.5
+        for r in range(3):
+            clock[3 + r], clock[6 + r] = rate[i, r], force[i, r]
+            clock[12 + r] = rate[i, r] + ahead * (rate[i, r] - clock[9 + r])
+        clock[1] = stop
+        if stop >= time[i] - eps:
+            whole = interval[i]
+    elif i < n:
+        stop, hold = min(time[i] - interval[i], until), True
+    elif t < clock[1] + 1.5 * nominal:
+        stop = min(clock[1] + 2.0 * nominal, until)  # the step ends between samples: carry the last one on
+    else:
+        hold = True
+    return i, stop, whole, hold
+
+
 @kernel(
     "UniTuple(i8, 2)(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], "
     "f8[:, ::1], i8, f8, f8[::1], f8[:, ::1])"
@@ -235,7 +291,7 @@ def advance_inertial(  # type: ignore[no-untyped-def]
     eps = 1e-7
     before = np.empty(9)
     keep = np.empty(6)
-    t, i, n, count = clock[0], first, time.size, 0
+    t, i, count = clock[0], first, 0
     nominal = noise[8]
     while t < until - eps:
         block = blocks[count]
@@ -247,32 +303,7 @@ def advance_inertial(  # type: ignore[no-untyped-def]
             block[7 + r] = 0.0
         held, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
         while t < end - eps:
-            while i < n and (
-                time[i] <= t + eps
-                or not _usable(rate[i, 0], rate[i, 1], rate[i, 2], force[i, 0], force[i, 1], force[i, 2])
-            ):
-                i += 1
-            hold, whole, stop = False, 0.0, end
-            if i < n and time[i] - interval[i] <= t + 0.5 * nominal:
-                stop = min(time[i], end)
-                started = time[i] - interval[i]
-                if t <= started + eps or clock[1] < started - 0.5 * nominal:
-                    adjacent = clock[1] >= started - 0.5 * nominal
-                    for r in range(3):
-                        clock[9 + r] = clock[3 + r] if adjacent else rate[i, r]
-                ahead = (stop - started) / interval[i] - 0.5
-                for r in range(3):
-                    clock[3 + r], clock[6 + r] = rate[i, r], force[i, r]
-                    clock[12 + r] = rate[i, r] + ahead * (rate[i, r] - clock[9 + r])
-                clock[1] = stop
-                if stop >= time[i] - eps:
-                    whole = interval[i]
-            elif i < n:
-                stop, hold = min(time[i] - interval[i], end), True
-            elif t < clock[1] + 1.5 * nominal:
-                stop = min(clock[1] + 2.0 * nominal, end)  # the step ends between samples: carry the last one on
-            else:
-                hold = True
+            i, stop, whole, hold = next_stretch(clock, time, interval, rate, force, i, t, end, nominal)
             dt = stop - t
             if hold:
                 meridian, prime = radii_scalar(sin(position[0]))

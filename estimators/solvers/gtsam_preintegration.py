@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from estimators.models.propagation import HELD_ATTITUDE, HELD_VELOCITY, LARGEST_FORCE, LARGEST_RATE, TURN_TIME
+from estimators.models.propagation import HELD_ATTITUDE, HELD_VELOCITY, TURN_TIME, next_stretch
 from estimators.solvers.tangent_frame import TangentFrame
 from simnav.compiled import kernel
 from simnav.rotation import cross
@@ -50,20 +50,18 @@ def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, n
     """Cut the stretch up to a time into pieces of constant rate and force, as GTSAM integrates them.
 
     A sample that spans ``until`` is used in part, the rest by the next call; where samples are missing there is a piece
-    to be held. The rules are those of `estimators.models.propagation.advance_inertial`.
+    to be held.
 
     Parameters
     ----------
-    clock : (14,) array
-        Time; end of the last sample used; its mean rate and force; the mean rate of the one before; the rate at the
-        time of the clock, extrapolated from both. Updated.
+    clock : (15,) array
+        As of `estimators.models.propagation.advance_inertial`, but for the seconds held; updated.
     memory : (6,) array
         Angle and velocity increment of the last whole sample; updated.
     bias : (6,) array
         Gyroscopes, accelerometers: taken off for coning and sculling, and put on again.
     time, interval : (k,) arrays
     rate, force : (k, 3) arrays
-        Usable samples.
     first : int
         The first that is not used up.
     until, nominal : float
@@ -77,30 +75,9 @@ def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, n
         Index of the first sample that is not used up, and the number of pieces.
     """
     eps = 1e-7
-    t, i, n, count = clock[0], first, time.size, 0
+    t, i, count = clock[0], first, 0
     while t < until - eps:
-        while i < n and time[i] <= t + eps:
-            i += 1
-        hold, whole, stop = False, False, until
-        if i < n and time[i] - interval[i] <= t + 0.5 * nominal:
-            stop = min(time[i], until)
-            started = time[i] - interval[i]
-            if t <= started + eps or clock[1] < started - 0.5 * nominal:
-                adjacent = clock[1] >= started - 0.5 * nominal
-                for r in range(3):
-                    clock[8 + r] = clock[2 + r] if adjacent else rate[i, r]
-            ahead = (stop - started) / interval[i] - 0.5
-            for r in range(3):
-                clock[2 + r], clock[5 + r] = rate[i, r], force[i, r]
-                clock[11 + r] = rate[i, r] + ahead * (rate[i, r] - clock[8 + r])
-            clock[1] = stop
-            whole = stop >= time[i] - eps
-        elif i < n:
-            stop, hold = min(time[i] - interval[i], until), True
-        elif t < clock[1] + 1.5 * nominal:
-            stop = min(clock[1] + 2.0 * nominal, until)  # the step ends between samples: carry the last one on
-        else:
-            hold = True
+        i, stop, whole, hold = next_stretch(clock, time, interval, rate, force, i, t, until, nominal)
         dt = stop - t
         piece = pieces[count]
         count += 1
@@ -109,8 +86,8 @@ def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, n
             piece[7] = 1.0
             memory[:] = 0.0
         else:
-            a0, a1, a2 = (clock[2] - bias[0]) * dt, (clock[3] - bias[1]) * dt, (clock[4] - bias[2]) * dt
-            n0, n1, n2 = (clock[5] - bias[3]) * dt, (clock[6] - bias[4]) * dt, (clock[7] - bias[5]) * dt
+            a0, a1, a2 = (clock[3] - bias[0]) * dt, (clock[4] - bias[1]) * dt, (clock[5] - bias[2]) * dt
+            n0, n1, n2 = (clock[6] - bias[3]) * dt, (clock[7] - bias[4]) * dt, (clock[8] - bias[5]) * dt
             m0, m1, m2 = memory[0], memory[1], memory[2]
             q0, q1, q2 = cross(m0, m1, m2, a0, a1, a2)
             r0, r1, r2 = a0 + q0 / 12.0, a1 + q1 / 12.0, a2 + q2 / 12.0
@@ -123,8 +100,8 @@ def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, n
             piece[4] = (n0 + s0 - 0.5 * x0) / dt + bias[3]
             piece[5] = (n1 + s1 - 0.5 * x1) / dt + bias[4]
             piece[6] = (n2 + s2 - 0.5 * x2) / dt + bias[5]
-            if whole:
-                scale = interval[i] / dt
+            if whole > 0.0:
+                scale = whole / dt
                 memory[0], memory[1], memory[2] = a0 * scale, a1 * scale, a2 * scale
                 memory[3], memory[4], memory[5] = n0 * scale, n1 * scale, n2 * scale
         t = stop
@@ -162,7 +139,7 @@ class Preintegration:
             max(float(densities[3]), LEAST_WALK * float(variance[0]), LEAST_WALK * LEAST_GYROSCOPE) * _EYE,
             max(float(densities[5]), LEAST_WALK * float(variance[3]), LEAST_WALK * LEAST_ACCELEROMETER) * _EYE,
         )
-        self._clock, self._memory, self._turn = np.zeros(14), np.zeros(6), np.zeros(3)
+        self._clock, self._memory, self._turn = np.zeros(15), np.zeros(6), np.zeros(3)
         self._clock[0], self._clock[1] = time, -1e9
         self.held = 0.0
         self.load(None)
@@ -175,18 +152,16 @@ class Preintegration:
     @property
     def rate(self) -> Array:
         """Body rate at the end, extrapolated, as measured [rad/s]."""
-        return self._clock[11:14].copy()
+        return self._clock[12:15].copy()
 
     def load(self, imu: ImuSamples | None) -> None:
-        """Take the IMU samples of the step that follows; those that no marine vehicle could make are left out."""
+        """Take the IMU samples of the step that follows."""
         self._first = 0
         if imu is None or len(imu) == 0:
             self._samples: tuple[Array, ...] = (np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
             return
-        usable = np.abs(imu.angular_rate).sum(axis=1) < LARGEST_RATE
-        usable &= np.abs(imu.specific_force).sum(axis=1) < LARGEST_FORCE
         arrays = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-        self._samples = tuple(np.array(a[usable], dtype=np.float64, order="C") for a in arrays)
+        self._samples = tuple(np.array(a, dtype=np.float64, order="C") for a in arrays)
 
     def begin(self, state: Any, bias: Any) -> None:
         """Start anew at a node."""
