@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimators.models.measurements import plausible
+from estimators.solvers.admission import Admission
 from simnav.earth import displace, relative_position
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.types import COMPONENTS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement, Measurements
@@ -62,19 +62,13 @@ class FilterpyEstimator(Estimator):
         self.sheets = {s.name: s for s in instruments.of_kind(*self.needs, *self.uses)}
         self.kf = self.build(start, instruments)
         self._time = start.time
-        self._skipped = 0
+        self._admission = Admission(instruments, self.sheets)
 
     def update(self, measurements: Measurements) -> Estimate:
         """Run the filter through one step."""
-        for m in measurements:
-            sheet = self.sheets.get(m.instrument)
-            if sheet is None:
-                continue
-            if not self._time - 1e-4 <= m.time <= measurements.time + 1e-4 or not plausible(m.kind, m.value):
-                self._skipped += 1
-                continue
+        for m in self._admission.admit(measurements, self._time):
             self._advance(m.time)
-            self.correct(self.kf, self._local(m), sheet)
+            self.correct(self.kf, self._local(m), self.sheets[m.instrument])
         self._advance(measurements.time)
         return self._estimate()
 
@@ -104,5 +98,5 @@ class FilterpyEstimator(Estimator):
             nine[6:9],
             covariance,
             estimated,
-            {"skipped": float(self._skipped)},
+            {"skipped": float(self._admission.skipped)},
         )

@@ -94,7 +94,7 @@ class FilterpyUkf(FilterpyEstimator):
         self._settle(kf)
         linearised = self.model.measure(self._measurement)
         if linearised is None:
-            self._skipped += 1
+            self._admission.skipped += 1
             return
         kf.update(z[: len(linearised.noise)], R=linearised.noise)
         kf.P = 0.5 * (kf.P + kf.P.T)
@@ -131,7 +131,7 @@ class FilterpyUkf(FilterpyEstimator):
         self._settle(self.kf)
         estimate = self.model.estimate(self.kf.P)
         estimate.time = self._time
-        estimate.diagnostics = {"skipped": float(self._skipped)}
+        estimate.diagnostics = {"skipped": float(self._admission.skipped)}
         return estimate
 
 
