@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from estimators.models.ship import ShipModel
 from estimators.models.ship_points import ShipPoints
 from estimators.ship_ekf import ShipEkf
-from estimators.ship_graphs import ShipFgo
 from simnav import earth, rotation
 from simnav.estimator import UnsuitableScenario
 from simnav.recording import AidStream, Block, Recording
@@ -155,23 +153,6 @@ def stochastic_voyage(seed: int, duration: int, model: ShipModel, sheets: tuple[
     truth = NavigationStates(time, states[:, :3], velocity, attitude)
     block = Block(0.0, float(duration), None, None, streams, truth[10::10])
     return Recording("stochastic-v1", seed, Instruments(sheets), truth[:1], start, (), block)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [ShipEkf, ShipFgo])
-def test_consistent_on_the_matched_scenario(kind: type, run_over):
-    """Average NEES over 50 seeds; 95 % bands, widened by Bonferroni for four epochs of three quantities."""
-    sheets = (SHEETS[3], SHEETS[4], Datasheet("gnss", "gnss_position", 1.0, np.array([3.0, 3.0, 6.0])))
-    moves = ShipEkf().model
-    runs = [run_over(kind(), stochastic_voyage(seed, 200, moves, sheets)) for seed in range(50)]
-    errors, covariances = (np.array(x) for x in zip(*runs, strict=True))
-    epochs = [9, 69, 129, 199]
-    for part in ([0, 1], [3, 4], [8]):
-        e, P = errors[:, epochs][..., part], covariances[:, epochs][..., part, :][..., :, part]
-        nees = np.einsum("sti,sti->st", e, np.linalg.solve(P, e[..., None])[..., 0]).mean(axis=0)
-        tail = 0.025 / 12
-        low, high = chi2.ppf([tail, 1 - tail], 50 * len(part)) / 50
-        assert np.all((nees > low) & (nees < high)), (part, nees, (low, high))
 
 
 def test_it_finds_the_biases_and_carries_through_an_outage(run_over):
