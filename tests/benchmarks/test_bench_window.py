@@ -78,7 +78,7 @@ def test_an_epoch_of_isam2(benchmark, recording: Recording):
 
 
 def test_ours_costs_a_fifth_of_gtsams(benchmark, recording: Recording):
-    """The same window, nodes, factors and data; medians of an epoch, rounds side by side.
+    """The same window, nodes, factors and data; medians of an epoch, ten at a time by each in turn.
 
     Both as the rows come: ours takes a second step where the first does not settle it, GTSAM linearises only what has
     moved, which is most of what an incremental solver has to offer. And like for like: both linearise the window anew
@@ -89,11 +89,12 @@ def test_ours_costs_a_fifth_of_gtsams(benchmark, recording: Recording):
     estimators = [filled(name, parameters, recording) for name, parameters in rows]
     steps = list(recording.steps())[21 : 21 + EPOCHS]
     seconds, iterations = np.empty((4, EPOCHS)), np.empty((4, EPOCHS))
-    for k, packet in enumerate(steps):
+    for first in range(0, EPOCHS, 10):
         for i, estimator in enumerate(estimators):
-            begun = process_time()
-            estimate = estimator.update(packet)
-            seconds[i, k], iterations[i, k] = process_time() - begun, estimate.diagnostics["iterations"]
+            for k in range(first, first + 10):
+                begun = process_time()
+                estimate = estimator.update(steps[k])
+                seconds[i, k], iterations[i, k] = process_time() - begun, estimate.diagnostics["iterations"]
     own, incremental, own_twice, twice = 1e3 * np.median(seconds, axis=1)
     benchmark.extra_info.update(ours_ms=own, gtsam_ms=incremental, ours_twice_ms=own_twice, gtsam_twice_ms=twice)
     print(f"\nas they come: ours {own:.2f} ms, GTSAM {incremental:.2f} ms, {incremental / own:.1f} times")
@@ -101,7 +102,7 @@ def test_ours_costs_a_fifth_of_gtsams(benchmark, recording: Recording):
     benchmark.pedantic(lambda: None, rounds=1)
     assert np.median(iterations[2]) >= np.median(iterations[3])
     assert twice > 5.0 * own_twice
-    assert incremental > own
+    assert incremental > 2.5 * own
 
 
 def test_cost_against_the_length_of_the_window(benchmark, recording: Recording):
