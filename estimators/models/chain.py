@@ -83,12 +83,16 @@ class Columns:
 
     def __init__(self, **columns: Any):
         self._capacity = 64
-        self._columns: dict[str, Any] = {
-            name: np.zeros((self._capacity, *what)) if isinstance(what, tuple) else np.zeros(self._capacity, what)
-            for name, what in columns.items()
-        }
-        self._first = self._last = 0
+        self._columns: dict[str, Any] = {}
         self._views: dict[str, Any] = {}
+        self._first = self._last = 0
+        self.add(**columns)
+
+    def add(self, **columns: Any) -> None:
+        """More columns; the rows that there are have zeros in them."""
+        for name, what in columns.items():
+            shape, dtype = ((self._capacity, *what), float) if isinstance(what, tuple) else ((self._capacity,), what)
+            self._columns[name] = np.zeros(shape, dtype)
 
     def __len__(self) -> int:
         return self._last - self._first
@@ -303,17 +307,21 @@ class Chain(ABC):
         """The front as an estimate."""
         return self.front.estimate(covariance)
 
+    def factors_from(self, node: int) -> tuple[int, int]:
+        """The first rows of motions and aids that have to do with a node of the window or a later one."""
+        return max(node - 1, 0), int(np.searchsorted(self.aids["node"], self.base + node)) if node else 0
+
     @abstractmethod
-    def linearise_motion(self) -> None:
-        """Fill ``residual`` and ``jacobian`` of all motion factors, for the nodes as they are.
+    def linearise_motion(self, first: int = 0) -> None:
+        """Fill ``residual`` and ``jacobian`` of the motion factors from a row on, for the nodes as they are.
 
         With x the state after a motion, ``residual`` is the newer node less x, ``jacobian`` the derivative of x with
         respect to the older node.
         """
 
     @abstractmethod
-    def linearise_aids(self) -> None:
-        """Fill ``residual`` (measured less predicted) and ``jacobian`` (of the prediction) of all aiding factors."""
+    def linearise_aids(self, first: int = 0) -> None:
+        """Fill ``residual`` (measured less predicted) and ``jacobian`` (of the prediction) from a row on."""
 
     @abstractmethod
     def retract(self, step: Array) -> None:

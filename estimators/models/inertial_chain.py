@@ -73,11 +73,11 @@ def _turn_covariance(P, shift, out):  # type: ignore[no-untyped-def]
                 out[i, 6], out[i, 7], out[i, 8] = v0, v1, v2
 
 
-@kernel("void(f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
-def _linearise_motion(transition, begin_shift, end_shift, residual, jacobian):  # type: ignore[no-untyped-def]
+@kernel("void(i8, f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+def _linearise_motion(first, transition, begin_shift, end_shift, residual, jacobian):  # type: ignore[no-untyped-def]
     count, n = begin_shift.shape
     moved = np.empty(n)
-    for k in range(count):
+    for k in range(first, count):
         F, J, s, e = transition[k], jacobian[k], begin_shift[k], end_shift[k]
         for i in range(n):
             x = 0.0
@@ -129,15 +129,15 @@ def _linearise_motion(transition, begin_shift, end_shift, residual, jacobian):  
 
 
 @kernel(
-    "void(i8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8[:, ::1], "
+    "void(i8, i8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8[:, ::1], "
     "f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], i8[::1])"
 )
 def _linearise_aids(  # type: ignore[no-untyped-def]
-    node, base, instrument, value, codes, arms, bias_at, scale_at,
+    first, node, base, instrument, value, codes, arms, bias_at, scale_at,
     position, velocity, dcm, rate, bias, calibration, residual, jacobian, components,
 ):  # fmt: skip
     innovation = np.empty(3)
-    for i in range(node.size):
+    for i in range(first, node.size):
         k, s = node[i] - base, instrument[i]
         components[i] = observe_inertial(
             codes[s], arms[s], bias_at[s], scale_at[s], value[i],
@@ -192,24 +192,24 @@ class InertialChain(Chain):
         self._scale_at = np.array([at for *_, at in known], dtype=np.int64)
         return covariance
 
-    def linearise_motion(self) -> None:
+    def linearise_motion(self, first: int = 0) -> None:
         """As `Chain.linearise_motion` (equations in the module)."""
         m = self.motions
-        _linearise_motion(m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"])
+        _linearise_motion(first, m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"])
 
-    def linearise_aids(self) -> None:
+    def linearise_aids(self, first: int = 0) -> None:
         """As `Chain.linearise_aids`."""
         nodes, aids = self.nodes, self.aids
         jacobian = aids["jacobian"]
-        wide = jacobian if self.size >= 15 else np.empty((len(aids), 3, 15))
+        wide = jacobian if self.size >= 15 else np.zeros((len(aids), 3, 15))
         _linearise_aids(
-            aids["node"], self.base, aids["instrument"], aids["value"],
+            first, aids["node"], self.base, aids["instrument"], aids["value"],
             self._codes, self._arms, self._bias_at, self._scale_at,
             nodes["position"], nodes["velocity"], nodes["dcm"], nodes["raw_rate"], nodes["bias"], nodes["calibration"],
             aids["residual"], wide, aids["components"],
         )  # fmt: skip
         if wide is not jacobian:
-            jacobian[...] = wide[..., : self.size]
+            jacobian[first:] = wide[first:, :, : self.size]
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""

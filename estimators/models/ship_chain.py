@@ -35,11 +35,11 @@ from simnav.types import Array, InitialState, Instruments
 __all__ = ["ShipChain"]
 
 
-@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1])")
-def _linearise_motion(time, position, x, rate, turn_time, residual, jacobian):  # type: ignore[no-untyped-def]
+@kernel("void(i8, f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1])")
+def _linearise_motion(first, time, position, x, rate, turn_time, residual, jacobian):  # type: ignore[no-untyped-def]
     count, n = residual.shape
     p, y, decay = np.empty(3), np.empty(n), np.empty(n)
-    for k in range(count):
+    for k in range(first, count):
         for i in range(3):
             p[i] = position[k, i]
         for i in range(n):
@@ -59,12 +59,13 @@ def _linearise_motion(time, position, x, rate, turn_time, residual, jacobian):  
 
 
 @kernel(
-    "void(i8[::1], i8, i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
+    "void(i8, i8[::1], i8, i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "f8[:, :, ::1])"
 )
 def _linearise_aids(  # type: ignore[no-untyped-def]
-    node, base, instrument, value, codes, aids, position, x, residual, jacobian
+    first, node, base, instrument, value, codes, aids, position, x, residual, jacobian
 ):
-    for i in range(node.size):
+    for i in range(first, node.size):
         k, s = node[i] - base, instrument[i]
         a, b = residual_of(codes[s], aids[s], position[k], x[k], value[i, 0], value[i, 1])
         residual[i, 0], residual[i, 1], residual[i, 2] = a, b, 0.0
@@ -104,18 +105,19 @@ class ShipChain(Chain):
                 self._codes[i], self._aids[i], _ = known[name]
         return covariance
 
-    def linearise_motion(self) -> None:
+    def linearise_motion(self, first: int = 0) -> None:
         """As `Chain.linearise_motion`, by the model's own step."""
         nodes, m, front = self.nodes, self.motions, self.front
         _linearise_motion(
-            nodes["time"], nodes["position"], nodes["x"], front.decay, front.turn_time, m["residual"], m["jacobian"]
-        )
+            first, nodes["time"], nodes["position"], nodes["x"], front.decay, front.turn_time, m["residual"],
+            m["jacobian"],
+        )  # fmt: skip
 
-    def linearise_aids(self) -> None:
+    def linearise_aids(self, first: int = 0) -> None:
         """As `Chain.linearise_aids`."""
         nodes, aids = self.nodes, self.aids
         _linearise_aids(
-            aids["node"], self.base, aids["instrument"], aids["value"], self._codes, self._aids,
+            first, aids["node"], self.base, aids["instrument"], aids["value"], self._codes, self._aids,
             nodes["position"], nodes["x"], aids["residual"], aids["jacobian"],
         )  # fmt: skip
 

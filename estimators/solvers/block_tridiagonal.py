@@ -32,7 +32,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 
-__all__ = ["chain_cost", "solve_chain"]
+__all__ = ["solve_chain", "step_residuals", "whiten"]
 
 #: A factor of less weight than this counts for nothing.
 LEAST_WEIGHT = 1e-9
@@ -124,25 +124,44 @@ def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-de
 
 
 @kernel()
+def _whiten(error, whitener, whitened):  # type: ignore[no-untyped-def]
+    square = 0.0
+    for i in range(error.size):
+        x = 0.0
+        for j in range(i + 1):
+            x += whitener[i, j] * error[j]
+        whitened[i] = x
+        square += x * x
+    return sqrt(square)
+
+
+@kernel()
 def _return(adjoint, U, G, y, m):  # type: ignore[no-untyped-def]
     """Take the adjoint back through m measurements: ``a + G' (y - U a)``."""
     n = adjoint.size
+    z0, z1, z2 = y[0], y[1] if m > 1 else 0.0, y[2] if m > 2 else 0.0
+    for c in range(n):
+        x = adjoint[c]
+        z0 -= U[0, c] * x
+        if m > 1:
+            z1 -= U[1, c] * x
+        if m > 2:
+            z2 -= U[2, c] * x
     for a in range(m):
+        z = z0 if a == 0 else (z1 if a == 1 else z2)
         for c in range(n):
-            y[a] -= U[a, c] * adjoint[c]
-    for a in range(m):
-        for c in range(n):
-            adjoint[c] += G[a, c] * y[a]
+            adjoint[c] += G[a, c] * z
 
 
 @kernel(
     "f8(f8[:, ::1], f8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], i8, i8[::1], f8[:, :, ::1], "
-    "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])",
+    "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], "
+    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], f8[:, ::1])"
 )
 def solve_chain(  # type: ignore[no-untyped-def]
     prior, prior_shift, transition, noise, error, motion_weight,
-    node, base, components, jacobian, residual, aid_noise, aid_weight, damping,
-    predicted, predicted_shift, filtered, filtered_shift, step,
+    node, base, components, jacobian, residual, aid_noise, aid_weight, damping, first,
+    predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used, step,
 ):  # fmt: skip
     """One step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
@@ -169,10 +188,17 @@ def solve_chain(  # type: ignore[no-untyped-def]
     aid_weight : (M,) array
     damping : float
         lambda, 0 for a Gauss-Newton step.
+    first : int
+        Nodes before it have been eliminated, without damping; the arrays that follow hold what that left.
     predicted, filtered : (K, n, n) arrays
         Overwritten with the covariances of a node without and with its own measurements, all older ones included.
     predicted_shift, filtered_shift : (K, n) arrays
         Overwritten with their means less the node.
+    cross, white : (M, 3, n) arrays
+    innovation : (M, 3) array
+        Overwritten with ``L^-1 H P``, ``L^-1 H`` and ``L^-1 (r - H d)`` at its turn, ``L L'`` being S.
+    used : (M,) int array
+        Overwritten with 1 where a measurement counts, else 0.
     step : (K, n) array
         Overwritten with dx.
 
@@ -184,9 +210,6 @@ def solve_chain(  # type: ignore[no-untyped-def]
     count, n = step.shape
     total = node.size
     work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((3, 3))
-    crosses, whites = np.empty((total, 3, n)), np.empty((total, 3, n))
-    innovations = np.empty((total, 3))
-    used = np.zeros(total, dtype=np.bool_)
     damps = count if damping > 0.0 else 0
     damp_crosses, damp_whites = np.empty((damps, n, 1, n)), np.empty((damps, n, 1, n))
     damp_innovations = np.empty((damps, n, 1))
@@ -194,7 +217,9 @@ def solve_chain(  # type: ignore[no-untyped-def]
     unit, zero, variance = np.zeros((1, n)), np.zeros(1), np.empty((n, 1, 1))
 
     i = 0
-    for k in range(count):
+    while i < total and node[i] - base < first:
+        i += 1
+    for k in range(first, count):
         P, d = predicted[k], predicted_shift[k]
         if k == 0:
             P[:] = prior
@@ -220,10 +245,11 @@ def solve_chain(  # type: ignore[no-untyped-def]
                 )  # fmt: skip
                 unit[0, r] = 0.0
         while i < total and node[i] - base == k:
+            used[i] = 0
             if components[i] > 0 and aid_weight[i] > LEAST_WEIGHT:
                 used[i] = _absorb(
                     P, d, jacobian[i], residual[i], aid_noise[i], aid_weight[i], components[i], L,
-                    crosses[i], whites[i], innovations[i],
+                    cross[i], white[i], innovation[i],
                 )  # fmt: skip
             i += 1
 
@@ -250,8 +276,8 @@ def solve_chain(  # type: ignore[no-untyped-def]
                 if size > largest or size != size:
                     largest = size
         while i >= 0 and node[i] - base == k:
-            if used[i]:
-                _return(adjoint, crosses[i], whites[i], innovations[i], components[i])
+            if used[i] == 1:
+                _return(adjoint, cross[i], white[i], innovation[i], components[i])
             i -= 1
         if damps:
             for r in range(n - 1, -1, -1):
@@ -260,12 +286,50 @@ def solve_chain(  # type: ignore[no-untyped-def]
     return largest
 
 
-@kernel("f8(f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
-def chain_cost(error, whitener, whitened, norm):  # type: ignore[no-untyped-def]
-    """Whiten N errors of n components; return the sum of their squares.
+@kernel(
+    "void(f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], i8, f8[:, :, ::1], "
+    "f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
+)
+def step_residuals(  # type: ignore[no-untyped-def]
+    step, transition, error, whitener, whitened, norm,
+    node, base, jacobian, residual, aid_whitener, aid_whitened, aid_norm,
+):  # fmt: skip
+    """Residuals after a step, as the factors were linearised: what solving for the step supposes them to be.
 
     Parameters
     ----------
+    step : (K, n) array
+    transition, error, node, base, jacobian, residual
+        As for `solve_chain`; errors and residuals are updated.
+    whitener, whitened, norm, aid_whitener, aid_whitened, aid_norm
+        As for `whiten`, of motion and of aids.
+    """
+    n = step.shape[1]
+    for k in range(error.shape[0]):
+        for r in range(n):
+            x = error[k, r] + step[k + 1, r]
+            for c in range(n):
+                x -= transition[k, r, c] * step[k, c]
+            error[k, r] = x
+        norm[k] = _whiten(error[k], whitener[k], whitened[k])
+    for i in range(node.size):
+        k = node[i] - base
+        for a in range(3):
+            x = residual[i, a]
+            for c in range(n):
+                x -= jacobian[i, a, c] * step[k, c]
+            residual[i, a] = x
+        aid_norm[i] = _whiten(residual[i], aid_whitener[i], aid_whitened[i])
+
+
+@kernel("void(i8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
+def whiten(first, error, whitener, whitened, norm):  # type: ignore[no-untyped-def]
+    """Whiten N errors of n components.
+
+    Parameters
+    ----------
+    first : int
+        Row to begin with.
     error : (N, n) array
     whitener : (N, n, n) array
         Lower triangular.
@@ -274,15 +338,5 @@ def chain_cost(error, whitener, whitened, norm):  # type: ignore[no-untyped-def]
     norm : (N,) array
         Overwritten with the norms of the whitened errors.
     """
-    total = 0.0
-    for k in range(error.shape[0]):
-        square = 0.0
-        for i in range(error.shape[1]):
-            x = 0.0
-            for j in range(i + 1):
-                x += whitener[k, i, j] * error[k, j]
-            whitened[k, i] = x
-            square += x * x
-        norm[k] = sqrt(square)
-        total += square
-    return total
+    for k in range(first, error.shape[0]):
+        norm[k] = _whiten(error[k], whitener[k], whitened[k])

@@ -26,6 +26,8 @@ class FullGraph(WindowEstimator):
         Of the trajectory that `smooth` returned.
     """
 
+    incremental = False
+
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(start, instruments)
@@ -67,8 +69,8 @@ class FullGraph(WindowEstimator):
         """Of all nodes, from all measurements (`estimators.solvers.smoother`)."""
         motions = self.chain.motions
         count = len(self.chain.nodes)
-        predicted, filtered = self._work[0][:count], self._work[2][:count]
-        smoothed = filtered.copy()
+        predicted, filtered = self.chain.nodes["predicted"], self.chain.nodes["filtered"]
+        smoothed: Array = filtered.copy()
         gains = smoother_gains(filtered[:-1], motions["jacobian"], predicted[1:])
         for k in range(count - 2, -1, -1):
             s = filtered[k] + gains[k] @ (smoothed[k + 1] - predicted[k + 1]) @ gains[k].T

@@ -8,6 +8,11 @@ node that is the first now, as linearised last, is its prior (a Schur complement
 "Sliding window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So nothing is lost but
 the freedom to linearise or weigh it anew, and a window of one epoch is an iterated EKF.
 
+An epoch's first step takes the older nodes as they were eliminated in the last one, as incremental smoothing does
+(M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", Int. J. Robotics Research 31(2),
+2012): only new factors are linearised and eliminated, and all nodes moved. Where weights of older factors change, a
+step is large, or one more is needed, everything is linearised and eliminated anew.
+
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
 innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
 
@@ -31,7 +36,7 @@ from estimators.adaptations.base import Adaptation, Innovation
 from estimators.adaptations.weighting import Factors, Weighting
 from estimators.models.chain import Chain
 from estimators.solvers.admission import Admission
-from estimators.solvers.block_tridiagonal import chain_cost, solve_chain
+from estimators.solvers.block_tridiagonal import solve_chain, step_residuals, whiten
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
@@ -72,6 +77,8 @@ class WindowEstimator(Estimator):
     #: A node for every IMU sample, instead of one preintegrated factor between measurements (paper 004's un-simplified
     #: graph).
     every_sample: ClassVar[bool] = False
+    #: Whether an epoch's first step takes the older nodes as they were eliminated in the last one.
+    incremental: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -103,8 +110,11 @@ class WindowEstimator(Estimator):
             if what is not None:
                 what.reset(instruments)
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
-        self._capacity = self._counted = 0
+        self._counted = self._eliminated = 0
         self._contraction = 1.0
+        n = self.chain.size
+        self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,))
+        self.chain.aids.add(cross=(3, n), white=(3, n), innovation=(3,), used=np.int64)
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
         self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
@@ -209,17 +219,20 @@ class WindowEstimator(Estimator):
         attached : int
             New factors that are left.
         """
-        chain = self.chain
-        self._make_room(len(chain.nodes))
-        filtered, step = self._work[2][: len(chain.nodes)], self._work[4][: len(chain.nodes)]
+        chain, nodes = self.chain, self.chain.nodes
         moved = np.zeros(chain.size)
         damping, settled, solved, before = 0.0, True, 0, inf
         saved: list[Array] | None = None
-        self._linearise()
-        while solved < self.iterations:
+        first = self._first_new(attached)
+        self._linearise(first)
+        while True:
             if saved is None and self.weighting is not None:
-                settled = self.weighting.weigh(self._factors(solved))
-            size = self._solve(damping)
+                settled, first = self._weigh(solved, first)
+            size = self._solve(damping, first)
+            if first and not size <= CHECKED_STEP:  # too far from where the older ones were linearised
+                first = 0
+                self._linearise()
+                size = self._solve(damping)
             solved += 1
             if not isfinite(size):
                 chain.detach(attached)
@@ -233,28 +246,52 @@ class WindowEstimator(Estimator):
             converged = settled and (
                 size < self.tolerance or (size <= CHECKED_STEP and contraction * size < self.tolerance)
             )
-            before = size
-            if converged or solved == self.iterations or size > CHECKED_STEP:
-                cost = self._cost()
+            before, first = size, 0
             saved = chain.copy_states() if size > CHECKED_STEP else None
-            chain.retract(step)
-            moved += step[-1]
-            if converged:
+            cost = self._cost() if saved is not None else 0.0
+            chain.retract(nodes["step"])
+            moved += nodes["step"][-1]
+            if converged or (solved == self.iterations and saved is None):
                 break
             self._linearise()
             if saved is not None and self._cost() > cost * (1.0 + 1e-9):
                 chain.restore_states(saved)
-                moved -= step[-1]
+                moved -= nodes["step"][-1]
                 damping = max(FIRST_DAMPING, DAMPING_FACTOR * damping)
                 self._linearise()
             else:
                 saved = None
                 damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
+            if solved == self.iterations:
+                damping = max(damping, FIRST_DAMPING)
+                break
+        self._keep(damping)
+        return solved, self._cost(), moved, attached
+
+    def _first_new(self, attached: int) -> int:
+        """The first node that new factors touch; those before it are eliminated, and 0 where they are not."""
+        if not (self.incremental and attached):
+            return 0
+        return min(self._eliminated, int(self.chain.aids["node"][-attached]) - self.chain.base)
+
+    def _keep(self, damping: float) -> None:
+        """Leave the elimination, and the residuals, as the next epoch needs them: about the nodes as they are now."""
+        chain, nodes, motions, aids = self.chain, self.chain.nodes, self.chain.motions, self.chain.aids
+        step = nodes["step"]
         if damping > 0.0:  # the covariances and the prior are those without it
+            self._linearise()
             self._solve(0.0)
             step[:] = 0.0
-        self.covariance = filtered[-1].copy()
-        return solved, cost, moved, attached
+        else:
+            step_residuals(
+                step, motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"],
+                motions["norm"], aids["node"], chain.base, aids["jacobian"], aids["residual"], aids["whitener"],
+                aids["whitened"], aids["norm"],
+            )  # fmt: skip
+            for shift in (nodes["predicted_shift"], nodes["filtered_shift"]):
+                np.subtract(shift, step, out=shift)
+        self.covariance = nodes["filtered"][-1].copy()
+        self._eliminated = len(nodes)
 
     def _contraction_at(self, solved: int, size: float, before: float, damping: float) -> float:
         """By how much the next step is smaller than this one, if as in the last two or in the epoch before, or so."""
@@ -266,13 +303,28 @@ class WindowEstimator(Estimator):
             self._contraction = contraction
         return contraction
 
-    def _linearise(self) -> None:
-        """Linearise and whiten all factors."""
-        self.chain.linearise_motion()
-        self.chain.linearise_aids()
+    def _linearise(self, node: int = 0) -> None:
+        """Linearise and whiten the factors that have to do with a node or later ones."""
         motions, aids = self.chain.motions, self.chain.aids
-        chain_cost(motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
-        chain_cost(aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
+        motion, aid = self.chain.factors_from(node)
+        self.chain.linearise_motion(motion)
+        self.chain.linearise_aids(aid)
+        whiten(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
+        whiten(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
+
+    def _weigh(self, iteration: int, first: int) -> tuple[bool, int]:
+        """Ask the weighting; whether it has settled, and ``first``: 0 if older factors have other weights now."""
+        assert self.weighting is not None
+        if not first:
+            return self.weighting.weigh(self._factors(iteration)), 0
+        motion, aid = self.chain.factors_from(first)
+        weights = self.chain.motions["weight"][:motion], self.chain.aids["weight"][:aid]
+        before = weights[0].tobytes(), weights[1].tobytes()
+        settled = self.weighting.weigh(self._factors(iteration))
+        if before != (weights[0].tobytes(), weights[1].tobytes()):
+            first = 0
+            self._linearise()
+        return settled, first
 
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
@@ -284,16 +336,17 @@ class WindowEstimator(Estimator):
         prior = chain.prior_whitener @ chain.prior_shift
         return 0.5 * (total + float(prior @ prior))
 
-    def _solve(self, damping: float) -> float:
+    def _solve(self, damping: float, first: int = 0) -> float:
         """One step of all nodes; its largest component in sigmas."""
-        chain = self.chain
+        chain, nodes = self.chain, self.chain.nodes
         motions, aids = chain.motions, chain.aids
-        count = len(chain.nodes)
         size: float = solve_chain(
             chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
             motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
             aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
-            aids["weight"], damping, *(a[:count] for a in self._work),
+            aids["weight"], damping, first,
+            nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
+            aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"],
         )  # fmt: skip
         return size
 
@@ -315,14 +368,8 @@ class WindowEstimator(Estimator):
         while self.window is not None and len(self._epochs) > self.window:
             leaving += self._epochs.popleft()
         if leaving:
-            predicted, predicted_shift, _, _, step = self._work
-            mean = predicted_shift[leaving]
-            chain.set_prior(chain.turned(predicted[leaving], mean), chain.less(mean, step[leaving]))
+            step = chain.nodes["step"][leaving].copy()
+            mean = chain.nodes["predicted_shift"][leaving] + step
+            chain.set_prior(chain.turned(chain.nodes["predicted"][leaving], mean), chain.less(mean, step))
             chain.drop(leaving)
-
-    def _make_room(self, count: int) -> None:
-        """Work space for ``count`` nodes."""
-        if count > self._capacity:
-            self._capacity = n = max(32, 2 * count)
-            m = self.chain.size
-            self._work = tuple(np.empty(shape) for shape in ((n, m, m), (n, m), (n, m, m), (n, m), (n, m)))
+            self._eliminated -= leaving

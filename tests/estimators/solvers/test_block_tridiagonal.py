@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimators.models.chain import whitening
-from estimators.solvers.block_tridiagonal import chain_cost, solve_chain
+from estimators.solvers.block_tridiagonal import solve_chain, step_residuals, whiten
 
 N, COUNT = 5, 6
 
@@ -30,16 +30,30 @@ class Problem:
         self.R = np.array([covariance(rng, 3) for _ in range(total)])
         self.v = rng.uniform(0.2, 1.0, total)
 
-    def solve(self, damping: float = 0.0):
-        out = (
-            np.empty((COUNT, N, N)), np.empty((COUNT, N)), np.empty((COUNT, N, N)), np.empty((COUNT, N)),
-            np.empty((COUNT, N)),
+    def solve(self, damping: float = 0.0, first: int = 0, left: tuple = ()):
+        """Largest step; predicted and filtered covariances and shifts, step; and what is left of each measurement.
+
+        ``left`` is what solving returned for the nodes before ``first``.
+        """
+        total = len(self.node)
+        nodes = (
+            np.full((COUNT, N, N), np.nan), np.full((COUNT, N), np.nan), np.full((COUNT, N, N), np.nan),
+            np.full((COUNT, N), np.nan),
         )  # fmt: skip
+        aids = (
+            np.full((total, 3, N), np.nan), np.full((total, 3, N), np.nan), np.full((total, 3), np.nan),
+            np.zeros(total, np.int64),
+        )  # fmt: skip
+        for ours, theirs in zip((*nodes, *aids), left):
+            rows = first if len(theirs) == COUNT else int(np.searchsorted(self.node, first))
+            ours[:rows] = theirs[:rows]
+        step = np.empty((COUNT, N))
         size = solve_chain(
             self.prior, self.shift, self.F, self.Q, self.e, self.w, self.node + 7, 7, self.m, self.H, self.r, self.R,
-            self.v, damping, *out,
+            self.v, damping, first, *nodes, *aids, step,
         )  # fmt: skip
-        return size, out
+        self.left = *nodes, *aids
+        return size, (*nodes, step)
 
     def dense(self, last: int = COUNT, own: bool = True, damping: np.ndarray | None = None):
         """Normal matrix and right side of the first ``last`` nodes, the last with its own measurements or without."""
@@ -109,6 +123,38 @@ def test_damping_is_levenberg_and_marquardts():
     assert np.linalg.norm(step) < np.linalg.norm(free)
 
 
+@pytest.mark.parametrize("first", [1, 3, 4])
+def test_older_nodes_need_not_be_eliminated_again(first: int):
+    """With other factors from a node on, it is enough to go on from what the nodes before it left."""
+    p, rng = Problem(8), np.random.default_rng(9)
+    p.solve()
+    left, aid = p.left, int(np.searchsorted(p.node, first))
+    p.r[aid:] = rng.normal(size=p.r[aid:].shape)
+    p.v[aid:] *= 0.5
+    p.e[first - 1 :] = rng.normal(size=p.e[first - 1 :].shape)
+    size, whole = p.solve()
+    same, part = p.solve(first=first, left=left)
+    assert same == size
+    for ours, theirs in zip(part, whole):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_after_a_step_there_is_none_to_take():
+    """Residuals and prior moved as the step supposes: what is linear is solved."""
+    p = Problem(10)
+    _, (*_, step) = p.solve()
+    motion, aids = (np.empty((COUNT - 1, N)), np.empty(COUNT - 1)), (np.empty_like(p.r), np.empty(len(p.node)))
+    unit, one = np.tile(np.eye(N), (COUNT - 1, 1, 1)), np.tile(np.eye(3), (len(p.node), 1, 1))
+    step_residuals(step, p.F, p.e, unit, *motion, p.node + 7, 7, p.H, p.r, one, *aids)
+    p.shift -= step[0]
+    _, (*_, after) = p.solve()
+    assert np.abs(step).max() > 0.1
+    np.testing.assert_allclose(after, 0.0, atol=1e-9)
+    for error, (white, norm) in ((p.e, motion), (p.r, aids)):
+        np.testing.assert_array_equal(white, error)
+        np.testing.assert_allclose(norm, np.linalg.norm(error, axis=1))
+
+
 def test_a_factor_without_weight_counts_for_nothing():
     p = Problem(6)
     p.v[3] = 0.0
@@ -155,15 +201,15 @@ def test_a_whitener_is_the_inverse_cholesky_factor():
     )
 
 
-def test_cost_is_the_sum_of_squares_of_whitened_errors():
+def test_whitened_errors_have_the_norm_of_the_cost():
     rng = np.random.default_rng(2)
     e = rng.normal(size=(3, 4))
     P = np.array([covariance(rng, 4) for _ in range(3)])
-    W, white, norm = np.empty_like(P), np.empty_like(e), np.empty(3)
+    W, white, norm = np.empty_like(P), np.zeros_like(e), np.zeros(3)
     for p, w in zip(P, W):
         whitening(p, w)
-    total = chain_cost(e, W, white, norm)
-    squares = [x @ np.linalg.solve(p, x) for x, p in zip(e, P)]
-    np.testing.assert_allclose(norm**2, squares)
-    assert total == pytest.approx(sum(squares))
+    whiten(1, e, W, white, norm)
+    assert norm[0] == 0.0  # before the row to begin with
+    whiten(0, e, W, white, norm)
+    np.testing.assert_allclose(norm**2, [x @ np.linalg.solve(p, x) for x, p in zip(e, P)])
     np.testing.assert_allclose(np.linalg.norm(white, axis=1), norm)
