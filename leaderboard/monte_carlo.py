@@ -186,9 +186,10 @@ def _rank(results: Sequence[Result]) -> Ranking:
 
 def ranking_table(ranking: Ranking, results: Sequence[Result], mine: str | None = None) -> Table:
     """The overall ranking."""
-    from leaderboard.ranking_table import SCORE_CAPTION, SCORE_TITLE, ranking_rows
+    from leaderboard.ranking_table import SCORE_TITLE, ranking_rows, score_caption
 
-    rows = ranking_rows(ranking.to_dict(), results)
+    content = ranking.to_dict()
+    rows = ranking_rows(content, results)
     columns = ["rank", "tier", "estimator", SCORE_TITLE, "95 % interval", "consistency", "95 % coverage", "failed",
                "per epoch", "memory"]  # fmt: skip
     cells = [
@@ -197,7 +198,7 @@ def ranking_table(ranking: Ranking, results: Sequence[Result], mine: str | None 
         for r in rows
     ]  # fmt: skip
     reference = [i for i, r in enumerate(rows) if r["reference"]]
-    caption = SCORE_CAPTION + (" * reference: told the truth, not ranked." if reference else "")
+    caption = score_caption(content) + (" * reference: told the truth, not ranked." if reference else "")
     own = [i for i, r in enumerate(rows) if r["label"] == mine]
     numeric = ["rank", "tier", SCORE_TITLE, "95 % coverage", "failed", "per epoch", "memory"]
     return tables.table("Ranking", columns, cells, numeric=numeric, dim=reference, strong=own, caption=caption)

@@ -13,26 +13,33 @@ if TYPE_CHECKING:
 
 __all__ = [
     "SCORE_AXIS",
-    "SCORE_CAPTION",
     "SCORE_LEAD",
     "SCORE_TITLE",
     "add_bars",
     "between",
     "ranking_rows",
     "ratio",
+    "score_caption",
     "sortable",
 ]
 
 _WIDEST = 50.0  # largest ratio on the scale of the bars
 SCORE_TITLE = "× oracle"
 SCORE_AXIS = "Horizontal RMSE, as a multiple of the oracle's"
-SCORE_CAPTION = (
+_CAPTION = (
     "× oracle: ratio of the horizontal RMSE to the oracle's on the same run; interquartile mean over the runs, "
     "each scenario counting the same. Who does not suit all scenarios is adjusted for how hard the others are."
 )
+_NO_ORACLE = " Where no oracle ran ({}), 1 is the best estimator's median."
 SCORE_LEAD = (
     "Ranked is the horizontal error as a multiple of that of an oracle, which knows the true noise and every fault."
 )
+
+
+def score_caption(ranking: Mapping[str, Any]) -> str:
+    """What the score is, and what it is a multiple of where that is not the oracle's error."""
+    without = [s["scenario"] for s in ranking["scenarios"] if s["baseline"].endswith("no oracle ran")]
+    return _CAPTION + (_NO_ORACLE.format(", ".join(without)) if without else "")
 
 
 def ranking_rows(ranking: Mapping[str, Any], results: Sequence[Result]) -> list[dict[str, Any]]:

@@ -27,13 +27,13 @@ from leaderboard.figures import Dot, Style, dots
 from leaderboard.pages import STATIC, TEMPLATES, environment
 from leaderboard.ranking_table import (
     SCORE_AXIS,
-    SCORE_CAPTION,
     SCORE_LEAD,
     SCORE_TITLE,
     add_bars,
     between,
     ranking_rows,
     ratio,
+    score_caption,
     sortable,
 )
 from leaderboard.reproduce import page as reproduction
@@ -323,7 +323,11 @@ class _Site:
                 "Overall score of every estimator with its interval, as in the table above",
             )
         return {
-            "score": {"title": SCORE_TITLE.replace(" ", "\u00a0"), "caption": SCORE_CAPTION, "lead": SCORE_LEAD},
+            "score": {
+                "title": SCORE_TITLE.replace(" ", "\u00a0"),
+                "caption": score_caption(self.ranking),
+                "lead": SCORE_LEAD,
+            },
             "facts": [{"name": n, "value": v} for n, v in facts],
             "ranking": rows,
             "matrix": self._matrix(),
