@@ -136,21 +136,16 @@ def _whiten(error, whitener, whitened):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _return(adjoint, U, G, y, m):  # type: ignore[no-untyped-def]
-    """Take the adjoint back through m measurements: ``a + G' (y - U a)``."""
+def _return(adjoint, U, G, y, m, z):  # type: ignore[no-untyped-def]
+    """Take the adjoint back through m measurements: ``a + G' (y - U a)``; z is work space."""
     n = adjoint.size
-    z0, z1, z2 = y[0], y[1] if m > 1 else 0.0, y[2] if m > 2 else 0.0
-    for c in range(n):
-        x = adjoint[c]
-        z0 -= U[0, c] * x
-        if m > 1:
-            z1 -= U[1, c] * x
-        if m > 2:
-            z2 -= U[2, c] * x
     for a in range(m):
-        z = z0 if a == 0 else (z1 if a == 1 else z2)
+        z[a] = y[a]
         for c in range(n):
-            adjoint[c] += G[a, c] * z
+            z[a] -= U[a, c] * adjoint[c]
+    for a in range(m):
+        for c in range(n):
+            adjoint[c] += G[a, c] * z[a]
 
 
 @kernel(
@@ -253,7 +248,7 @@ def solve_chain(  # type: ignore[no-untyped-def]
                 )  # fmt: skip
             i += 1
 
-    adjoint, after = np.zeros(n), np.empty(n)
+    adjoint, after, z = np.zeros(n), np.empty(n), np.empty(3)
     largest = 0.0
     i = total - 1
     for k in range(count - 1, -1, -1):
@@ -271,18 +266,18 @@ def solve_chain(  # type: ignore[no-untyped-def]
             for r in range(n):
                 step[k, r] += filtered[k, c, r] * x
         for r in range(n):
-            if filtered[k, r, r] > 0.0:
+            if not filtered[k, r, r] <= 0.0:
                 size = abs(step[k, r]) / sqrt(filtered[k, r, r])
                 if size > largest or size != size:
                     largest = size
         while i >= 0 and node[i] - base == k:
             if used[i] == 1:
-                _return(adjoint, cross[i], white[i], innovation[i], components[i])
+                _return(adjoint, cross[i], white[i], innovation[i], components[i], z)
             i -= 1
         if damps:
             for r in range(n - 1, -1, -1):
                 if damp_used[k, r]:
-                    _return(adjoint, damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r], 1)
+                    _return(adjoint, damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r], 1, z)
     return largest
 
 
