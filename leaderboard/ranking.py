@@ -13,7 +13,8 @@ estimator there; on a run that the oracle failed, the oracle's median. `Scenario
 **Unsuitable.** An estimator that needs other instruments than a scenario has, or gives no position at all, is listed as
 such there: no failure, but no score either.
 
-**Tiers.** `leaderboard.statistics.tiers`: paired by run, against the best of a tier, Holm-corrected at 5 %.
+**Tiers.** `leaderboard.statistics.tiers`: paired by run, against the best of a tier, Holm-corrected at 5 %; overall,
+each scenario counts the same in the test as it does in the score.
 
 **Overall.** Each scenario counts the same. An estimator that covers all of them has the mean of its log ratios. One
 that covers fewer is not rewarded for leaving out the hard ones: an additive model, log ratio = estimator + scenario, is
@@ -334,7 +335,7 @@ class _Scenario:
 
     def ranking(self) -> ScenarioRanking:
         ranked = {n: m for n, m in self.means.items() if not self.cells[n].reference}
-        places = tiers(ranked, self.differences)
+        places = tiers(ranked, lambda a, b: [self.differences(a, b)])
         references = sorted((n for n in self.cells if n not in ranked), key=lambda n: (self.means[n], n))
         rows = [self._row(n, k + 1, p) for k, (n, p) in enumerate(places.items())]
         rows += [self._row(n, None, None) for n in references]
@@ -393,10 +394,7 @@ def _overall(scenarios: Sequence[_Scenario]) -> list[OverallRow]:
     spread = {n: interval(draws[n]) if several[n] else (math.nan, math.nan) for n in names}
 
     ranked = {n: score[n] for n in entries if len(covers[n]) >= MIN_COVERAGE * len(used)}
-    places = tiers(
-        ranked,
-        lambda a, b: np.concatenate([s.differences(a, b) if {a, b} <= s.cells.keys() else [] for s in scenarios]),
-    )
+    places = tiers(ranked, lambda a, b: [s.differences(a, b) for s in scenarios if {a, b} <= s.cells.keys()])
     order = list(places) + sorted((n for n in entries if n not in places), key=lambda n: (score[n], n))
     order += sorted(references, key=lambda n: (score[n], n))
     return [

@@ -4,9 +4,10 @@
   learning at the edge of the statistical precipice*, NeurIPS 2021).
 - `bootstrap_means`, `interval`: percentile bootstrap, resampled within each stratum (scenario).
 - `holm`: p-values adjusted for many tests (Holm, *A simple sequentially rejective multiple test procedure*, 1979).
+- `stratified_test`: paired, over several scenarios that count the same, by sign flips (E. J. G. Pitman 1937).
 - `tiers`: who cannot be told from the best, who not from the best of the rest, and so on.
 
-The paired test itself is `simnav.scoring.paired_test`.
+The paired test on one scenario is `simnav.scoring.paired_test`.
 """
 
 from __future__ import annotations
@@ -20,12 +21,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from simnav.scoring import paired_test
 
-__all__ = ["RESAMPLES", "Place", "bootstrap_means", "holm", "interquartile_mean", "interval", "tiers"]
+__all__ = [
+    "RESAMPLES",
+    "Place",
+    "bootstrap_means",
+    "holm",
+    "interquartile_mean",
+    "interval",
+    "stratified_test",
+    "tiers",
+]
 
 Array = NDArray[np.float64]
 
 #: Bootstrap resamples.
 RESAMPLES = 2000
+#: Sign flips of a test; of up to `_FEW` differences all are tried.
+_FLIPS, _FEW = 20_000, 12
 
 
 def _weights(n: int) -> Array:
@@ -129,6 +141,46 @@ def holm(p_values: ArrayLike) -> Array:
     return adjusted
 
 
+@lru_cache(maxsize=16)
+def _signs(n: int) -> NDArray[np.float32]:
+    """(B, n) sign flips; the first changes nothing."""
+    if n <= _FEW:
+        bits = np.arange(2**n)[:, None] >> np.arange(n) & 1
+    else:
+        bits = np.random.default_rng(n).integers(0, 2, (_FLIPS, n), dtype=np.int8)
+        bits[0] = 0
+    return np.asarray(1 - 2 * bits, dtype=np.float32)
+
+
+def stratified_test(strata: Sequence[ArrayLike]) -> float:
+    """Two-sided p-value of paired differences in strata that count the same, whatever the number in each.
+
+    The statistic is the mean over the strata of their mean differences, which is what a score that averages scenarios
+    compares. If neither side is better, the sign of each difference is anybody's: p is the share of random flips of all
+    signs (all of them, if there are few) that lead as far from zero. A signed-rank test of all runs together would ask
+    another question: who is better in most runs.
+
+    Parameters
+    ----------
+    strata : sequence of (n_s,) array_like
+        Empty ones do not count.
+
+    Examples
+    --------
+    >>> stratified_test([[1.0, 2.0, 1.5], [0.2, 0.1, 0.3]])
+    0.03125
+    """
+    arrays: list[Array] = [x for values in strata if len(x := np.asarray(values, dtype=np.float64))]
+    if not arrays:
+        return 1.0
+    shares = np.concatenate([x / len(x) for x in arrays])
+    size = np.abs(shares).max()
+    if not size > 0.0:
+        return 1.0
+    statistics = np.abs(_signs(len(shares)) @ (shares / size).astype(np.float32))
+    return float(np.mean(statistics >= statistics[0] * (1.0 - 1e-5)))
+
+
 @dataclass(frozen=True)
 class Place:
     """Where an entry stands.
@@ -146,7 +198,7 @@ class Place:
 
 
 def tiers(
-    scores: Mapping[str, float], differences: Callable[[str, str], ArrayLike], *, level: float = 0.05
+    scores: Mapping[str, float], differences: Callable[[str, str], Sequence[ArrayLike]], *, level: float = 0.05
 ) -> dict[str, Place]:
     """Sort entries into tiers that hold together what cannot be told apart.
 
@@ -160,7 +212,8 @@ def tiers(
     scores : mapping of name to float
         Lower is better; ties go by name.
     differences : callable
-        ``differences(a, b)``: the paired differences a - b over the runs that both have; empty if there are none.
+        ``differences(a, b)``: the paired differences a - b over the runs that both have, by stratum; empty if there are
+        none. One stratum is tested by signed ranks, several by `stratified_test`.
     level : float
         Family-wise error rate of the tests within one tier.
 
@@ -186,7 +239,9 @@ def tiers(
     return places
 
 
-def _worse(differences: ArrayLike) -> float:
+def _worse(strata: Sequence[ArrayLike]) -> float:
     """Two-sided p-value of paired differences; 1 where they do not point upwards."""
-    d: Array = np.asarray(differences, dtype=np.float64)
-    return paired_test(d) if len(d) and np.median(d) >= 0.0 else 1.0
+    arrays: list[Array] = [np.asarray(d, dtype=np.float64) for d in strata if len(np.asarray(d))]
+    if len(arrays) == 1:
+        return paired_test(arrays[0]) if np.median(arrays[0]) >= 0.0 else 1.0
+    return stratified_test(arrays) if arrays and np.mean([d.mean() for d in arrays]) > 0.0 else 1.0

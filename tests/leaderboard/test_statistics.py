@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from leaderboard.statistics import bootstrap_means, holm, interquartile_mean, interval, tiers
+from leaderboard.statistics import bootstrap_means, holm, interquartile_mean, interval, stratified_test, tiers
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_tiers_hold_together_what_cannot_be_told_apart() -> None:
         "as-bad": base + 0.5 + rng.normal(0.0, 0.3, 40),
         "worst": base + 3.0,
     }
-    places = tiers({n: float(np.mean(x)) for n, x in runs.items()}, lambda a, b: runs[a] - runs[b])
+    places = tiers({n: float(np.mean(x)) for n, x in runs.items()}, lambda a, b: [runs[a] - runs[b]])
     assert {n: p.tier for n, p in places.items()} == {"first": 1, "alike": 1, "worse": 2, "as-bad": 2, "worst": 3}
     assert sum(p.p_value is None for p in places.values()) == 1
     assert places["worst"].p_value is not None
@@ -114,12 +114,44 @@ def test_tiers_hold_together_what_cannot_be_told_apart() -> None:
 def test_a_noisy_entry_never_stands_above_a_better_one_that_was_told_apart() -> None:
     steady, noisy = np.full(30, 0.5) + 0.01 * np.arange(30), np.linspace(-10.0, 12.0, 30)
     runs = {"best": np.zeros(30), "steady": steady, "noisy": noisy}
-    places = tiers({"best": 0.0, "steady": 0.65, "noisy": 1.0}, lambda a, b: runs[a] - runs[b])
+    places = tiers({"best": 0.0, "steady": 0.65, "noisy": 1.0}, lambda a, b: [runs[a] - runs[b]])
     assert {n: p.tier for n, p in places.items()} == {"best": 1, "steady": 2, "noisy": 2}
 
 
+def test_a_stratified_test_asks_what_a_mean_over_scenarios_asks() -> None:
+    """A little better in most scenarios, far worse in one: the median run says one thing, the score another."""
+    rng = np.random.default_rng(7)
+    differences = [rng.normal(-0.05, 0.02, 30) for _ in range(4)] + [rng.normal(2.0, 0.3, 30)]
+    assert np.median(np.concatenate(differences)) < 0.0
+    assert stratified_test(differences) < 1e-3
+    places = tiers({"a": 0.0, "b": 0.3}, lambda a, b: differences)
+    assert places["b"].tier == 2
+
+
+def test_strata_count_the_same_whatever_their_size() -> None:
+    rng = np.random.default_rng(8)
+    many, few = rng.normal(0.1, 0.5, 400), rng.normal(-1.0, 0.5, 10)
+    assert stratified_test([many, few]) < 0.05  # as the ten have it
+    assert stratified_test([many]) < 0.05
+    assert np.mean([many.mean(), few.mean()]) < 0.0
+
+
+def test_a_stratified_test_keeps_its_level() -> None:
+    rng = np.random.default_rng(9)
+    scales = [0.1, 1.0, 3.0]
+    p = np.array([stratified_test([s * rng.standard_t(3, n) for s, n in zip(scales, (15, 8, 20))]) for _ in range(400)])
+    assert 0.02 <= np.mean(p < 0.05) <= 0.08
+    assert 0.4 <= np.mean(p < 0.5) <= 0.6
+
+
+def test_what_is_always_the_same_cannot_be_told_apart() -> None:
+    assert stratified_test([np.zeros(9), np.zeros(4)]) == 1.0
+    assert stratified_test([[], []]) == 1.0
+    assert stratified_test([[1.0], [2.0]]) == 0.5  # two runs: one flip in two leads as far
+
+
 def test_few_runs_and_no_common_runs_tell_nothing_apart() -> None:
-    places = tiers({"a": 0.0, "b": 9.0}, lambda a, b: np.full(5, 9.0))
+    places = tiers({"a": 0.0, "b": 9.0}, lambda a, b: [np.full(5, 9.0)])
     assert places["b"].tier == 1  # p = 1/16
     assert tiers({"a": 0.0, "b": 9.0}, lambda a, b: [])["b"].p_value == 1.0
     assert tiers({}, lambda a, b: []) == {}
@@ -130,7 +162,7 @@ def test_equal_entries_rarely_fall_into_different_tiers() -> None:
     split = 0
     for _ in range(150):
         runs = {str(k): rng.normal(size=20) for k in range(4)}
-        places = tiers({n: interquartile_mean(x) for n, x in runs.items()}, lambda a, b, r=runs: r[a] - r[b])
+        places = tiers({n: interquartile_mean(x) for n, x in runs.items()}, lambda a, b, r=runs: [r[a] - r[b]])
         split += max(p.tier for p in places.values()) > 1
     # The leader is chosen for its luck, so somewhat more than 5 % is expected.
     assert split / 150 < 0.2
