@@ -36,7 +36,7 @@ test: $(VENV)/installed-test
 
 bench: $(VENV)/installed-test
 	$(BIN)/simnav warmup
-	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-columns=median,iqr,rounds --benchmark-sort=name
+	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-columns=median,mean,iqr,rounds --benchmark-sort=name
 
 clean:
 	rm -rf $(VENV) $(RESULTS) $(SITE) build dist *.egg-info

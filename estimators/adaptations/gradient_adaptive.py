@@ -76,6 +76,21 @@ def medians(values, group, fewest, out):  # type: ignore[no-untyped-def]
             out[g] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
 
+@kernel("void(f8[::1], f8[::1], i8[::1], i8[::1], f8[:, ::1], f8, f8, i8, f8[::1], f8[::1])")
+def _adapt(norm, kappa, kind, group, shapes, epsilon, floor, fewest, scales, weight):  # type: ignore[no-untyped-def]
+    """Scales of the groups and weights of the members (eqs. 19-21); kappa is that of a norm's kind."""
+    scaled = np.empty(norm.size)
+    for i in range(norm.size):
+        scaled[i] = kappa[kind[i]] * norm[i]
+    medians(scaled, group, fewest, scales)
+    for g in range(scales.size):
+        scales[g] = max(scales[g], floor)
+    for i in range(norm.size):
+        a, c, least = shapes[group[i], 0], shapes[group[i], 1], shapes[group[i], 2]
+        ratio = norm[i] / (c * (scales[group[i]] + epsilon))
+        weight[i] = min(max(a / (1.0 + ratio * ratio), least), 1.0)
+
+
 class GradientAdaptive(Weighting):
     """The weighting of the module.
 
@@ -118,9 +133,14 @@ class GradientAdaptive(Weighting):
         self._names: tuple[str, ...] = ()
         self._scales = np.ones(1)
         if self.preset == "paper":
-            self._kappa, self._kappa_motion, self._floor, self._least = np.full(4, 1.4826), 1.4826, 0.0, 1
+            self._kappa, self._kappa_motion, self._floor, self._least = np.full(4, 1.4826), np.array([1.4826]), 0.0, 1
         else:
-            self._kappa, self._kappa_motion, self._floor, self._least = 1.0 / _CHI_MEDIAN, 3.0**-0.5, 1.0, self.fewest
+            self._kappa, self._kappa_motion, self._floor, self._least = (
+                1.0 / _CHI_MEDIAN,
+                np.array([3.0**-0.5]),
+                1.0,
+                self.fewest,
+            )
 
     def weigh(self, factors: Factors) -> bool:
         """Set the weights of the measurements and of motion."""
@@ -134,15 +154,13 @@ class GradientAdaptive(Weighting):
             norm, motion = _rows(factors.residual), _rows(factors.motion_residual[:, :9])
         else:
             norm, motion = factors.norm, factors.motion_norm * (3.0 / factors.motion_residual.shape[1]) ** 0.5
-        instrument, scales = factors.instrument, self._scales
-        medians(norm * self._kappa[factors.components], instrument, self._least, scales[:-1])
-        medians(motion * self._kappa_motion, np.zeros(len(motion), np.int64), self._least, scales[-1:])
-        np.maximum(scales, self._floor, out=scales)
-        a, c, least = self._shapes.T
-        reach = c * (scales + self.epsilon)
-        for r, which, weight in ((norm, instrument, factors.weight), (motion, -1, factors.motion_weight)):
-            ratio = r / reach[which]
-            weight[:] = np.minimum(np.maximum(a[which] / (1.0 + ratio * ratio), least[which]), 1.0)
+        constants, scales, zero = self._shapes, self._scales, np.zeros(len(motion), np.int64)
+        settings = self.epsilon, self._floor, self._least
+        _adapt(
+            norm, self._kappa, factors.components, factors.instrument, constants[:-1], *settings, scales[:-1],
+            factors.weight,
+        )  # fmt: skip
+        _adapt(motion, self._kappa_motion, zero, zero, constants[-1:], *settings, scales[-1:], factors.motion_weight)
         return True
 
     def diagnostics(self) -> dict[str, float | Array]:
