@@ -110,10 +110,10 @@ def test_ours_costs_a_fifth_of_gtsams(benchmark, recording: Recording):
 
 
 def test_weightings_cost_at_most_half_more(benchmark):
-    """On the voyage of paper 000; means of the epochs, each the least of three runs that take turns."""
+    """On the voyage of paper 000; means of the epochs, each the least of five runs that take turns."""
     recording = record(load("coastal-voyage").model_copy(update={"duration": 120.0}), 1)
     seconds = {name: np.full(90, np.inf) for name in ("sw-fgo", *WEIGHTED)}
-    for _ in range(3):
+    for _ in range(5):
         for name, least in seconds.items():
             np.minimum(least, epoch_seconds(filled(name, {}, recording), recording, epochs=90), out=least)
     costs = {name: 1e3 * float(least.mean()) for name, least in seconds.items()}
