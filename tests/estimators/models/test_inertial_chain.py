@@ -8,7 +8,7 @@ import pytest
 from estimators.models.inertial import InertialModel
 from estimators.models.inertial_chain import InertialChain
 from simnav.recording import Recording
-from simnav.rotation import rotation_vector_from_dcm
+from simnav.rotation import left_jacobian, rotation_vector_from_dcm
 from simnav.scenario import load
 from simnav.source import record
 from simnav.types import Array
@@ -151,3 +151,15 @@ def test_a_step_back_and_forth_leaves_nothing(recording: Recording):
     chain.retract(-step)
     chain.linearise_motion()
     np.testing.assert_allclose(chain.motions["residual"], 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 0.03, 0.04, 0.5, 2.0])
+def test_a_covariance_about_another_attitude_is_turned_by_the_left_jacobian(size: float):
+    """On both sides of where the series ends (0.032 rad)."""
+    rng = np.random.default_rng(5)
+    root, axis = rng.normal(size=(15, 15)), np.array([0.48, -0.6, 0.64])
+    P, shift = root @ root.T, rng.normal(size=15)
+    shift[6:9] = size * axis
+    J = np.eye(15)
+    J[6:9, 6:9] = left_jacobian(shift[6:9])
+    np.testing.assert_allclose(InertialChain(InertialModel()).turned(P, shift), J @ P @ J.T, rtol=1e-9, atol=1e-9)
