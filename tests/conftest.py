@@ -1,9 +1,15 @@
-"""Shared by all tests: where the real logs are, if they are there."""
+"""Shared by all tests: where the real logs are, if they are there, and a registry that is left as it was."""
 
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
+
+import pytest
+
+from simnav import estimator as registry
+from simnav.estimator import names
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
@@ -13,3 +19,15 @@ if "SIMNAV_DATA" not in os.environ and _BESIDE.is_dir():
 
 # Tables are compared as they are where there is no terminal; a worker of pytest-xdist is told of a narrow one.
 os.environ.pop("COLUMNS", None)
+
+
+@pytest.fixture
+def clean_registry():
+    """Names that a test registers, and what it does to the import path, are gone for the others of the process."""
+    names()
+    before, path = (dict(registry._classes), dict(registry._aliases)), list(sys.path)
+    yield
+    sys.path[:] = path
+    for now, then in zip((registry._classes, registry._aliases), before, strict=True):
+        now.clear()
+        now.update(then)

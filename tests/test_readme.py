@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from simnav import estimator as registry
 from simnav.check import check
-from simnav.estimator import make, names
+from simnav.estimator import make
 from simnav.scenario import load
 
 ROOT = Path(__file__).parents[1]
@@ -18,15 +17,7 @@ BLOCKS = {kind: re.findall(rf"```{kind}\n(.*?)```", README, re.DOTALL) for kind 
 ESTIMATORS = [b for b in BLOCKS["python"] if "@register" in b]
 
 
-@pytest.fixture(autouse=True)
-def _clean_registry():
-    """Names that the examples register are free again for other tests of the same process."""
-    names()
-    before = dict(registry._classes), dict(registry._aliases)
-    yield
-    for now, then in zip((registry._classes, registry._aliases), before, strict=True):
-        now.clear()
-        now.update(then)
+pytestmark = pytest.mark.usefixtures("clean_registry")
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav import estimator as registry
 from simnav.check import check
 from simnav.estimator import describe, make, names
 
@@ -17,17 +16,7 @@ TEXT = PAGE.read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
 
 
-@pytest.fixture
-def _clean_registry():
-    names()
-    before = dict(registry._classes), dict(registry._aliases)
-    yield
-    for now, then in zip((registry._classes, registry._aliases), before, strict=True):
-        now.clear()
-        now.update(then)
-
-
-@pytest.mark.usefixtures("_clean_registry")
+@pytest.mark.usefixtures("clean_registry")
 @pytest.mark.parametrize("k", range(len(EXAMPLES)))
 def test_examples_keep_the_contract(tmp_path: Path, k: int):
     path = tmp_path / f"example_{k}.py"
@@ -43,7 +32,7 @@ def test_the_first_example_is_short():
     assert len(body) <= 22
 
 
-@pytest.mark.usefixtures("_clean_registry")
+@pytest.mark.usefixtures("clean_registry")
 def test_the_first_example_is_useful(tmp_path: Path, recording_of, run_over):
     """Half the error of the fixes, and gross errors do not matter."""
     path = tmp_path / "alpha_beta.py"

@@ -26,17 +26,7 @@ BODY = """
 HEAD = "from simnav import Estimate, Estimator, register\n"
 
 
-@pytest.fixture(autouse=True)
-def _clean_registry():
-    names()
-    before = dict(registry._classes), dict(registry._aliases)
-    path = list(sys.path)
-    yield
-    registry._classes.clear()
-    registry._aliases.clear()
-    registry._classes.update(before[0])
-    registry._aliases.update(before[1])
-    sys.path[:] = path
+pytestmark = pytest.mark.usefixtures("clean_registry")
 
 
 def write(path: Path, text: str) -> str:
