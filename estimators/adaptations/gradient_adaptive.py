@@ -132,15 +132,10 @@ class GradientAdaptive(Weighting):
         self._kinds = {name: sheet.kind for name, sheet in instruments.items()}
         self._names: tuple[str, ...] = ()
         self._scales = np.ones(1)
-        if self.preset == "paper":
-            self._kappa, self._kappa_motion, self._floor, self._least = np.full(4, 1.4826), np.array([1.4826]), 0.0, 1
-        else:
-            self._kappa, self._kappa_motion, self._floor, self._least = (
-                1.0 / _CHI_MEDIAN,
-                np.array([3.0**-0.5]),
-                1.0,
-                self.fewest,
-            )
+        paper = self.preset == "paper"
+        self._kappa = np.full(4, 1.4826) if paper else 1.0 / _CHI_MEDIAN
+        self._kappa_motion = np.array([1.4826 if paper else 3.0**-0.5])
+        self._floor, self._least = (0.0, 1) if paper else (1.0, self.fewest)
 
     def weigh(self, factors: Factors) -> bool:
         """Set the weights of the measurements and of motion."""

@@ -263,7 +263,7 @@ class WindowEstimator(Estimator):
                 saved = None
                 damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
             if solved == self.iterations:
-                damping = max(damping, FIRST_DAMPING)
+                damping = max(damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
                 break
         self._keep(damping)
         return solved, self._cost(), moved, attached
