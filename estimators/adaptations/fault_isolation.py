@@ -15,12 +15,23 @@ from numpy.typing import NDArray
 
 from estimators.adaptations.prediction import FIXES, LOGS, chi_square_limits
 from estimators.adaptations.weighting import Factors
+from simnav.compiled import kernel
 from simnav.types import Instruments
 
 __all__ = ["MotionTest"]
 
 #: Weight of motion while the measurements are asked.
 LOOSE = 1e-6
+
+
+@kernel("Tuple((i8, i8))(f8[::1], f8, f8[::1], i8[::1], f8[::1])")
+def _failing(time, tested, norm, components, limits):  # type: ignore[no-untyped-def]
+    """The first measurement after a time, and how many from there on fail the test."""
+    first, failing = time.size, 0
+    while first > 0 and time[first - 1] > tested:
+        first -= 1
+        failing += norm[first] * norm[first] > limits[components[first]]
+    return first, failing
 
 
 class MotionTest:
@@ -92,13 +103,14 @@ class MotionTest:
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
         """Test the new measurements, as the window fits them with full weight; the time in which motion is suspect."""
-        new = slice(int(np.searchsorted(factors.time, self._tested, side="right")), None)
-        if not len(factors.time[new]):
+        first, failing_now = _failing(factors.time, self._tested, factors.norm, factors.components, self._limits)
+        new = slice(first, None)
+        if first == len(factors.time):
             return None
         self._tested = now = float(factors.time[-1])
-        failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
-        if not (self._failures or self._blamed or failed.any()):
+        if not (self._failures or self._blamed or failing_now):
             return None
+        failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
         for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
             name = factors.names[i]
             if not fails:

@@ -100,11 +100,11 @@ class GraduatedNonConvexity(RobustWeighting):
     def _soften(self, factors: Factors, square: Array) -> None:
         """Choose the epoch's first mu."""
         self._mu = self._hard
-        new = factors.time > self._seen
-        if not new.any():
+        new = square[np.searchsorted(factors.time, self._seen, side="right") :]
+        if not len(new):
             return
-        self._newest = float(factors.time.max())
-        if square[new].max() > 1.0:
+        self._newest = float(factors.time[-1])
+        if new.max() > 1.0:
             largest = float(square.max())
             self._mu = 1.0 / (2.0 * largest - 1.0) if self.cost == "tls" else max(2.0 * largest, 1.0)
 

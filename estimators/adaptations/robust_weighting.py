@@ -15,6 +15,7 @@ import numpy as np
 
 from estimators.adaptations.fault_isolation import MotionTest
 from estimators.adaptations.weighting import Factors, Weighting
+from simnav.compiled import kernel
 from simnav.types import Instruments
 
 __all__ = ["RobustWeighting", "weigh_motion"]
@@ -26,15 +27,20 @@ def _quantile(n: int) -> float:
     return float(n**0.5 * (1.0 - 2.0 / (9.0 * n) + 3.0902 * (2.0 / (9.0 * n)) ** 0.5) ** 1.5)
 
 
+@kernel("void(f8, f8[::1], f8[::1])")
+def _weigh_motion(quantile, norm, weight):  # type: ignore[no-untyped-def]
+    for k in range(norm.size):
+        u = quantile / max(norm[k], quantile)
+        weight[k] = u * u
+
+
 def weigh_motion(factors: Factors) -> None:
     """Weigh motion by ``min(1, (c/r)^2)`` of its whitened norm r, c being the 99.9 % quantile of chi of n components.
 
     The noise believed of a motion grows to what its residual shows. On sound data the weights are 1: the residuals of
     motion in a window are smaller than its noise.
     """
-    quantile = _quantile(factors.motion_residual.shape[1])
-    u = quantile / np.maximum(factors.motion_norm, quantile)
-    np.multiply(u, u, out=factors.motion_weight)
+    _weigh_motion(_quantile(factors.motion_residual.shape[1]), factors.motion_norm, factors.motion_weight)
 
 
 class RobustWeighting(Weighting):

@@ -25,8 +25,6 @@ from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, I
 
 __all__ = ["Chain", "Columns", "whitening"]
 
-_UNIT = np.eye(3)
-
 
 @kernel("void(f8[:, ::1], f8[:, ::1])")
 def whitening(covariance, whitener):  # type: ignore[no-untyped-def]
@@ -61,6 +59,16 @@ def whitening(covariance, whitener):  # type: ignore[no-untyped-def]
                 x += L[i, k] * whitener[k, j]
             whitener[i, j] = -x / L[i, i]
         whitener[i, i] = 1.0 / L[i, i]
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
+def _attach(noise, value, full, whitener, values):  # type: ignore[no-untyped-def]
+    """The (m, m) noise and the value of a measurement, widened to three components; and the whitener."""
+    for i in range(3):
+        values[i] = value[i] if i < value.size else 0.0
+        for j in range(3):
+            full[i, j] = noise[i, j] if max(i, j) < noise.shape[0] else 1.0 if i == j else 0.0
+    whitening(full, whitener)
 
 
 class Columns:
@@ -264,15 +272,15 @@ class Chain(ABC):
 
     def attach(self, measurement: Measurement, noise: Array) -> None:
         """Make a measurement with the (m, m) noise a factor on the newest node."""
-        m, aids = len(noise), self.aids
+        aids = self.aids
         aids.append(
-            node=self.base + len(self.nodes) - 1, instrument=self._index[measurement.instrument], components=m,
-            time=measurement.time, value=0.0, noise=_UNIT, weight=1.0,
+            node=self.base + len(self.nodes) - 1, instrument=self._index[measurement.instrument], components=len(noise),
+            time=measurement.time, weight=1.0,
         )  # fmt: skip
-        full = aids.newest("noise")
-        full[:m, :m] = noise
-        whitening(full, aids.newest("whitener"))
-        aids.newest("value")[: len(measurement.value)] = measurement.value
+        _attach(
+            np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
+            aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
+        )  # fmt: skip
 
     def settle(self, moved: Array) -> None:
         """Set the front to the newest node, or, where it has run ahead of it, by how much that was ``moved``."""

@@ -198,7 +198,7 @@ class InertialModel(ErrorModel):
             self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
         else:
             self._samples = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-            if not all(a.flags.c_contiguous and a.flags.writeable and a.dtype == np.float64 for a in self._samples):
+            if not all(a.flags.carray and a.dtype == np.float64 for a in self._samples):
                 time, interval, rate, force = (np.array(a, dtype=np.float64) for a in self._samples)
                 self._samples = (time, interval, rate, force)
 

@@ -32,7 +32,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 
-__all__ = ["solve_chain", "step_residuals", "whiten"]
+__all__ = ["after_step", "half_squares", "keep_weights", "solve_chain", "whiten"]
 
 #: A factor of less weight than this counts for nothing.
 LEAST_WEIGHT = 1e-9
@@ -114,12 +114,18 @@ def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-de
         for c in range(n):
             U[a, c] *= x
             G[a, c] *= x
-    for a in range(m):
-        for i in range(n):
+    for i in range(n):
+        for a in range(m):
             d[i] += U[a, i] * y[a]
-            x = U[a, i]
+        if m == 3:  # in one pass
+            u, v, w = U[0, i], U[1, i], U[2, i]
             for j in range(n):
-                P[i, j] -= x * U[a, j]
+                P[i, j] -= u * U[0, j] + v * U[1, j] + w * U[2, j]
+        else:
+            for a in range(m):
+                u = U[a, i]
+                for j in range(n):
+                    P[i, j] -= u * U[a, j]
     return True
 
 
@@ -282,24 +288,29 @@ def solve_chain(  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    "void(f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], i8, f8[:, :, ::1], "
-    "f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
+    "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], "
+    "i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
 )
-def step_residuals(  # type: ignore[no-untyped-def]
-    step, transition, error, whitener, whitened, norm,
+def after_step(  # type: ignore[no-untyped-def]
+    step, predicted_shift, filtered_shift, transition, error, whitener, whitened, norm,
     node, base, jacobian, residual, aid_whitener, aid_whitened, aid_norm,
 ):  # fmt: skip
-    """Residuals after a step, as the factors were linearised: what solving for the step supposes them to be.
+    """Shifts and residuals after a step, as the factors were linearised: what solving for it supposes them to be.
 
     Parameters
     ----------
-    step : (K, n) array
+    step, predicted_shift, filtered_shift : (K, n) arrays
+        The step is taken off the shifts.
     transition, error, node, base, jacobian, residual
         As for `solve_chain`; errors and residuals are updated.
     whitener, whitened, norm, aid_whitener, aid_whitened, aid_norm
         As for `whiten`, of motion and of aids.
     """
     n = step.shape[1]
+    for k in range(step.shape[0]):
+        for r in range(n):
+            predicted_shift[k, r] -= step[k, r]
+            filtered_shift[k, r] -= step[k, r]
     for k in range(error.shape[0]):
         for r in range(n):
             x = error[k, r] + step[k + 1, r]
@@ -335,3 +346,65 @@ def whiten(first, error, whitener, whitened, norm):  # type: ignore[no-untyped-d
     """
     for k in range(first, error.shape[0]):
         norm[k] = _whiten(error[k], whitener[k], whitened[k])
+
+
+@kernel("i8(f8[::1], f8[::1], f8[::1], i8[::1], i8, f8[::1], f8[::1], f8[::1], f8)")
+def keep_weights(before, norm, weight, node, base, aid_before, aid_norm, aid_weight, tolerance):  # type: ignore[no-untyped-def]
+    """Set weights back that have hardly changed.
+
+    Parameters
+    ----------
+    before, aid_before : (K - 1,), (M,) arrays
+        The weights with which the factors, of motion and aiding, were eliminated.
+    norm, aid_norm : arrays
+        Of the whitened residuals.
+    weight, aid_weight : arrays
+        The weights that are wanted; overwritten with those before where the weight and the factor's pull, which is the
+        weight times the norm, differ by no more than the tolerance.
+    node, base
+        As for `solve_chain`.
+    tolerance : float
+
+    Returns
+    -------
+    int
+        The first node at whose elimination a weight differs; K if there is none.
+    """
+    first = norm.size + 1
+    for k in range(norm.size - 1, -1, -1):
+        if abs(weight[k] - before[k]) * max(norm[k], 1.0) > tolerance:
+            first = k + 1
+        else:
+            weight[k] = before[k]
+    for i in range(node.size - 1, -1, -1):
+        if abs(aid_weight[i] - aid_before[i]) * max(aid_norm[i], 1.0) > tolerance:
+            first = min(first, node[i] - base)
+        else:
+            aid_weight[i] = aid_before[i]
+    return first
+
+
+@kernel("f8(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def half_squares(whitener, shift, weight, norm, aid_weight, aid_norm):  # type: ignore[no-untyped-def]
+    """The cost: half the sum of squares of all factors.
+
+    Parameters
+    ----------
+    whitener : (n, n) array
+        Of the prior; lower triangular.
+    shift : (n,) array
+        Mean of the prior less the first node.
+    weight, norm, aid_weight, aid_norm : arrays
+        Of the factors of motion and of aids: their weights, and the norms of their whitened residuals.
+    """
+    total = 0.0
+    for i in range(shift.size):
+        x = 0.0
+        for j in range(i + 1):
+            x += whitener[i, j] * shift[j]
+        total += x * x
+    for k in range(norm.size):
+        total += weight[k] * norm[k] * norm[k]
+    for i in range(aid_norm.size):
+        total += aid_weight[i] * aid_norm[i] * aid_norm[i]
+    return 0.5 * total

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from math import hypot, inf, isfinite
+from math import hypot, isfinite
 from typing import ClassVar
 
 import numpy as np
@@ -36,7 +36,7 @@ from estimators.adaptations.base import Adaptation, Innovation
 from estimators.adaptations.weighting import Factors, Weighting
 from estimators.models.chain import Chain
 from estimators.solvers.admission import Admission
-from estimators.solvers.block_tridiagonal import solve_chain, step_residuals, whiten
+from estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
@@ -221,13 +221,20 @@ class WindowEstimator(Estimator):
         """
         chain, nodes = self.chain, self.chain.nodes
         moved = np.zeros(chain.size)
-        damping, settled, solved, before = 0.0, True, 0, inf
+        damping, settled, linear, solved = 0.0, True, False, 0
+        contraction = self._contraction = min(1.0, 2.0 * self._contraction)
+        latest = since = before = 0.0  # size of the last step; of those since the linearisation; of those up to it
         saved: list[Array] | None = None
         first = self._first_new(attached)
         self._linearise(first)
         while True:
+            reweighted = len(nodes)
             if saved is None and self.weighting is not None:
-                settled, first = self._weigh(solved, first)
+                settled, reweighted = self._weigh(solved)
+            first = min(first, reweighted)
+            if first == len(nodes) and settled and linear:  # the weights are as they were
+                nodes["step"][:] = 0.0
+                break
             size = self._solve(damping, first)
             if first and not size <= CHECKED_STEP:  # too far from where the older ones were linearised
                 first = 0
@@ -242,18 +249,26 @@ class WindowEstimator(Estimator):
                 size = self._solve(0.0)
                 if not isfinite(size):
                     raise FloatingPointError(f"the window at {chain.time:g} s has no finite solution")
-            contraction = self._contraction_at(solved, size, before, damping)
-            converged = settled and (
-                size < self.tolerance or (size <= CHECKED_STEP and contraction * size < self.tolerance)
-            )
-            before, first = size, 0
+            if before > 0.0:
+                contraction = _ratio(size, before, damping)
+                if reweighted == len(nodes):  # other weights would have their share in it
+                    self._contraction = contraction
+            since += size
+            weighed = self.weighting is None or (settled and _ratio(size, latest, damping) * size < self.tolerance)
+            linear = contraction * since < self.tolerance
+            latest, before = size, 0.0
             saved = chain.copy_states() if size > CHECKED_STEP else None
             cost = self._cost() if saved is not None else 0.0
             chain.retract(nodes["step"])
             moved += nodes["step"][-1]
-            if converged or (solved == self.iterations and saved is None):
+            if saved is None and ((weighed and linear) or solved == self.iterations):
                 break
+            if saved is None and not weighed and damping == 0.0 and self.incremental:
+                self._keep()
+                first = len(nodes)
+                continue
             self._linearise()
+            first, before, since = 0, since, 0.0
             if saved is not None and self._cost() > cost * (1.0 + 1e-9):
                 chain.restore_states(saved)
                 moved -= nodes["step"][-1]
@@ -265,7 +280,13 @@ class WindowEstimator(Estimator):
             if solved == self.iterations:
                 damping = max(damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
                 break
-        self._keep(damping)
+        if damping > 0.0:  # the covariances and the prior are those without it
+            self._linearise()
+            self._solve(0.0)
+            nodes["step"][:] = 0.0
+        self._keep()
+        self.covariance = nodes["filtered"][-1].copy()
+        self._eliminated = len(nodes)
         return solved, self._cost(), moved, attached
 
     def _first_new(self, attached: int) -> int:
@@ -274,34 +295,15 @@ class WindowEstimator(Estimator):
             return 0
         return min(self._eliminated, int(self.chain.aids["node"][-attached]) - self.chain.base)
 
-    def _keep(self, damping: float) -> None:
-        """Leave the elimination, and the residuals, as the next epoch needs them: about the nodes as they are now."""
+    def _keep(self) -> None:
+        """Refer what the elimination left, and the residuals, to the nodes as they are after the step."""
         chain, nodes, motions, aids = self.chain, self.chain.nodes, self.chain.motions, self.chain.aids
-        step = nodes["step"]
-        if damping > 0.0:  # the covariances and the prior are those without it
-            self._linearise()
-            self._solve(0.0)
-            step[:] = 0.0
-        else:
-            step_residuals(
-                step, motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"],
-                motions["norm"], aids["node"], chain.base, aids["jacobian"], aids["residual"], aids["whitener"],
-                aids["whitened"], aids["norm"],
-            )  # fmt: skip
-            for shift in (nodes["predicted_shift"], nodes["filtered_shift"]):
-                np.subtract(shift, step, out=shift)
-        self.covariance = nodes["filtered"][-1].copy()
-        self._eliminated = len(nodes)
-
-    def _contraction_at(self, solved: int, size: float, before: float, damping: float) -> float:
-        """By how much the next step is smaller than this one, if as in the last two or in the epoch before, or so."""
-        if solved == 1:
-            self._contraction = min(1.0, 2.0 * self._contraction)
-            return self._contraction
-        contraction = min(1.0, size / before) if damping == 0.0 and before > 0.0 else 1.0
-        if solved == 2:
-            self._contraction = contraction
-        return contraction
+        after_step(
+            nodes["step"], nodes["predicted_shift"], nodes["filtered_shift"],
+            motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"], motions["norm"],
+            aids["node"], chain.base, aids["jacobian"], aids["residual"], aids["whitener"], aids["whitened"],
+            aids["norm"],
+        )  # fmt: skip
 
     def _linearise(self, node: int = 0) -> None:
         """Linearise and whiten the factors that have to do with a node or later ones."""
@@ -312,36 +314,32 @@ class WindowEstimator(Estimator):
         whiten(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
         whiten(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
 
-    def _weigh(self, iteration: int, first: int) -> tuple[bool, int]:
-        """Ask the weighting; whether it has settled, and ``first``: 0 if older factors have other weights now."""
+    def _weigh(self, iteration: int) -> tuple[bool, int]:
+        """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
         assert self.weighting is not None
-        if not first:
-            return self.weighting.weigh(self._factors(iteration)), 0
-        motion, aid = self.chain.factors_from(first)
-        weights = self.chain.motions["weight"][:motion], self.chain.aids["weight"][:aid]
-        before = weights[0].tobytes(), weights[1].tobytes()
+        motions, aids = self.chain.motions, self.chain.aids
+        before = motions["weight"].copy(), aids["weight"].copy()
         settled = self.weighting.weigh(self._factors(iteration))
-        if before != (weights[0].tobytes(), weights[1].tobytes()):
-            first = 0
-            self._linearise()
+        first = keep_weights(
+            before[0], motions["norm"], motions["weight"], aids["node"], self.chain.base, before[1], aids["norm"],
+            aids["weight"], self.tolerance,
+        )  # fmt: skip
         return settled, first
 
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
-        chain = self.chain
-        total = 0.0
-        for factors in (chain.motions, chain.aids):
-            norm = factors["norm"]
-            total += float(np.dot(factors["weight"], norm * norm))
-        prior = chain.prior_whitener @ chain.prior_shift
-        return 0.5 * (total + float(prior @ prior))
+        chain, motions, aids = self.chain, self.chain.motions, self.chain.aids
+        cost: float = half_squares(
+            chain.prior_whitener, chain.prior_shift, motions["weight"], motions["norm"], aids["weight"], aids["norm"]
+        )
+        return cost
 
     def _solve(self, damping: float, first: int = 0) -> float:
         """One step of all nodes; its largest component in sigmas."""
         chain, nodes = self.chain, self.chain.nodes
         motions, aids = chain.motions, chain.aids
         size: float = solve_chain(
-            chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
+            chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
             motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
             aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
             aids["weight"], damping, first,
@@ -373,3 +371,8 @@ class WindowEstimator(Estimator):
             chain.set_prior(chain.turned(chain.nodes["predicted"][leaving], mean), chain.less(mean, step))
             chain.drop(leaving)
             self._eliminated -= leaving
+
+
+def _ratio(size: float, before: float, damping: float) -> float:
+    """By how much a step, without damping, is smaller than what went before; 1 at most, and where nothing did."""
+    return min(1.0, size / before) if before > 0.0 and damping == 0.0 else 1.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimators.models.chain import whitening
-from estimators.solvers.block_tridiagonal import solve_chain, step_residuals, whiten
+from estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 
 N, COUNT = 5, 6
 
@@ -142,14 +142,16 @@ def test_older_nodes_need_not_be_eliminated_again(first: int):
 def test_after_a_step_there_is_none_to_take():
     """Residuals and prior moved as the step supposes: what is linear is solved."""
     p = Problem(10)
-    _, (*_, step) = p.solve()
+    _, (_, predicted_shift, _, filtered_shift, step) = p.solve()
+    left = p.left
     motion, aids = (np.empty((COUNT - 1, N)), np.empty(COUNT - 1)), (np.empty_like(p.r), np.empty(len(p.node)))
     unit, one = np.tile(np.eye(N), (COUNT - 1, 1, 1)), np.tile(np.eye(3), (len(p.node), 1, 1))
-    step_residuals(step, p.F, p.e, unit, *motion, p.node + 7, 7, p.H, p.r, one, *aids)
+    after_step(step, predicted_shift, filtered_shift, p.F, p.e, unit, *motion, p.node + 7, 7, p.H, p.r, one, *aids)
     p.shift -= step[0]
-    _, (*_, after) = p.solve()
     assert np.abs(step).max() > 0.1
-    np.testing.assert_allclose(after, 0.0, atol=1e-9)
+    for first in (0, 3, COUNT):  # whatever is eliminated anew
+        _, (*_, after) = p.solve(first=first, left=left)
+        np.testing.assert_allclose(after, 0.0, atol=1e-9)
     for error, (white, norm) in ((p.e, motion), (p.r, aids)):
         np.testing.assert_array_equal(white, error)
         np.testing.assert_allclose(norm, np.linalg.norm(error, axis=1))
@@ -213,3 +215,37 @@ def test_whitened_errors_have_the_norm_of_the_cost():
     whiten(0, e, W, white, norm)
     np.testing.assert_allclose(norm**2, [x @ np.linalg.solve(p, x) for x, p in zip(e, P)])
     np.testing.assert_allclose(np.linalg.norm(white, axis=1), norm)
+
+
+def test_the_cost_is_half_the_weighted_sum_of_squares():
+    rng = np.random.default_rng(3)
+    P, shift = covariance(rng, 4), rng.normal(size=4)
+    W = np.empty((4, 4))
+    whitening(P, W)
+    norm, weight = rng.uniform(size=(2, 3))
+    aid_norm, aid_weight = rng.uniform(size=(2, 5))
+    squares = shift @ np.linalg.solve(P, shift) + weight @ norm**2 + aid_weight @ aid_norm**2
+    assert half_squares(W, shift, weight, norm, aid_weight, aid_norm) == pytest.approx(0.5 * squares)
+
+
+@pytest.mark.parametrize(
+    ("motion", "aid", "first"), [(None, None, 4), (None, 2, 1), (0, None, 1), (2, 2, 1), (1, 4, 2), (None, 4, 3)]
+)
+def test_weights_that_have_hardly_changed_are_kept(motion: int | None, aid: int | None, first: int):
+    """A motion's weight has to do with the node that it leads to, a measurement's with its own."""
+    node = np.array([0, 1, 1, 2, 3], dtype=np.int64)
+    before, aid_before = np.array([1.0, 0.5, 0.2]), np.array([1.0, 1.0, 0.6, 0.3, 1e-3])
+    norm, aid_norm = np.array([0.1, 2.0, 0.0]), np.array([0.0, 1.0, 3.0, 0.5, 40.0])
+    weight, aid_weight = before + 0.009 / np.maximum(norm, 1.0), aid_before - 0.009 / np.maximum(aid_norm, 1.0)
+    changed = []
+    for weights, norms, which in ((weight, norm, motion), (aid_weight, aid_norm, aid)):
+        if which is not None:
+            weights[which] += 0.03 / max(norms[which], 1.0)
+            changed.append((weights, which, weights[which]))
+    assert keep_weights(before, norm, weight, node + 7, 7, aid_before, aid_norm, aid_weight, 0.01) == first
+    for weights, which, wanted in changed:
+        assert weights[which] == wanted
+    kept = [np.delete(w, [] if i is None else i) for w, i in ((weight, motion), (aid_weight, aid))]
+    were = [np.delete(w, [] if i is None else i) for w, i in ((before, motion), (aid_before, aid))]
+    for ours, theirs in zip(kept, were):
+        np.testing.assert_array_equal(ours, theirs)
