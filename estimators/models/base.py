@@ -78,6 +78,11 @@ class ErrorModel(ABC):
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise at the present state; None where the measurement says nothing usable."""
 
+    def nominal_noise(self, measurement: Measurement) -> Array | None:
+        """The noise alone, or None, as of `measure`; a model may know it without linearising."""
+        linearised = self.measure(measurement)
+        return None if linearised is None else linearised.noise
+
     @abstractmethod
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

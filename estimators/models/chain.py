@@ -270,6 +270,10 @@ class Chain(ABC):
         """A measurement at the front, not attached yet."""
         return self.front.measure(measurement)
 
+    def nominal_noise(self, measurement: Measurement) -> Array | None:
+        """The (m, m) noise of a measurement at the front; None where it says nothing usable."""
+        return self.front.nominal_noise(measurement)
+
     def attach(self, measurement: Measurement, noise: Array) -> None:
         """Make a measurement with the (m, m) noise a factor on the newest node."""
         aids = self.aids

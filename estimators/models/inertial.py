@@ -31,7 +31,7 @@ import numpy as np
 
 from estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
 from estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
-from estimators.models.measurements import CODES, observe, uncalibrated_noise, white_noise
+from estimators.models.measurements import CODES, HEADING, observe, uncalibrated_noise, white_noise
 from estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
 from simnav.estimator import UnsuitableScenario
 from simnav.rotation import dcm_from_rpy
@@ -242,6 +242,13 @@ class InertialModel(ErrorModel):
         if name in self.uncalibrated:
             noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
         return Linearised(innovation, jacobian, noise)
+
+    def nominal_noise(self, measurement: Measurement) -> Array | None:
+        """As of the datasheet, but for what depends on the state."""
+        name = measurement.instrument
+        if name in self._fused and self.aid_parameters[name][0] != HEADING:  # which may say nothing
+            return self.noise[name]
+        return super().nominal_noise(measurement)
 
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
         """What a measurement says of the state (`estimators.models.inertial_update`)."""

@@ -161,28 +161,41 @@ class WindowEstimator(Estimator):
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> bool:
         """Make a measurement a factor; False if it is not used."""
         chain = self.chain
-        linearised = chain.linearise(m)
-        if linearised is None:
-            self._admission.skipped += 1
-            return False
-        residual, jacobian, noise = linearised
         if self.adaptation is not None:
-            covariance = chain.predicted_covariance(self.covariance)
-            cross = covariance @ jacobian.T
-            predicted = jacobian @ cross
-            chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, covariance, cross))
-            diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
-            with contextlib.suppress(np.linalg.LinAlgError):
-                white = np.linalg.solve(predicted + (noise if chosen is None else chosen), residual)
-                diagnostics[f"nis.{m.instrument}"] = float(residual @ white)
-            if chosen is None:
-                flagged.append((m.instrument, m.time))
-                return False
-            noise = chosen
+            noise = self._adapted_noise(m, self.adaptation, diagnostics, flagged)
+        elif (noise := chain.nominal_noise(m)) is None:
+            self._admission.skipped += 1
+        if noise is None:
+            return False
         if chain.ahead > 0.0:
             self._extend()
         chain.attach(m, noise)
         return True
+
+    def _adapted_noise(
+        self,
+        m: Measurement,
+        adaptation: Adaptation,
+        diagnostics: dict[str, float | Array],
+        flagged: list[tuple[str, float]],
+    ) -> Array | None:
+        """The noise that the adaptation chooses; None for a measurement that is not to be used."""
+        linearised = self.chain.linearise(m)
+        if linearised is None:
+            self._admission.skipped += 1
+            return None
+        residual, jacobian, noise = linearised
+        covariance = self.chain.predicted_covariance(self.covariance)
+        cross = covariance @ jacobian.T
+        predicted = jacobian @ cross
+        chosen = adaptation.adapt(Innovation(m, residual, predicted, noise, covariance, cross))
+        diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
+        with contextlib.suppress(np.linalg.LinAlgError):
+            white = np.linalg.solve(predicted + (noise if chosen is None else chosen), residual)
+            diagnostics[f"nis.{m.instrument}"] = float(residual @ white)
+        if chosen is None:
+            flagged.append((m.instrument, m.time))
+        return chosen
 
     def _optimise(self, attached: int, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         """Estimate all nodes, the newest of which hold new factors, and report."""
