@@ -10,15 +10,18 @@ the freedom to linearise or weigh it anew, and a window of one epoch is an itera
 
 An epoch's first step takes the older nodes as they were eliminated in the last one, as incremental smoothing does
 (M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", Int. J. Robotics Research 31(2),
-2012): only new factors are linearised and eliminated, and all nodes moved. Where weights of older factors change, a
-step is large, or one more is needed, everything is linearised and eliminated anew.
+2012): only new factors are linearised and eliminated, and all nodes moved. With the residuals that this leaves the
+weighting is asked again. A weight that would change the pull of its factor by no more than the tolerance stays as it
+is; from the first node on that has to do with another one, nodes are eliminated again. Everything is linearised and
+eliminated anew where a step is large, or where it would move the nodes by more than the tolerance.
 
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
 innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
 
 Sources: paper 000, section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); paper 001, section 2;
-for the test of convergence by contraction, which an epoch inherits with a doubt (a factor of 2) from the one before,
-E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996, section IV.8.
+for the test of convergence by contraction (the step that linearising anew leads to over those before it; an epoch
+inherits it, with a doubt: a factor of 2), E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996,
+section IV.8.
 Eq. 15 of paper 001 takes the inverse of the window's prior for the newest covariance; it is that of the oldest state.
 The newest one is the last block of the elimination.
 """
@@ -64,7 +67,8 @@ class WindowEstimator(Estimator):
         Epochs (steps that bring measurements) in the window; None: all of them.
     tolerance : float
         Largest component of a step, in its sigmas, at which the nodes have converged; the step need not be taken where
-        the contraction from step to step, also of the epochs before, says that it would be smaller.
+        the contraction from step to step, also of the epochs before, says that it would be smaller. Likewise the
+        largest change of a weight, and of the weight times the norm of a whitened residual, that does not count.
     iterations : int
         Most steps an epoch.
 
@@ -77,7 +81,7 @@ class WindowEstimator(Estimator):
     #: A node for every IMU sample, instead of one preintegrated factor between measurements (paper 004's un-simplified
     #: graph).
     every_sample: ClassVar[bool] = False
-    #: Whether an epoch's first step takes the older nodes as they were eliminated in the last one.
+    #: Whether a step takes the older nodes as they were eliminated before.
     incremental: ClassVar[bool] = True
 
     def __init__(
@@ -248,20 +252,8 @@ class WindowEstimator(Estimator):
             if first == len(nodes) and settled and linear:  # the weights are as they were
                 nodes["step"][:] = 0.0
                 break
-            size = self._solve(damping, first)
-            if first and not size <= CHECKED_STEP:  # too far from where the older ones were linearised
-                first = 0
-                self._linearise()
-                size = self._solve(damping)
+            size, attached = self._step(damping, first, attached)
             solved += 1
-            if not isfinite(size):
-                chain.detach(attached)
-                self._admission.skipped += attached
-                attached = 0
-                self._linearise()
-                size = self._solve(0.0)
-                if not isfinite(size):
-                    raise FloatingPointError(f"the window at {chain.time:g} s has no finite solution")
             if before > 0.0:
                 contraction = _ratio(size, before, damping)
                 if reweighted == len(nodes):  # other weights would have their share in it
@@ -301,6 +293,22 @@ class WindowEstimator(Estimator):
         self.covariance = nodes["filtered"][-1].copy()
         self._eliminated = len(nodes)
         return solved, self._cost(), moved, attached
+
+    def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
+        """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
+        size = self._solve(damping, first)
+        if first and not size <= CHECKED_STEP:  # too far from where the older nodes were linearised
+            self._linearise()
+            size = self._solve(damping)
+        if not isfinite(size):
+            self.chain.detach(attached)
+            self._admission.skipped += attached
+            attached = 0
+            self._linearise()
+            size = self._solve(0.0)
+            if not isfinite(size):
+                raise FloatingPointError(f"the window at {self.chain.time:g} s has no finite solution")
+        return size, attached
 
     def _first_new(self, attached: int) -> int:
         """The first node that new factors touch; those before it are eliminated, and 0 where they are not."""
