@@ -41,8 +41,7 @@ class AnfisFgo(ShipFgo):
         highest: float = 30.0,
         **options: Any,
     ):
-        super().__init__(**options)
-        self.adaptation = Anfis(features, file, lowest, highest)
+        super().__init__(adaptation=Anfis(features, file, lowest, highest), **options)
 
 
 @register("anfis-fgo-motion")
@@ -61,9 +60,20 @@ class AnfisFgoMotion(AnfisFgo):
 class AnfisEkf(ShipEkf):
     """The network of ``anfis-fgo`` (a reconstruction of paper 002) in ``ship-ekf``: what it does without the graph.
 
-    The parameters are those of ``anfis-fgo``.
+    Parameters
+    ----------
+    features, file, lowest, highest
+        As for ``anfis-fgo``.
+    acceleration, turn_rate_deg, turn_time, current, current_time, sway
+        As for ``ship-ekf``.
     """
 
-    def __init__(self, features: FeatureSet = "innovation", file: str = "", lowest: float = 1.0, highest: float = 30.0):
-        super().__init__()
-        self.adaptation = Anfis(features, file, lowest, highest)
+    def __init__(
+        self,
+        features: FeatureSet = "innovation",
+        file: str = "",
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        **model: Any,
+    ):
+        super().__init__(adaptation=Anfis(features, file, lowest, highest), **model)

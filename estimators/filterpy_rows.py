@@ -15,15 +15,16 @@ Of filterpy 2.0 as it is, and worked around here or in the adapter:
 
 from __future__ import annotations
 
-from math import cos, radians
+from math import cos
 from typing import Any
 
 import numpy as np
 
 from estimators.filterpy_adapter import FilterpyEstimator
 from estimators.models.measurements import radii, wrap
-from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, E, N, require_ship_aids
+from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, E, N
 from estimators.models.ship_points import ShipPoints
+from estimators.ship_row import ShipRow
 from estimators.solvers.sigma_point import draw_points
 from simnav.earth import displace
 from simnav.estimator import register
@@ -32,41 +33,23 @@ from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, 
 __all__ = ["FilterpyUkf"]
 
 
-@register("filterpy-ukf")
-class FilterpyUkf(FilterpyEstimator):
-    """filterpy's unscented Kalman filter over the ship model: the states and the noise of ``ship-ukf``.
+class _Unscented(FilterpyEstimator):
+    """filterpy's unscented Kalman filter over a ship's points.
 
     Parameters
     ----------
+    model : ShipPoints
     alpha, beta, kappa : float
-        Of the sigma points, as for ``ship-ukf``.
-    acceleration, turn_rate_deg, turn_time, current, current_time, sway : float
-        Of the model, as for ``ship-ekf``.
+        Of the sigma points.
     """
 
     uses = (*POSITION_KINDS, *HEADING_KINDS, "gnss_velocity", "dvl", "speed_log")
 
-    def __init__(
-        self,
-        alpha: float = 0.5,
-        beta: float = 2.0,
-        kappa: float = 0.0,
-        acceleration: float = 0.05,
-        turn_rate_deg: float = 0.6,
-        turn_time: float = 10.0,
-        current: float = 0.3,
-        current_time: float = 3600.0,
-        sway: float = 0.2,
-    ):
+    def __init__(self, model: ShipPoints, *, alpha: float = 0.5, beta: float = 2.0, kappa: float = 0.0):
         if not 0.0 < alpha < np.inf:
             raise ValueError(f"alpha is the scale of the sigma points: a number above 0, not {alpha}")
         self.alpha, self.beta, self.kappa = alpha, beta, kappa
-        self.model = ShipPoints(acceleration, radians(turn_rate_deg), turn_time, current, current_time, sway)
-
-    def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run; needs a heading, and a position or a speed."""
-        require_ship_aids(instruments, self.name)
-        super().reset(start, instruments)
+        self.model = model
 
     def build(self, start: InitialState, instruments: Instruments) -> Any:
         """The filter at the model's initial state."""
@@ -133,6 +116,21 @@ class FilterpyUkf(FilterpyEstimator):
         estimate.time = self._time
         estimate.diagnostics = {"skipped": float(self._admission.skipped)}
         return estimate
+
+
+@register("filterpy-ukf")
+class FilterpyUkf(ShipRow, _Unscented):
+    """filterpy's unscented Kalman filter over the ship model: the states and the noise of ``ship-ukf``.
+
+    Parameters
+    ----------
+    alpha, beta, kappa : float
+        Of the sigma points, as for ``ship-ukf``.
+    acceleration, turn_rate_deg, turn_time, current, current_time, sway : float
+        Of the model, as for ``ship-ekf``.
+    """
+
+    model_class = ShipPoints
 
 
 def _root(matrix: Array) -> Array:

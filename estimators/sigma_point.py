@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from math import radians
+from typing import Any
 
+from estimators.adaptations.base import Adaptation
 from estimators.ekf import AidedInertial
 from estimators.models.inertial_points import InertialPoints
-from estimators.models.ship import require_ship_aids
+from estimators.models.points import PointModel
 from estimators.models.ship_points import ShipPoints
+from estimators.ship_row import ShipRow
 from estimators.solvers.sigma_point import SigmaPointEstimator
 from simnav.estimator import register
-from simnav.types import InitialState, Instruments
 
 __all__ = ["Ckf", "ShipCkf", "ShipUkf", "Ukf"]
 
 
-class _Ship(SigmaPointEstimator):
-    def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run; needs a heading, and a position or a speed."""
-        require_ship_aids(instruments, self.name)
-        super().reset(start, instruments)
+class _Cubature(SigmaPointEstimator):
+    """Points of equal weight, ``sqrt(n)`` sigma out."""
+
+    def __init__(self, model: PointModel, adaptation: Adaptation | None = None):
+        super().__init__(model, adaptation, alpha=1.0, beta=0.0, kappa=0.0)
 
 
 @register("ukf")
@@ -40,12 +41,12 @@ class Ukf(SigmaPointEstimator, AidedInertial):
         False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
     """
 
-    def __init__(self, alpha: float = 0.5, beta: float = 2.0, kappa: float = 0.0, calibrate: bool = True):
-        super().__init__(InertialPoints(calibrate), None, alpha, beta, kappa)
+    def __init__(self, calibrate: bool = True, **points: Any):
+        super().__init__(InertialPoints(calibrate), **points)
 
 
 @register("ckf")
-class Ckf(SigmaPointEstimator, AidedInertial):
+class Ckf(_Cubature, AidedInertial):
     """Cubature Kalman filter on the manifold: the states of ``ekf``, moments by third-degree cubature points.
 
     Its points lie ``sqrt(n)`` sigma out, 3.9 for 15 states: where a heading is known to 20 degrees or worse they go
@@ -58,11 +59,11 @@ class Ckf(SigmaPointEstimator, AidedInertial):
     """
 
     def __init__(self, calibrate: bool = True):
-        super().__init__(InertialPoints(calibrate), None, alpha=1.0, beta=0.0, kappa=0.0)
+        super().__init__(InertialPoints(calibrate))
 
 
 @register("ship-ukf")
-class ShipUkf(_Ship):
+class ShipUkf(ShipRow, SigmaPointEstimator):
     """Unscented Kalman filter on GNSS, compass and log, for a ship without an INS: the states of ``ship-ekf``.
 
     After the UKF of paper 002.
@@ -75,24 +76,11 @@ class ShipUkf(_Ship):
         Of the model, as for ``ship-ekf``.
     """
 
-    def __init__(
-        self,
-        alpha: float = 0.5,
-        beta: float = 2.0,
-        kappa: float = 0.0,
-        acceleration: float = 0.05,
-        turn_rate_deg: float = 0.6,
-        turn_time: float = 10.0,
-        current: float = 0.3,
-        current_time: float = 3600.0,
-        sway: float = 0.2,
-    ):
-        model = ShipPoints(acceleration, radians(turn_rate_deg), turn_time, current, current_time, sway)
-        super().__init__(model, None, alpha, beta, kappa)
+    model_class = ShipPoints
 
 
 @register("ship-ckf")
-class ShipCkf(ShipUkf):
+class ShipCkf(ShipRow, _Cubature):
     """Cubature Kalman filter on GNSS, compass and log, for a ship without an INS: the states of ``ship-ekf``.
 
     Parameters
@@ -101,13 +89,4 @@ class ShipCkf(ShipUkf):
         Of the model, as for ``ship-ekf``.
     """
 
-    def __init__(
-        self,
-        acceleration: float = 0.05,
-        turn_rate_deg: float = 0.6,
-        turn_time: float = 10.0,
-        current: float = 0.3,
-        current_time: float = 3600.0,
-        sway: float = 0.2,
-    ):
-        super().__init__(1.0, 0.0, 0.0, acceleration, turn_rate_deg, turn_time, current, current_time, sway)
+    model_class = ShipPoints

@@ -120,8 +120,8 @@ class FgoFull(FullGraph, InertialWindow):
 
     slow = True
 
-    def __init__(self, calibrate: bool = True, tolerance: float = 1e-3, iterations: int = 10):
-        super().__init__(InertialModel(calibrate), window=None, tolerance=tolerance, iterations=iterations)
+    def __init__(self, calibrate: bool = True, **options: Any):
+        super().__init__(InertialModel(calibrate), **options)
 
 
 @register("iae-fgo")

@@ -17,7 +17,7 @@ turn rate and the current are ours, since a log measures through the water.
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +93,7 @@ class ShipModel(ErrorModel):
     def __init__(
         self,
         acceleration: float = 0.05,
-        turn_rate: float = 0.01,
+        turn_rate: float = radians(0.6),
         turn_time: float = 10.0,
         current: float = 0.3,
         current_time: float = 3600.0,

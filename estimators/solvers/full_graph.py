@@ -6,6 +6,8 @@ long past are linearised or weighed anew. At the end it is the batch solution: t
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from estimators.solvers.smoother import smoother_gains
@@ -16,9 +18,16 @@ __all__ = ["FullGraph"]
 
 
 class FullGraph(WindowEstimator):
-    """A graph that keeps all its nodes, and smooths; put it before the window's class, with ``window=None``::
+    """A graph that keeps all its nodes, and smooths; put it before a window's class that has a model of its own::
 
         class FgoFull(FullGraph, InertialWindow): ...
+
+    Parameters
+    ----------
+    *model
+        What the window's class is given.
+    tolerance, iterations
+        As for `WindowEstimator`.
 
     Attributes
     ----------
@@ -27,6 +36,9 @@ class FullGraph(WindowEstimator):
     """
 
     incremental = False
+
+    def __init__(self, *model: Any, tolerance: float = 1e-3, iterations: int = 10):
+        super().__init__(*model, window=None, tolerance=tolerance, iterations=iterations)
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""

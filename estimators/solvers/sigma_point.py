@@ -98,6 +98,7 @@ class SigmaPointEstimator(KalmanEstimator):
         self,
         model: PointModel,
         adaptation: Adaptation | None = None,
+        *,
         alpha: float = 0.5,
         beta: float = 2.0,
         kappa: float = 0.0,

@@ -80,7 +80,7 @@ class Linear(PointModel):
 def test_a_linear_problem_is_the_kalman_filter_to_rounding(numbers):
     """Also with a state that is known exactly, and against the equations written out."""
     rng = np.random.default_rng(1)
-    ours = SigmaPointEstimator(Linear(), None, *numbers)
+    ours = SigmaPointEstimator(Linear(), **dict(zip(("alpha", "beta", "kappa"), numbers)))
     theirs = KalmanEstimator(Linear())
     for filter_ in (ours, theirs):
         filter_.reset(START, Instruments((METER,)))
@@ -125,7 +125,7 @@ def test_the_mean_of_polar_coordinates_in_closed_form(numbers):
     """E[r cos(b)] = r exp(-s^2/2); the points give r (1 + (cos(k s) - 1) / k^2) at k sigma, equal to fourth order."""
     r, bearing_sigma, range_sigma = 50.0, 0.25, 0.5
     model = Polar((r, 0.0), (range_sigma, bearing_sigma))
-    estimator = SigmaPointEstimator(model, None, *numbers)
+    estimator = SigmaPointEstimator(model, **dict(zip(("alpha", "beta", "kappa"), numbers)))
     estimator.reset(START, Instruments((METER,)))
     residual, _, covariance, _ = estimator._observe(Measurement(0.0, "meter", METER.kind, np.zeros(3)))
     alpha, _, kappa = numbers
@@ -145,7 +145,7 @@ def test_the_moments_are_those_of_the_scaled_unscented_transform():
     rng = np.random.default_rng(0)
     n = 4
     for alpha, beta, kappa in [(0.5, 2.0, 0.0), (0.1, 2.0, 1.0), (1.0, 0.0, 0.0), (0.3, 0.09, -1.0)]:
-        estimator = SigmaPointEstimator(Linear(), None, alpha, beta, kappa)
+        estimator = SigmaPointEstimator(Linear(), alpha=alpha, beta=beta, kappa=kappa)
         estimator.reset(START, Instruments((METER,)))
         values = rng.standard_normal((2 * n, 3)) + 2.0
         mean, covariance = estimator._moments(values)
