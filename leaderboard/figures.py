@@ -62,6 +62,8 @@ _DARK = {INK: "#e8ebef", GREY: "#9aa5b1", GRID: "#343c46", SHADE: "#262d36", PAP
 TRUTH = INK
 _LEGEND = 15.0  # characters of a legend that fit into an inch
 _POINTS = 300  # of a curve over time: more cannot be seen
+#: What an axis of all estimators shows ends at this multiple of their median.
+FAR_OFF = 20.0
 
 _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -431,9 +433,14 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
 
 
 def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log: bool = True) -> Figure:
-    """One line an estimator: the runs as faint points, the figure with its interval in front."""
+    """One line an estimator: the runs as faint points, the figure with its interval in front.
+
+    What is more than `FAR_OFF` times the median estimator stands at the edge, as a number.
+    """
+    values = [r.value for r in rows if math.isfinite(r.value) and r.value > 0.0]
+    limit = FAR_OFF * float(np.median(values)) if values else math.inf
     with styled():
-        fig = figure(7.6, 0.9 + 0.34 * max(len(rows), 1))
+        fig = figure(7.6, 0.9 + 0.25 * max(len(rows), 1))
         ax = fig.add_subplot()
         for y, row in enumerate(rows):
             colour = style.colour(row.label)
@@ -443,13 +450,20 @@ def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log:
                 ax.plot(runs, y + offset, ".", ms=4, mew=0, color=colour, alpha=0.35, zorder=2)
             if not math.isfinite(row.value):
                 continue
+            if row.value > limit:
+                ax.annotate(
+                    f"{row.value:.{0 if row.value >= 100.0 else 1}f} \N{RIGHTWARDS ARROW}", (1.0, y), xycoords=ax.get_yaxis_transform(), color=colour,
+                    ha="right", va="center", fontsize="small",
+                )  # fmt: skip
+                continue
             if math.isfinite(row.low) and math.isfinite(row.high):
-                ax.plot([row.low, row.high], [y, y], color=colour, lw=2.4, zorder=3)
-            ax.plot(row.value, y, style.marker(row.label), ms=6.5, mew=1.3, mec=colour,
+                ax.plot([row.low, row.high], [y, y], color=colour, lw=1.6, marker="|", ms=6.0, zorder=3)
+            ax.plot(row.value, y, style.marker(row.label), ms=4.5, mew=1.0, mec=colour,
                     mfc=PAPER if row.hollow else colour, zorder=4)  # fmt: skip
         if log and any(math.isfinite(r.value) and r.value > 0 for r in rows):
             ax.set_xscale("log")
             plain_log_ticks(ax.xaxis)
+        ax.set_xlim(right=min(ax.get_xlim()[1], limit))
         names = [f"{r.label}  {r.note}".rstrip() for r in rows]
         ax.set_yticks(range(len(rows)), names)
         ax.set_ylim(len(rows) - 0.4, -0.6)

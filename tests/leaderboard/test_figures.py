@@ -151,6 +151,15 @@ def test_dots_show_value_interval_runs_and_failures(style):
     assert ax.get_xlabel() == "Horizontal RMSE [m]"
 
 
+def test_what_is_far_off_stands_at_the_edge_as_a_number(style):
+    """It would press all others together."""
+    rows = [*(Dot(f"row-{i}", 1.0 + 0.1 * i) for i in range(5)), Dot("inertial", 2137.0, 2000.0, 2200.0)]
+    ax = figures.dots(rows, style, label="Horizontal RMSE [m]").axes[0]
+    assert ax.get_xlim()[1] < 100.0
+    assert [t.get_text().split()[0] for t in ax.texts] == ["2137"]
+    assert not any(2137.0 in line.get_xdata() for line in ax.lines)
+
+
 def test_dots_of_those_that_all_failed_can_be_drawn(style, tmp_path):
     fig = figures.dots([Dot("ekf", np.nan)], style, label="Horizontal RMSE [m]")
     assert figures.save(fig, tmp_path / "x.svg", formats=("svg",))[0].stat().st_size > 1000
