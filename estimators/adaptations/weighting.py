@@ -82,6 +82,8 @@ class Weighting:
     def weigh(self, factors: Factors) -> bool:
         """Set ``factors.weight`` and ``factors.motion_weight`` in place, once an iteration.
 
+        The solver leaves a weight as it was where the change is within its tolerance.
+
         Returns
         -------
         bool
