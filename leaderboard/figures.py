@@ -451,9 +451,10 @@ def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log:
             if not math.isfinite(row.value):
                 continue
             if row.value > limit:
+                number = f"{row.value:.{0 if row.value >= 100.0 else 1}f} \N{RIGHTWARDS ARROW}"
                 ax.annotate(
-                    f"{row.value:.{0 if row.value >= 100.0 else 1}f} \N{RIGHTWARDS ARROW}", (1.0, y), xycoords=ax.get_yaxis_transform(), color=colour,
-                    ha="right", va="center", fontsize="small",
+                    number, (1.0, y), xycoords=ax.get_yaxis_transform(), color=colour, fontsize="small", ha="right",
+                    va="center",
                 )  # fmt: skip
                 continue
             if math.isfinite(row.low) and math.isfinite(row.high):
