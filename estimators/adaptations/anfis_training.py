@@ -232,7 +232,7 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
         for scenario in scenarios():
             recording = record(scenario, seed)
             teacher = _Teacher(recording)
-            ship = KalmanEstimator(ShipModel(), teacher)
+            ship = KalmanEstimator(ShipModel(turn_rate=0.01), teacher)  # as the files that are shipped were trained
             ship.reset(recording.start, recording.instruments)
             for packet in recording.steps():
                 ship.update(packet)

@@ -183,7 +183,13 @@ def start(folder: Path, results: Path, seeds: int) -> subprocess.Popen[bytes]:
         start_new_session=True,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
+        preexec_fn=_interruptible,
     )
+
+
+def _interruptible() -> None:
+    """Whoever started the tests in the background may have had them ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def results_in(folder: Path) -> int:
