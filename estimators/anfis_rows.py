@@ -8,13 +8,36 @@ from estimators.adaptations.anfis import Anfis
 from estimators.adaptations.anfis_file import FeatureSet
 from estimators.ship_ekf import ShipEkf
 from estimators.ship_graphs import ShipFgo
+from estimators.ship_row import ShipRow
 from simnav.estimator import register
 
 __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 
 
+class _AnfisRow(ShipRow):
+    """A ship's row whose noise the network chooses.
+
+    Parameters
+    ----------
+    features, file, lowest, highest
+        As for ``anfis-fgo``.
+    **options
+        Of the model and the solver.
+    """
+
+    def __init__(
+        self,
+        features: FeatureSet = "innovation",
+        file: str = "",
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        **options: Any,
+    ):
+        super().__init__(adaptation=Anfis(features, file, lowest, highest), **options)
+
+
 @register("anfis-fgo")
-class AnfisFgo(ShipFgo):
+class AnfisFgo(_AnfisRow, ShipFgo):
     """ANFIS-FGO, a reconstruction: ``ship-fgo``, the noise of each fix chosen by a neuro-fuzzy network.
 
     After paper 002, whose section on the network is missing from the text at hand; see docs/anfis.md. Needs what
@@ -33,16 +56,6 @@ class AnfisFgo(ShipFgo):
         As for ``ship-fgo``.
     """
 
-    def __init__(
-        self,
-        features: FeatureSet = "innovation",
-        file: str = "",
-        lowest: float = 1.0,
-        highest: float = 30.0,
-        **options: Any,
-    ):
-        super().__init__(adaptation=Anfis(features, file, lowest, highest), **options)
-
 
 @register("anfis-fgo-motion")
 class AnfisFgoMotion(AnfisFgo):
@@ -57,7 +70,7 @@ class AnfisFgoMotion(AnfisFgo):
 
 
 @register("anfis-ekf")
-class AnfisEkf(ShipEkf):
+class AnfisEkf(_AnfisRow, ShipEkf):
     """The network of ``anfis-fgo`` (a reconstruction of paper 002) in ``ship-ekf``: what it does without the graph.
 
     Parameters
@@ -67,13 +80,3 @@ class AnfisEkf(ShipEkf):
     acceleration, turn_rate_deg, turn_time, current, current_time, sway
         As for ``ship-ekf``.
     """
-
-    def __init__(
-        self,
-        features: FeatureSet = "innovation",
-        file: str = "",
-        lowest: float = 1.0,
-        highest: float = 30.0,
-        **model: Any,
-    ):
-        super().__init__(adaptation=Anfis(features, file, lowest, highest), **model)
