@@ -119,8 +119,8 @@ def test_ours_costs_a_fifth_of_gtsams(benchmark, recording: Recording):
     moved, which is most of what an incremental solver has to offer. And like for like: both linearise the window anew
     at each of two iterations.
 
-    The length of a turn matters: alternating at every epoch, each begins with the others' data in the caches. That costs
-    ours more, and as the rows come the factor is then 4.4 to 4.5.
+    The length of a turn matters: alternating at every epoch, each begins with the others' data in the caches. That
+    costs ours more, and as the rows come the factor is then 4.4 to 4.5.
     """
     twice = ((OURS[0], OURS[1] | {"tolerance": 1e-4}), (THEIRS[0], {"threshold": 0.0, "iterations": 2}))
     rows = dict(zip(("ours", "gtsam", "ours_twice", "gtsam_twice"), (OURS, THEIRS, *twice)))
