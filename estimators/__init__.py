@@ -3,7 +3,7 @@
 Importing the package registers the rows; compiled code and large libraries load when an estimator first runs.
 """
 
-from estimators.adaptive import (
+from simnav.estimators.adaptive import (
     Adkf,
     AdkfPaper,
     FadingEkf,
@@ -19,21 +19,21 @@ from estimators.adaptive import (
     SageHusaPaper,
     VbAkf,
 )
-from estimators.anfis_rows import AnfisEkf, AnfisFgo, AnfisFgoMotion
-from estimators.dead_reckoning import DeadReckoning
-from estimators.ekf import Ekf
-from estimators.ekf_presets import Ekf9, Ekf23
-from estimators.federated import Federated, FederatedNoReset
-from estimators.filterpy_rows import FilterpyUkf
-from estimators.gnss_only import GnssOnly
-from estimators.gtsam_rows import GtsamBatch, GtsamFixedLag, GtsamGnc, GtsamIsam2
-from estimators.inertial import PureInertial
-from estimators.invariant import InvariantEkf
-from estimators.iterated import IteratedEkf
-from estimators.kf import Kf, Kf23
-from estimators.oracle import Oracle
-from estimators.references import OracleClairvoyant, OracleMixture, OracleRts
-from estimators.robust_graphs import (
+from simnav.estimators.anfis_rows import AnfisEkf, AnfisFgo, AnfisFgoMotion
+from simnav.estimators.dead_reckoning import DeadReckoning
+from simnav.estimators.ekf import Ekf
+from simnav.estimators.ekf_presets import Ekf9, Ekf23
+from simnav.estimators.federated import Federated, FederatedNoReset
+from simnav.estimators.filterpy_rows import FilterpyUkf
+from simnav.estimators.gnss_only import GnssOnly
+from simnav.estimators.gtsam_rows import GtsamBatch, GtsamFixedLag, GtsamGnc, GtsamIsam2
+from simnav.estimators.inertial import PureInertial
+from simnav.estimators.invariant import InvariantEkf
+from simnav.estimators.iterated import IteratedEkf
+from simnav.estimators.kf import Kf, Kf23
+from simnav.estimators.oracle import Oracle
+from simnav.estimators.references import OracleClairvoyant, OracleMixture, OracleRts
+from simnav.estimators.robust_graphs import (
     CauchyFgo,
     DcsFgo,
     GaFgo,
@@ -46,11 +46,11 @@ from estimators.robust_graphs import (
     SwitchableFgo,
     TukeyFgo,
 )
-from estimators.ship_ekf import ShipEkf
-from estimators.ship_graphs import ShipFgo, ShipFgoFull
-from estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
-from estimators.sliding_window import FgoFull, FgoUnsimplified, IaeFgo, IaeFgoFixed, SwFgo
-from estimators.smoothers import EkfRts, EkfTwoFilter, ShipEkfRts
+from simnav.estimators.ship_ekf import ShipEkf
+from simnav.estimators.ship_graphs import ShipFgo, ShipFgoFull
+from simnav.estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
+from simnav.estimators.sliding_window import FgoFull, FgoUnsimplified, IaeFgo, IaeFgoFixed, SwFgo
+from simnav.estimators.smoothers import EkfRts, EkfTwoFilter, ShipEkfRts
 
 __all__ = [
     "Adkf",

@@ -8,21 +8,21 @@ from __future__ import annotations
 
 from typing import Literal
 
-from estimators.adaptations.adkf import AdaptiveFactor, Factor, Statistic
-from estimators.adaptations.base import Adaptation
-from estimators.adaptations.correntropy import MaximumCorrentropy
-from estimators.adaptations.fading import FadingMemory
-from estimators.adaptations.gating import ChiSquareGate
-from estimators.adaptations.imm import ImmEstimator
-from estimators.adaptations.innovation_based import InnovationBased
-from estimators.adaptations.noise import Scope
-from estimators.adaptations.robust import EquivalentWeights, huber, igg3
-from estimators.adaptations.sage_husa import SageHusa
-from estimators.adaptations.variational_bayes import VariationalBayes
-from estimators.models.inertial import InertialModel
-from estimators.models.suitable import model_for
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import register
+from simnav.estimators.adaptations.adkf import AdaptiveFactor, Factor, Statistic
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.adaptations.correntropy import MaximumCorrentropy
+from simnav.estimators.adaptations.fading import FadingMemory
+from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.adaptations.imm import ImmEstimator
+from simnav.estimators.adaptations.innovation_based import InnovationBased
+from simnav.estimators.adaptations.noise import Scope
+from simnav.estimators.adaptations.robust import EquivalentWeights, huber, igg3
+from simnav.estimators.adaptations.sage_husa import SageHusa
+from simnav.estimators.adaptations.variational_bayes import VariationalBayes
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.suitable import model_for
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import InitialState, Instruments
 
 __all__ = [
@@ -59,7 +59,7 @@ class _Adaptive(KalmanEstimator):
 class SageHusaKf(_Adaptive):
     """Sage-Husa filter: the measurement noise estimated from all innovations, the old ones fading.
 
-    See `estimators.adaptations.sage_husa`, also for the parameters.
+    See `simnav.estimators.adaptations.sage_husa`, also for the parameters.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class SageHusaKf(_Adaptive):
 class SageHusaPaper(_Adaptive):
     """Sage-Husa filter without fading, as the figures of paper 001 have it.
 
-    See `estimators.adaptations.sage_husa`, also for the parameters.
+    See `simnav.estimators.adaptations.sage_husa`, also for the parameters.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class SageHusaPaper(_Adaptive):
 class Iae(_Adaptive):
     """Innovation-based adaptive estimation of the measurement noise, window after paper 001, eqs. 16-20.
 
-    See `estimators.adaptations.innovation_based`, also for the parameters.
+    See `simnav.estimators.adaptations.innovation_based`, also for the parameters.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Iae(_Adaptive):
 class IaeFixed(_Adaptive):
     """Innovation-based adaptive estimation of the measurement noise over a fixed window.
 
-    See `estimators.adaptations.innovation_based`, also for the parameters.
+    See `simnav.estimators.adaptations.innovation_based`, also for the parameters.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class IaeFixed(_Adaptive):
 class Rae(_Adaptive):
     """Residual-based adaptive estimation of the measurement noise over a fixed window.
 
-    See `estimators.adaptations.innovation_based`, also for the parameters.
+    See `simnav.estimators.adaptations.innovation_based`, also for the parameters.
     """
 
     def __init__(
@@ -173,7 +173,7 @@ class Rae(_Adaptive):
 class Adkf(_Adaptive):
     """Adaptive robust filter after paper 003: R or P over a factor that falls with a statistic of the innovation.
 
-    See `estimators.adaptations.adkf`, also for the parameters.
+    See `simnav.estimators.adaptations.adkf`, also for the parameters.
     """
 
     def __init__(
@@ -193,7 +193,7 @@ class Adkf(_Adaptive):
 class AdkfPaper(_Adaptive):
     """Adaptive robust filter with the statistics and thresholds as paper 003 prints them.
 
-    See `estimators.adaptations.adkf`, also for the parameters.
+    See `simnav.estimators.adaptations.adkf`, also for the parameters.
     """
 
     def __init__(
@@ -209,7 +209,7 @@ class AdkfPaper(_Adaptive):
 class Igg3(_Adaptive):
     """IGG-III equivalent weights: full weight up to k0 sigma, almost none from k1 sigma on.
 
-    See `estimators.adaptations.robust`.
+    See `simnav.estimators.adaptations.robust`.
     """
 
     def __init__(self, k0: float = 2.5, k1: float = 8.0):
@@ -222,7 +222,7 @@ class Igg3(_Adaptive):
 class HuberKf(_Adaptive):
     """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
 
-    See `estimators.adaptations.robust`. Huber's k = 1.345 keeps 95 % of the efficiency for each component; it
+    See `simnav.estimators.adaptations.robust`. Huber's k = 1.345 keeps 95 % of the efficiency for each component; it
     cost up to 8 % of RMSE on clean data.
     """
 
@@ -236,7 +236,7 @@ class HuberKf(_Adaptive):
 class GatedEkf(_Adaptive):
     """Chi-square gating: measurements that fail the test are left out; a filter that fails for long is doubted.
 
-    See `estimators.adaptations.gating`, also for the parameters.
+    See `simnav.estimators.adaptations.gating`, also for the parameters.
     """
 
     def __init__(self, probability: float = 0.999, patience: float = 10.0):
@@ -247,7 +247,7 @@ class GatedEkf(_Adaptive):
 class FadingEkf(_Adaptive):
     """Fading memory: information loses weight with its age.
 
-    See `estimators.adaptations.fading`, also for the parameters.
+    See `simnav.estimators.adaptations.fading`, also for the parameters.
     """
 
     def __init__(self, memory: float = 1000.0):
@@ -258,7 +258,7 @@ class FadingEkf(_Adaptive):
 class VbAkf(_Adaptive):
     """Variational-Bayes adaptive filter: state and noise variances estimated together.
 
-    See `estimators.adaptations.variational_bayes`, also for the parameters.
+    See `simnav.estimators.adaptations.variational_bayes`, also for the parameters.
     """
 
     def __init__(
@@ -277,7 +277,7 @@ class VbAkf(_Adaptive):
 class Mckf(_Adaptive):
     """Maximum correntropy Kalman filter: residuals weighted by a Gaussian kernel.
 
-    See `estimators.adaptations.correntropy`, also for the parameters.
+    See `simnav.estimators.adaptations.correntropy`, also for the parameters.
     """
 
     def __init__(self, bandwidth: float = 4.0, iterations: int = 5, begin: Literal["update", "prediction"] = "update"):
@@ -288,7 +288,7 @@ class Mckf(_Adaptive):
 class Imm(ImmEstimator):
     """Interacting multiple models: the noise of each instrument jumps between levels.
 
-    See `estimators.adaptations.imm`, also for the parameters.
+    See `simnav.estimators.adaptations.imm`, also for the parameters.
     """
 
     def __init__(self, levels: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0), stay: float = 0.99, stay_high: float = 0.8):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from estimators.adaptations.anfis import Anfis
-from estimators.adaptations.anfis_file import FeatureSet
-from estimators.ship_ekf import ShipEkf
-from estimators.ship_graphs import ShipFgo
-from estimators.ship_row import ShipRow
 from simnav.estimator import register
+from simnav.estimators.adaptations.anfis import Anfis
+from simnav.estimators.adaptations.anfis_file import FeatureSet
+from simnav.estimators.ship_ekf import ShipEkf
+from simnav.estimators.ship_graphs import ShipFgo
+from simnav.estimators.ship_row import ShipRow
 
 __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 

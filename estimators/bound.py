@@ -21,9 +21,9 @@ then inverted. It bounds the mean square error over runs, whose initial errors a
 covariance; a single run may be better.
 
 What it is not: a bound beyond the model. Where the model stands for the simulator's errors by something simpler (one
-Gauss-Markov state for a turn-on and an in-run bias, noise for an IMU's scale factor, in `estimators.models.inertial`;
-all of the motion, in `estimators.models.ship`), it is the bound of an estimator with that model. A disturbance of the
-IMU counts as known. Outages of random times count as known too.
+Gauss-Markov state for a turn-on and an in-run bias, noise for an IMU's scale factor, in
+`simnav.estimators.models.inertial`; all of the motion, in `simnav.estimators.models.ship`), it is the bound of an
+estimator with that model. A disturbance of the IMU counts as known. Outages of random times count as known too.
 
 Smoothed output, which has seen what comes after, has a bound of its own (``smoothed``): the covariance that a
 Rauch-Tung-Striebel smoother behind the same filter ends with (``oracle-rts`` for ``flags``).
@@ -41,9 +41,9 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.adaptations.truth import FisherNoise, NominalNoise, TrueNoise
-from estimators.oracle import Oracle
-from estimators.solvers.smoother import SmoothingEstimator
+from simnav.estimators.adaptations.truth import FisherNoise, NominalNoise, TrueNoise
+from simnav.estimators.oracle import Oracle
+from simnav.estimators.solvers.smoother import SmoothingEstimator
 from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.simulator import ideal

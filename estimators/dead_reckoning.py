@@ -23,10 +23,10 @@ from math import hypot
 
 import numpy as np
 
-from estimators.models.base import triad_bias
-from estimators.models.measurements import plausible, radii, wrap
 from simnav.earth import gravity
 from simnav.estimator import Estimator, UnsuitableScenario, register
+from simnav.estimators.models.base import triad_bias
+from simnav.estimators.models.measurements import plausible, radii, wrap
 from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.strapdown import mechanize
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurements

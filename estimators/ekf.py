@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from estimators.models.inertial import InertialModel
-from estimators.models.suitable import require_inertial_aids
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import register
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.suitable import require_inertial_aids
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import InitialState, Instruments
 
 __all__ = ["AidedInertial", "Ekf"]
@@ -25,7 +25,7 @@ class Ekf(AidedInertial):
     """15-state error-state EKF over an IMU and whatever aids there are.
 
     Position, velocity, attitude and IMU biases, plus calibration states where the datasheets of the aids ask for them
-    (`estimators.models.inertial`). Every measurement is used, at its own time; no gating, no adaptation.
+    (`simnav.estimators.models.inertial`). Every measurement is used, at its own time; no gating, no adaptation.
 
     Parameters
     ----------

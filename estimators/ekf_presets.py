@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from estimators.ekf import AidedInertial
-from estimators.models.dvl_calibration import DvlCalibrationModel
-from estimators.models.nine_state import NineStateModel
 from simnav.estimator import register
+from simnav.estimators.ekf import AidedInertial
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
+from simnav.estimators.models.nine_state import NineStateModel
 
 __all__ = ["Ekf9", "Ekf23"]
 
@@ -16,7 +16,7 @@ __all__ = ["Ekf9", "Ekf23"]
 class Ekf23(AidedInertial):
     """23-state EKF after paper 003: DVL misalignment, lever arm, scale factor and time error beside the 15.
 
-    `estimators.models.dvl_calibration` says what is settled of the paper, and how.
+    `simnav.estimators.models.dvl_calibration` says what is settled of the paper, and how.
 
     Parameters
     ----------

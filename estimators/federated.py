@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from estimators.ekf import AidedInertial
-from estimators.models.inertial import InertialModel
-from estimators.solvers.federated import FederatedEstimator
 from simnav.estimator import register
+from simnav.estimators.ekf import AidedInertial
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.federated import FederatedEstimator
 
 __all__ = ["Federated", "FederatedNoReset"]
 
@@ -14,8 +14,8 @@ __all__ = ["Federated", "FederatedNoReset"]
 class Federated(FederatedEstimator, AidedInertial):
     """Federated Kalman filter: a local filter for each aiding sensor, fused and reset when the slowest has delivered.
 
-    The rival of paper 004 (`estimators.solvers.federated`); every measurement is used, at its own time, in its local
-    filter.
+    The rival of paper 004 (`simnav.estimators.solvers.federated`); every measurement is used, at its own time, in its
+    local filter.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class FederatedNoReset(Federated):
     """Federated Kalman filter whose local filters are never told what the others saw.
 
     Its covariance is an upper bound, not the error's: conservative where the sensors differ
-    (`estimators.solvers.federated`).
+    (`simnav.estimators.solvers.federated`).
 
     Parameters
     ----------

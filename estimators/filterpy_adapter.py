@@ -15,9 +15,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimators.solvers.admission import Admission
 from simnav.earth import displace, relative_position
 from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimators.solvers.admission import Admission
 from simnav.types import COMPONENTS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["FilterpyEstimator"]

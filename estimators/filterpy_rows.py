@@ -1,7 +1,7 @@
 """The row ``filterpy-ukf``: filterpy's unscented filter over our ship model, through the adapter.
 
-The motion, the measurements and the noise are `estimators.models.ship_points`; the filter is filterpy's, version 2. It
-is there to be compared with ``ship-ukf``, which does the same on the manifold.
+The motion, the measurements and the noise are `simnav.estimators.models.ship_points`; the filter is filterpy's, version
+2. It is there to be compared with ``ship-ukf``, which does the same on the manifold.
 
 Of filterpy 2.0 as it is, and worked around here or in the adapter:
 
@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from estimators.filterpy_adapter import FilterpyEstimator
-from estimators.models.measurements import radii, wrap
-from estimators.models.ship import HEADING_KINDS, POSITION_KINDS, E, N
-from estimators.models.ship_points import ShipPoints
-from estimators.ship_row import ShipRow
-from estimators.solvers.sigma_point import draw_points
 from simnav.earth import displace
 from simnav.estimator import register
+from simnav.estimators.filterpy_adapter import FilterpyEstimator
+from simnav.estimators.models.measurements import radii, wrap
+from simnav.estimators.models.ship import HEADING_KINDS, POSITION_KINDS, E, N
+from simnav.estimators.models.ship_points import ShipPoints
+from simnav.estimators.ship_row import ShipRow
+from simnav.estimators.solvers.sigma_point import draw_points
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["FilterpyUkf"]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from estimators.models.kinematic import KinematicModel
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import register
+from simnav.estimators.models.kinematic import KinematicModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 
 __all__ = ["GnssOnly"]
 
@@ -13,7 +13,7 @@ __all__ = ["GnssOnly"]
 class GnssOnly(KalmanEstimator):
     """GNSS alone: fixes (and velocities, if any) smoothed by a constant-velocity Kalman filter.
 
-    Between fixes and in an outage the ship goes on as she went (`estimators.models.kinematic`).
+    Between fixes and in an outage the ship goes on as she went (`simnav.estimators.models.kinematic`).
 
     Parameters
     ----------

@@ -1,15 +1,15 @@
 """The rows ``gtsam-fixed-lag``, ``gtsam-isam2``, ``gtsam-batch`` and ``gtsam-gnc``: GTSAM as an independent reference.
 
 They share our mechanization of the datasheets and our measurement models, and nothing else with the windows of
-`estimators.solvers.window`: preintegration, linearisation, elimination and marginalisation are GTSAM's.
+`simnav.estimators.solvers.window`: preintegration, linearisation, elimination and marginalisation are GTSAM's.
 """
 
 from __future__ import annotations
 
 from typing import Literal
 
-from estimators.solvers.gtsam_solvers import BatchEstimator, FixedLagEstimator, GncEstimator, Isam2Estimator
 from simnav.estimator import register
+from simnav.estimators.solvers.gtsam_solvers import BatchEstimator, FixedLagEstimator, GncEstimator, Isam2Estimator
 
 __all__ = ["GtsamBatch", "GtsamFixedLag", "GtsamGnc", "GtsamIsam2"]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from estimators.models.inertial import InertialModel
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import UnsuitableScenario, register
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Datasheet, InitialState, Instruments
 
 __all__ = ["PureInertial"]

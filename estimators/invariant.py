@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from estimators.ekf import AidedInertial
-from estimators.models.inertial import InertialModel
-from estimators.solvers.invariant import InvariantKalmanEstimator
 from simnav.estimator import register
+from simnav.estimators.ekf import AidedInertial
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.invariant import InvariantKalmanEstimator
 
 __all__ = ["InvariantEkf"]
 

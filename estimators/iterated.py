@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from estimators.ekf import AidedInertial
-from estimators.models.inertial import InertialModel
-from estimators.solvers.iterated import IteratedKalmanEstimator
 from simnav.estimator import register
+from simnav.estimators.ekf import AidedInertial
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.iterated import IteratedKalmanEstimator
 
 __all__ = ["IteratedEkf"]
 

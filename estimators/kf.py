@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-from estimators.ekf import AidedInertial
-from estimators.models.dvl_calibration import DvlCalibrationModel
-from estimators.models.inertial import InertialModel
-from estimators.solvers.linear import LinearKalmanEstimator
 from simnav.estimator import register
+from simnav.estimators.ekf import AidedInertial
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.linear import LinearKalmanEstimator
 
 __all__ = ["Kf", "Kf23"]
 
@@ -18,7 +18,7 @@ class Kf(LinearKalmanEstimator, AidedInertial):
     """Linear 15-state error-state KF, open loop: free inertial navigation, corrected by its estimated error.
 
     The states of ``ekf``. It leaves its linear range where free inertial navigation does
-    (`estimators.solvers.linear`).
+    (`simnav.estimators.solvers.linear`).
 
     Parameters
     ----------

@@ -7,13 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimators.adaptations.truth import TrueNoise, imu_faults
-from estimators.models.base import ErrorModel
-from estimators.models.fault_states import FaultStateModel
-from estimators.models.inertial import InertialModel
-from estimators.models.ship import ShipModel
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import UnsuitableScenario, register
+from simnav.estimators.adaptations.truth import TrueNoise, imu_faults
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.fault_states import FaultStateModel
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.recording import Recording
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
@@ -25,9 +25,9 @@ class Oracle(KalmanEstimator):
     """EKF that knows each measurement's true noise and faults; what any real-time estimator is measured against.
 
     The inertial model where there is an IMU, the ship model where there is none. Of the faults it knows the flags and
-    the statistics, not what they added (`estimators.adaptations.truth`): gross errors are left out, errors that last,
-    like multipath, are states (`estimators.models.fault_states`); but a disturbance of the IMU is taken off its
-    samples. On a run without faults it is ``ekf`` or ``ship-ekf``. It is not ranked. (Oracle O1.)
+    the statistics, not what they added (`simnav.estimators.adaptations.truth`): gross errors are left out, errors that
+    last, like multipath, are states (`simnav.estimators.models.fault_states`); but a disturbance of the IMU is taken
+    off its samples. On a run without faults it is ``ekf`` or ``ship-ekf``. It is not ranked. (Oracle O1.)
     """
 
     reference = True

@@ -10,10 +10,10 @@ O0, O1, O1 with a smoother, and O3 of the reference literature differ in what th
 
 from __future__ import annotations
 
-from estimators.adaptations.truth import MixtureNoise, NominalNoise
-from estimators.oracle import Oracle
-from estimators.solvers.smoother import SmoothingEstimator
 from simnav.estimator import register
+from simnav.estimators.adaptations.truth import MixtureNoise, NominalNoise
+from simnav.estimators.oracle import Oracle
+from simnav.estimators.solvers.smoother import SmoothingEstimator
 from simnav.types import Estimate, Measurements
 
 __all__ = ["OracleClairvoyant", "OracleMixture", "OracleRts"]
@@ -46,7 +46,7 @@ class OracleMixture(Oracle):
     """Oracle that knows the density of each measurement's noise, not which measurements a gross error hit. (Oracle O3.)
 
     The realistic target of robust estimators: the schedule of the faults and their sizes are known, each hit has to be
-    told from the innovation (`estimators.adaptations.truth.MixtureNoise`). The bound ``mix`` is its.
+    told from the innovation (`simnav.estimators.adaptations.truth.MixtureNoise`). The bound ``mix`` is its.
     """
 
     knowledge = MixtureNoise

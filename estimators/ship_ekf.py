@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from estimators.ship_row import ShipRow
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import register
+from simnav.estimators.ship_row import ShipRow
+from simnav.estimators.solvers.kalman import KalmanEstimator
 
 __all__ = ["ShipEkf"]
 
@@ -13,10 +13,10 @@ __all__ = ["ShipEkf"]
 class ShipEkf(ShipRow, KalmanEstimator):
     """EKF on GNSS, compass and log, for a ship without an INS; estimates log and compass bias and the current.
 
-    After the EKF of paper 002 (`estimators.models.ship`). It uses no IMU.
+    After the EKF of paper 002 (`simnav.estimators.models.ship`). It uses no IMU.
 
     Parameters
     ----------
     acceleration, turn_rate_deg, turn_time, current, current_time, sway : float
-        Of the model (`estimators.ship_row`).
+        Of the model (`simnav.estimators.ship_row`).
     """

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from estimators.models.ship import ShipModel
-from estimators.models.ship_chain import ShipChain
-from estimators.ship_row import ShipRow
-from estimators.solvers.full_graph import FullGraph
-from estimators.solvers.window import WindowEstimator
 from simnav.estimator import register
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.ship_chain import ShipChain
+from simnav.estimators.ship_row import ShipRow
+from simnav.estimators.solvers.full_graph import FullGraph
+from simnav.estimators.solvers.window import WindowEstimator
 
 __all__ = ["ShipFgo", "ShipFgoFull"]
 
@@ -28,7 +28,7 @@ class ShipFgo(_ShipGraph, WindowEstimator):
     After the FGO of paper 002: GNSS factors, DR factors (the motion between epochs, driven by log and compass), DR
     error factors, and the marginalization factor that older epochs leave behind. The DR error factor, a random walk of
     the log and compass biases in the paper, is the Gauss-Markov motion of the bias states that the datasheets ask for
-    (`estimators.models.ship`); a bias that they call constant does not walk.
+    (`simnav.estimators.models.ship`); a bias that they call constant does not walk.
 
     Parameters
     ----------

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import radians
 from typing import Any, ClassVar
 
-from estimators.models.ship import ShipModel, require_ship_aids
 from simnav.estimator import Estimator
+from simnav.estimators.models.ship import ShipModel, require_ship_aids
 from simnav.types import InitialState, Instruments
 
 __all__ = ["ShipRow"]

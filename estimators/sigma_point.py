@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from estimators.adaptations.base import Adaptation
-from estimators.ekf import AidedInertial
-from estimators.models.inertial_points import InertialPoints
-from estimators.models.points import PointModel
-from estimators.models.ship_points import ShipPoints
-from estimators.ship_row import ShipRow
-from estimators.solvers.sigma_point import SigmaPointEstimator
 from simnav.estimator import register
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.ekf import AidedInertial
+from simnav.estimators.models.inertial_points import InertialPoints
+from simnav.estimators.models.points import PointModel
+from simnav.estimators.models.ship_points import ShipPoints
+from simnav.estimators.ship_row import ShipRow
+from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 
 __all__ = ["Ckf", "ShipCkf", "ShipUkf", "Ukf"]
 
@@ -27,7 +27,7 @@ class _Cubature(SigmaPointEstimator):
 class Ukf(SigmaPointEstimator, AidedInertial):
     """Unscented Kalman filter on the manifold: the states of ``ekf``, moments by sigma points.
 
-    After the UKF of paper 000 (`estimators.solvers.sigma_point`); every measurement is used, at its own time.
+    After the UKF of paper 000 (`simnav.estimators.solvers.sigma_point`); every measurement is used, at its own time.
 
     Parameters
     ----------

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from estimators.adaptations.base import Adaptation
-from estimators.adaptations.innovation_based import InnovationBased
-from estimators.adaptations.weighting import Weighting
-from estimators.models.inertial import InertialModel
-from estimators.models.inertial_chain import InertialChain
-from estimators.models.ship_chain import ShipChain
-from estimators.models.suitable import model_for, require_inertial_aids
-from estimators.solvers.full_graph import FullGraph
-from estimators.solvers.window import WindowEstimator
 from simnav.estimator import register
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.adaptations.innovation_based import InnovationBased
+from simnav.estimators.adaptations.weighting import Weighting
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_chain import InertialChain
+from simnav.estimators.models.ship_chain import ShipChain
+from simnav.estimators.models.suitable import model_for, require_inertial_aids
+from simnav.estimators.solvers.full_graph import FullGraph
+from simnav.estimators.solvers.window import WindowEstimator
 from simnav.types import InitialState, Instruments
 
 __all__ = ["AidedWindow", "FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "InertialWindow", "SwFgo"]
@@ -131,7 +131,7 @@ class IaeFgo(AidedWindow):
     Parameters
     ----------
     shortest, longest, low, high, forgetting, lowest, highest
-        Of the estimation (`estimators.adaptations.innovation_based`).
+        Of the estimation (`simnav.estimators.adaptations.innovation_based`).
     window, tolerance, iterations
         As for `SwFgo`.
     """
@@ -162,7 +162,7 @@ class IaeFgoFixed(AidedWindow):
     innovations : int
         M of eq. 17.
     forgetting, lowest, highest
-        Of the estimation (`estimators.adaptations.innovation_based`).
+        Of the estimation (`simnav.estimators.adaptations.innovation_based`).
     window, tolerance, iterations
         As for `SwFgo`.
     """

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from estimators.ekf import Ekf
-from estimators.ship_ekf import ShipEkf
-from estimators.solvers.smoother import SmoothingEstimator
-from estimators.solvers.two_filter import TwoFilterEstimator
 from simnav.estimator import register
+from simnav.estimators.ekf import Ekf
+from simnav.estimators.ship_ekf import ShipEkf
+from simnav.estimators.solvers.smoother import SmoothingEstimator
+from simnav.estimators.solvers.two_filter import TwoFilterEstimator
 
 __all__ = ["EkfRts", "EkfTwoFilter", "ShipEkfRts"]
 
 
 @register("ekf-rts")
 class EkfRts(SmoothingEstimator, Ekf):
-    """The EKF with a Rauch-Tung-Striebel smoother behind it (`estimators.solvers.smoother`).
+    """The EKF with a Rauch-Tung-Striebel smoother behind it (`simnav.estimators.solvers.smoother`).
 
     In real time it is ``ekf``; the trajectory after the run is smoothed.
     """
@@ -21,7 +21,7 @@ class EkfRts(SmoothingEstimator, Ekf):
 
 @register("ekf-two-filter")
 class EkfTwoFilter(TwoFilterEstimator, Ekf):
-    """The EKF with the two-filter smoother of paper 004 behind it (`estimators.solvers.two_filter`).
+    """The EKF with the two-filter smoother of paper 004 behind it (`simnav.estimators.solvers.two_filter`).
 
     In real time it is ``ekf``; the smoothed trajectory is that of ``ekf-rts``, by another way.
 
@@ -41,7 +41,7 @@ class EkfTwoFilter(TwoFilterEstimator, Ekf):
 
 @register("ship-ekf-rts")
 class ShipEkfRts(SmoothingEstimator, ShipEkf):
-    """The ship EKF with a Rauch-Tung-Striebel smoother behind it (`estimators.solvers.smoother`).
+    """The ship EKF with a Rauch-Tung-Striebel smoother behind it (`simnav.estimators.solvers.smoother`).
 
     In real time it is ``ship-ekf``; the trajectory after the run is smoothed.
     """

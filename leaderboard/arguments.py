@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from leaderboard.console import Output, UserError, mistakes, sentence
+from simnav.leaderboard.console import Output, UserError, mistakes, sentence
 
 if TYPE_CHECKING:
-    from leaderboard.campaign import EstimatorRequest
+    from simnav.leaderboard.campaign import EstimatorRequest
     from simnav.scenario import Scenario
 
 __all__ = ["requests", "scenario", "scenarios", "split_estimators", "split_names"]
@@ -79,8 +79,8 @@ def requests(
     UserError
         On an unknown estimator or parameter, or a value that does not fit.
     """
-    from leaderboard.campaign import EstimatorRequest
     from simnav.estimator import describe, make, names
+    from simnav.leaderboard.campaign import EstimatorRequest
 
     asked = split_estimators(given)
     if not asked:

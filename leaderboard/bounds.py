@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from leaderboard import tables
-from leaderboard.console import Output, absolute, mistakes, session
+from simnav.leaderboard import tables
+from simnav.leaderboard.console import Output, absolute, mistakes, session
 
 if TYPE_CHECKING:
-    from estimators.bound import Bound
+    from simnav.estimators.bound import Bound
 
 __all__ = ["register", "run"]
 
@@ -40,7 +40,7 @@ def _command(
 
 def run(out: Output, name: str, runs: int, csv: Path | None, smoothed: bool = False) -> None:
     """Compute the three bounds and show them."""
-    from estimators.bound import KINDS, bound
+    from simnav.estimators.bound import KINDS, bound
     from simnav.scenario import load
 
     with mistakes(ValueError, FileNotFoundError):

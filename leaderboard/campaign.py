@@ -21,10 +21,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard import store
-from leaderboard.fingerprint import estimator_source, recording_digest, simulator_version, variant
-from leaderboard.isolation import isolate
-from leaderboard.worker import Entrant, Unit, run_unit
+from simnav.leaderboard import store
+from simnav.leaderboard.fingerprint import estimator_source, recording_digest, simulator_version, variant
+from simnav.leaderboard.isolation import isolate
+from simnav.leaderboard.worker import Entrant, Unit, run_unit
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
@@ -301,7 +301,7 @@ def _importable(module: str) -> bool:
 def _import_estimators() -> None:
     """Our own estimators, imported once here, so that forked processes need not do it."""
     with contextlib.suppress(ImportError):
-        importlib.import_module("estimators")
+        importlib.import_module("simnav.estimators")
 
 
 def _compile(report: Callable[[Progress], None]) -> None:

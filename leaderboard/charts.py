@@ -1,4 +1,4 @@
-"""From recordings and trials to what `leaderboard.figures` draws."""
+"""From recordings and trials to what `simnav.leaderboard.figures` draws."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from leaderboard.figures import Curve, Style, Track, run_chart
 from simnav.earth import relative_position
+from simnav.leaderboard.figures import Curve, Style, Track, run_chart
 from simnav.scoring import errors
 from simnav.types import Array
 

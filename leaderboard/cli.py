@@ -14,9 +14,9 @@ from typing import Annotated
 
 import typer
 
-from leaderboard import bounds, training
-from leaderboard.console import USER, Output, UserError, session
-from leaderboard.reproduce import command as reproduce
+from simnav.leaderboard import bounds, training
+from simnav.leaderboard.console import USER, Output, UserError, session
+from simnav.leaderboard.reproduce import command as reproduce
 
 __all__ = ["app", "main"]
 
@@ -91,7 +91,7 @@ def list_(
 ) -> None:
     """List scenarios, estimators, kinds of instruments or kinds of faults."""
     with session(json, debug) as out:
-        from leaderboard import listing
+        from simnav.leaderboard import listing
 
         topics = [topic] if topic else [Topic.SCENARIOS, Topic.ESTIMATORS]
         found = {t.value: getattr(listing, t.value)() for t in topics}
@@ -112,7 +112,7 @@ def run(
 ) -> None:
     """Run estimators once over one scenario and score them."""
     with session(json, debug) as out:
-        from leaderboard import arguments, single
+        from simnav.leaderboard import arguments, single
 
         if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
             raise UserError(f"--plot {plot}: the file should end in .png, .svg or .pdf")
@@ -134,7 +134,7 @@ def simulate(
 ) -> None:
     """Write the recording of one run: measurements, labels and truth."""
     with session(json, debug) as out:
-        from leaderboard import arguments, single
+        from simnav.leaderboard import arguments, single
 
         if output.suffix != ".npz":
             raise UserError(f"--output {output}: the file should end in .npz")
@@ -150,7 +150,7 @@ def check(
 ) -> None:
     """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
     with session(json, debug) as out:
-        from leaderboard import arguments, single
+        from simnav.leaderboard import arguments, single
 
         request = arguments.requests([file], set_)[0]
         out.code = single.check(out, request)
@@ -165,7 +165,7 @@ def new_estimator(
 ) -> None:
     """Write a small estimator that works, to start from."""
     with session(json, debug) as out:
-        from leaderboard import single
+        from simnav.leaderboard import single
 
         single.scaffold(out, name, output)
 
@@ -189,7 +189,7 @@ def evaluate(
 ) -> None:
     """Run an estimator beside the baselines on the same seeds and show where it stands."""
     with session(json, debug) as out:
-        from leaderboard import arguments, monte_carlo
+        from simnav.leaderboard import arguments, monte_carlo
 
         mine = arguments.requests([estimator], set_)[0]
         out.code = monte_carlo.evaluate(
@@ -215,7 +215,7 @@ def campaign(
 ) -> None:
     """Run scenarios x estimators x seeds; started again, it goes on where it was."""
     with session(json, debug) as out:
-        from leaderboard import arguments, monte_carlo
+        from simnav.leaderboard import arguments, monte_carlo
 
         seeds = range(seed, seed + (runs or (_QUICK_RUNS if quick else _RUNS)))
         out.code = monte_carlo.campaign(
@@ -238,7 +238,7 @@ def leaderboard_(
 ) -> None:
     """Rank the results of a campaign and write the site."""
     with session(json, debug) as out:
-        from leaderboard import monte_carlo
+        from simnav.leaderboard import monte_carlo
 
         out.code = monte_carlo.leaderboard(out, results, output, workers, papers)
 
@@ -247,7 +247,7 @@ def leaderboard_(
 def warmup(json: Json = False, debug: Debug = False) -> None:
     """Compile every kernel, once; later starts are quick."""
     with session(json, debug) as out:
-        from leaderboard import single
+        from simnav.leaderboard import single
 
         single.warmup(out)
 

@@ -263,7 +263,10 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
             traceback.print_exc()
         mistake = isinstance(error, (UserError, _spec_error()))
         text = sentence(error)
-        ours = type(error).__module__.partition(".")[0] in ("simnav", "leaderboard")  # their messages are sentences
+        module = type(error).__module__
+        ours = module.startswith("simnav") and not module.startswith(
+            "simnav.estimators"
+        )  # their messages are sentences
         if not mistake and not ours and not isinstance(error, OSError):
             text = f"{type(error).__name__}: {text}" + ("" if debug else " (--debug shows where)")
         out.note(f"simnav: {text}")

@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard.console import plain
+from simnav.leaderboard.console import plain
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from leaderboard.store import Result
+    from simnav.leaderboard.store import Result
 
 __all__ = ["SCHEMA_VERSION", "as_document", "write_csv", "write_json", "write_parquet"]
 

@@ -17,11 +17,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import simnav
+
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.scenario import Scenario
 
 __all__ = ["digest", "estimator_source", "recording_digest", "simulator_version", "variant"]
+
+
+#: The library, and the folders in it that are packages of the floors above: they do not decide a recording.
+LIBRARY = Path(simnav.__file__).parent
+UPPER_FLOORS = ("estimators", "scenarios", "leaderboard")
+
+OUR_ESTIMATORS = "simnav.estimators"
 
 
 def digest(*parts: str) -> str:
@@ -47,10 +56,12 @@ def _files_digest(files: Iterable[tuple[str, Path]]) -> str:
 
 
 def _package_digest(folder: Path) -> str:
-    """Digest of all files of a package, but for what Python makes of them."""
+    """Digest of all files of a package, but for what Python makes of them; of simnav, the library alone."""
     found = []
     for place, folders, names in os.walk(folder):
         folders[:] = [f for f in folders if f != "__pycache__" and not f.startswith(".")]
+        if folder == LIBRARY and place == str(folder):
+            folders[:] = [f for f in folders if f not in UPPER_FLOORS]
         found += [Path(place, n) for n in names if not n.startswith(".") and not n.endswith((".pyc", "~"))]
     return _files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
 
@@ -105,7 +116,9 @@ def estimator_source(cls: type[Estimator]) -> str:
     parts = []
     for base in cls.__mro__:
         package = base.__module__.partition(".")[0]
-        if package in sys.stdlib_module_names or package in ("simnav", "numpy"):
+        if _is_ours(base.__module__):
+            package = OUR_ESTIMATORS
+        elif package in sys.stdlib_module_names or package in ("simnav", "numpy"):
             continue  # the simulator's version has simnav
         module = sys.modules.get(base.__module__)
         path = Path(inspect.getfile(base)).resolve()
@@ -126,15 +139,19 @@ def _closure_digest(start: Path) -> str:
         found[path] = None
         for name in _imports(path):
             first = name.partition(".")[0]
-            ours = ours or first == "estimators"
+            ours = ours or _is_ours(name)
             for place in {folder, path.parent}:
                 beside = place / f"{first}.py"
                 if beside.is_file():
                     todo.append(beside)
-                elif (place / first / "__init__.py").is_file() and first not in ("estimators", "simnav"):
+                elif (place / first / "__init__.py").is_file() and first != "simnav":
                     todo += sorted((place / first).rglob("*.py"))
     files = sorted((os.path.relpath(p, folder), p) for p in found)
-    return digest(_files_digest(files), _installed_digest("estimators") if ours else "")
+    return digest(_files_digest(files), _installed_digest(OUR_ESTIMATORS) if ours else "")
+
+
+def _is_ours(module: str) -> bool:
+    return module == OUR_ESTIMATORS or module.startswith(f"{OUR_ESTIMATORS}.")
 
 
 def _imports(path: Path) -> Iterator[str]:
@@ -148,6 +165,8 @@ def _imports(path: Path) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield node.module or ""
+            if node.module and not node.level:  # "from simnav import estimators"
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
             if node.level:  # "from . import x"
                 yield from (alias.name for alias in node.names)
 

@@ -6,7 +6,7 @@ import typing
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from leaderboard import tables
+from simnav.leaderboard import tables
 
 if TYPE_CHECKING:
     from rich.table import Table

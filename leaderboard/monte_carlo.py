@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard import tables
-from leaderboard.console import FAILED, Output, UserError, absolute, mistakes, plain, sentence
-from leaderboard.summary import NO_TRIAL, group
+from simnav.leaderboard import tables
+from simnav.leaderboard.console import FAILED, Output, UserError, absolute, mistakes, plain, sentence
+from simnav.leaderboard.summary import NO_TRIAL, group
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from leaderboard.campaign import EstimatorRequest, Progress, Summary
-    from leaderboard.ranking import Ranking
-    from leaderboard.result import Result
+    from simnav.leaderboard.campaign import EstimatorRequest, Progress, Summary
+    from simnav.leaderboard.ranking import Ranking
+    from simnav.leaderboard.result import Result
     from simnav.scenario import Scenario
 
 __all__ = ["Limits", "campaign", "evaluate", "leaderboard"]
@@ -55,8 +55,8 @@ def _run(
     limits: Limits,
     folder: Path,
 ) -> Summary:
-    from leaderboard.campaign import CampaignError, run_campaign
-    from leaderboard.store import StoreError, create
+    from simnav.leaderboard.campaign import CampaignError, run_campaign
+    from simnav.leaderboard.store import StoreError, create
 
     with mistakes(StoreError):
         create(folder)
@@ -87,7 +87,7 @@ def _run(
 
 
 def _load(folder: Path, *, series: bool) -> list[Result]:
-    from leaderboard.store import StoreError, load
+    from simnav.leaderboard.store import StoreError, load
 
     with mistakes(StoreError):
         results = load(folder, series=series)
@@ -126,7 +126,7 @@ def campaign(
 
 def leaderboard(out: Output, folder: Path, output: Path, workers: int, papers: Path | None = None) -> int:
     """Show the ranking and write the site; returns the exit code."""
-    from leaderboard.site import build
+    from simnav.leaderboard.site import build
 
     results = _load(absolute(folder), series=True)
     ranking = _rank(results)
@@ -179,14 +179,14 @@ def _folder(keep: Path | None) -> Iterator[Path]:
 
 
 def _rank(results: Sequence[Result]) -> Ranking:
-    from leaderboard.ranking import rank
+    from simnav.leaderboard.ranking import rank
 
     return rank(results)
 
 
 def ranking_table(ranking: Ranking, results: Sequence[Result], mine: str | None = None) -> Table:
     """The overall ranking."""
-    from leaderboard.ranking_table import SCORE_TITLE, ranking_rows, score_caption
+    from simnav.leaderboard.ranking_table import SCORE_TITLE, ranking_rows, score_caption
 
     content = ranking.to_dict()
     rows = ranking_rows(content, results)

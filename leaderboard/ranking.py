@@ -13,8 +13,8 @@ estimator there; on a run that the oracle failed, the oracle's median. `Scenario
 **Unsuitable.** An estimator that needs other instruments than a scenario has, or gives no position at all, is listed as
 such there: no failure, but no score either.
 
-**Tiers.** `leaderboard.statistics.tiers`: paired by run, against the best of a tier, Holm-corrected at 5 %; overall,
-each scenario counts the same in the test as it does in the score.
+**Tiers.** `simnav.leaderboard.statistics.tiers`: paired by run, against the best of a tier, Holm-corrected at 5 %;
+overall, each scenario counts the same in the test as it does in the score.
 
 **Overall.** Each scenario counts the same. An estimator that covers all of them has the mean of its log ratios. One
 that covers fewer is not rewarded for leaving out the hard ones: an additive model, log ratio = estimator + scenario, is
@@ -33,11 +33,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from leaderboard.statistics import RESAMPLES, Array, Place, bootstrap_means, interquartile_mean, interval, tiers
+from simnav.leaderboard.statistics import RESAMPLES, Array, Place, bootstrap_means, interquartile_mean, interval, tiers
 from simnav.scoring import badge
 
 if TYPE_CHECKING:
-    from leaderboard.result import Result
+    from simnav.leaderboard.result import Result
 
 __all__ = ["MIN_AVAILABILITY", "WORST", "OverallRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from leaderboard import tables
+from simnav.leaderboard import tables
 
 if TYPE_CHECKING:
-    from leaderboard.result import Result
+    from simnav.leaderboard.result import Result
 
 __all__ = [
     "SCORE_AXIS",
@@ -90,7 +90,7 @@ def ranking_rows(ranking: Mapping[str, Any], results: Sequence[Result]) -> list[
 
 def ratio(value: float | None) -> str:
     """A ratio to the baseline's error; at the cap it stands for failure."""
-    from leaderboard.ranking import WORST
+    from simnav.leaderboard.ranking import WORST
 
     return "failed" if value is not None and value >= 0.999 * WORST else tables.number(value)
 

@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard import tables
-from leaderboard.console import FAILED, USER, Output, UserError, absolute, mistakes
+from simnav.leaderboard import tables
+from simnav.leaderboard.console import FAILED, USER, Output, UserError, absolute, mistakes
 
 if TYPE_CHECKING:
-    from leaderboard.campaign import EstimatorRequest
+    from simnav.leaderboard.campaign import EstimatorRequest
     from simnav.recording import Recording
     from simnav.scenario import Scenario
 
@@ -62,8 +62,8 @@ def run(out: Output, scenario: Scenario, requests: list[EstimatorRequest], seed:
         progress(len(requests))
     drawn = None
     if plot is not None and any(len(t) for _, t in trials):
-        from leaderboard.charts import run_figure
-        from leaderboard.figures import save
+        from simnav.leaderboard.charts import run_figure
+        from simnav.leaderboard.figures import save
 
         references = [str(row["estimator"]) for row in rows if row["reference"]]
         drawn = save(run_figure(recording, trials, references), absolute(plot), formats=(plot.suffix[1:],))[0]
@@ -140,7 +140,7 @@ def simulate(out: Output, scenario: Scenario, seed: int, output: Path, csv: Path
     recording.save(target)
     written = []
     if csv is not None:
-        from leaderboard.csv_export import write
+        from simnav.leaderboard.csv_export import write
 
         written = write(recording, absolute(csv))
     counts = {name: len(stream) for name, stream in recording.data.aids.items()}

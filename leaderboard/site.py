@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from leaderboard import export, tables
-from leaderboard.console import UserError
-from leaderboard.figures import Dot, Style, dots
-from leaderboard.pages import STATIC, TEMPLATES, environment
-from leaderboard.ranking_table import (
+from simnav.leaderboard import export, tables
+from simnav.leaderboard.console import UserError
+from simnav.leaderboard.figures import Dot, Style, dots
+from simnav.leaderboard.pages import STATIC, TEMPLATES, environment
+from simnav.leaderboard.ranking_table import (
     SCORE_AXIS,
     SCORE_LEAD,
     SCORE_TITLE,
@@ -36,13 +36,13 @@ from leaderboard.ranking_table import (
     score_caption,
     sortable,
 )
-from leaderboard.reproduce import page as reproduction
-from leaderboard.site_figures import catalogued, scenario_figures, write_figure
-from leaderboard.summary import NO_TRIAL, Interval, Runs, group
+from simnav.leaderboard.reproduce import page as reproduction
+from simnav.leaderboard.site_figures import catalogued, scenario_figures, write_figure
+from simnav.leaderboard.summary import NO_TRIAL, Interval, Runs, group
 
 if TYPE_CHECKING:
-    from leaderboard.ranking import Ranking
-    from leaderboard.store import Result
+    from simnav.leaderboard.ranking import Ranking
+    from simnav.leaderboard.store import Result
 
 __all__ = ["build"]
 

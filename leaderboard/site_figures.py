@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard.figures import Dot, Style, Track, dots, error_cdf, error_over_time, save, trajectory
-from leaderboard.summary import Runs, tracks
+from simnav.leaderboard.figures import Dot, Style, Track, dots, error_cdf, error_over_time, save, trajectory
+from simnav.leaderboard.summary import Runs, tracks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,7 +123,7 @@ def scenario_figures(
 
 def _of_recording(identity: str, seed: int) -> tuple[dict[str, Track], list[tuple[float, float, str]]]:
     """Fixes and outages of one run, made again; nothing where that is not possible any more."""
-    from leaderboard.charts import fixes, outage_spans
+    from simnav.leaderboard.charts import fixes, outage_spans
     from simnav.source import record
 
     scenario = catalogued(identity)

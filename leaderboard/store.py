@@ -6,7 +6,7 @@ A results folder holds::
     results/KEY.parquet      one result, fresh from a worker
     compacted/part-*.parquet many results
 
-A result's key names everything that decides it (`leaderboard.fingerprint`), so a campaign that was
+A result's key names everything that decides it (`simnav.leaderboard.fingerprint`), so a campaign that was
 killed goes on where it was. Whatever moment it was killed at: a file is either whole or not there
 (temporary name, fsync, rename), a result that is both loose and compacted counts once, and nothing
 is deleted before the file that replaces it is on disk.
@@ -28,7 +28,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
-from leaderboard.result import BATCH, FORMAT, Result, batches, rows, schema, to_table, write_tables
+from simnav.leaderboard.result import BATCH, FORMAT, Result, batches, rows, schema, to_table, write_tables
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from leaderboard.figures import Array, Band, Track
+from simnav.leaderboard.figures import Array, Band, Track
 
 if TYPE_CHECKING:
-    from leaderboard.store import Result
+    from simnav.leaderboard.store import Result
 
 __all__ = ["Interval", "Runs", "group", "interval_of_median"]
 

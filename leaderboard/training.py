@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from leaderboard import tables
-from leaderboard.console import Output, UserError, absolute, mistakes, session
+from simnav.leaderboard import tables
+from simnav.leaderboard.console import Output, UserError, absolute, mistakes, session
 
 if TYPE_CHECKING:
-    from estimators.adaptations.anfis_file import Parameters
-    from estimators.adaptations.hybrid_learning import Learned
+    from simnav.estimators.adaptations.anfis_file import Parameters
+    from simnav.estimators.adaptations.hybrid_learning import Learned
 
 __all__ = ["register", "run"]
 
@@ -26,7 +26,7 @@ _LEAST_VALIDATION = 2
 
 
 class _Features(StrEnum):
-    """As `estimators.adaptations.anfis_file.FEATURES`, which the command does not import before it runs."""
+    """As `simnav.estimators.adaptations.anfis_file.FEATURES`, which the command does not import before it runs."""
 
     INNOVATION = "innovation"
     MOTION = "motion"
@@ -66,15 +66,15 @@ def _command(
 
 def run(out: Output, features: str, seeds: int, passes: int, output: Path | None) -> None:
     """Gather, learn, and write the parameter file with two figures beside it."""
-    from estimators.adaptations.anfis_training import (
+    from simnav.estimators.adaptations.anfis_training import (
         FIRST_TRAINING_SEED,
         FIRST_VALIDATION_SEED,
         gather,
         scenarios,
         train,
     )
-    from leaderboard import training_figures
-    from leaderboard.fingerprint import simulator_version
+    from simnav.leaderboard import training_figures
+    from simnav.leaderboard.fingerprint import simulator_version
 
     path = absolute(output or Path(f"anfis_{features}.json"))
     if path.suffix != ".json":

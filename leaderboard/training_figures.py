@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimators.adaptations.anfis_file import FEATURES, Parameters
-from estimators.adaptations.hybrid_learning import Learned
-from leaderboard.figures import GREY, PALETTE, figure, legend_below, save, styled
+from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
+from simnav.estimators.adaptations.hybrid_learning import Learned
+from simnav.leaderboard.figures import GREY, PALETTE, figure, legend_below, save, styled
 from simnav.types import Array
 
 if TYPE_CHECKING:

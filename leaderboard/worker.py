@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard import store
-from leaderboard.isolation import Outcome, isolate
-from leaderboard.result import Result
+from simnav.leaderboard import store
+from simnav.leaderboard.isolation import Outcome, isolate
+from simnav.leaderboard.result import Result
 
 if TYPE_CHECKING:
     from simnav.recording import Recording

@@ -96,8 +96,7 @@ def _folders() -> Iterator[Path]:
     points = {(p.name, p.value): p for p in importlib.metadata.entry_points(group=_GROUP)}
     for point in sorted(points.values(), key=lambda p: (not _own(p), p.name)):
         if _own(point):
-            # Beside this package, so that a folder "scenarios" of the working directory cannot shadow it.
-            yield Path(__file__).resolve().parent.parent / point.module
+            yield (Path(__file__).parent / "scenarios").resolve()
             continue
         try:
             folders = _package_folders(point.module)

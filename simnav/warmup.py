@@ -61,8 +61,8 @@ def _cores() -> int:
 
 
 def _import_all() -> None:
-    """Import every module of our two packages that holds kernels, and whatever plug-ins import."""
-    for package in ("simnav", "estimators"):
+    """Import every module of simnav that holds kernels, and whatever plug-ins import."""
+    for package in ("simnav", "simnav.estimators"):  # the second is a link in a checkout: rglob does not follow it
         spec = importlib.util.find_spec(package)
         for folder in [] if spec is None else spec.submodule_search_locations or []:
             for path in sorted(Path(folder).rglob("*.py")):

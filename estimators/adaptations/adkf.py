@@ -8,10 +8,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation, Posterior, normalised_square
-from estimators.adaptations.robust import igg3
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import NoiseAdaptation, Posterior, normalised_square
+from simnav.estimators.adaptations.robust import igg3
 from simnav.types import Array, Instruments
 
 __all__ = ["FACTORS", "AdaptiveFactor", "exponential", "three_segment", "two_segment"]

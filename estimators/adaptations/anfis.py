@@ -2,9 +2,9 @@
 
 Section 3 of the paper, the ANFIS itself, is missing from the text at hand. Known are: a five-layer first-order network,
 fed with features of the present moment (of the ship's motion), that gives the covariance of the GNSS. Reconstructed
-after Jang 1993 (`estimators.adaptations.sugeno`, `estimators.adaptations.hybrid_learning`): three inputs with three
-Gaussian memberships, 27 rules. The output is the logarithm of the variance over the datasheet's. What it learns from is
-in `estimators.adaptations.anfis_training`; `simnav train anfis` learns it again.
+after Jang 1993 (`simnav.estimators.adaptations.sugeno`, `simnav.estimators.adaptations.hybrid_learning`): three inputs
+with three Gaussian memberships, 27 rules. The output is the logarithm of the variance over the datasheet's. What it
+learns from is in `simnav.estimators.adaptations.anfis_training`; `simnav train anfis` learns it again.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from estimators.adaptations.anfis_file import FEATURES, FeatureSet, Parameters, shipped
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation
-from estimators.models.measurements import wrap
+from simnav.estimators.adaptations.anfis_file import FEATURES, FeatureSet, Parameters, shipped
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import NoiseAdaptation
+from simnav.estimators.models.measurements import wrap
 from simnav.types import Array, Instruments
 
 __all__ = ["Anfis", "Features", "Motion"]

@@ -10,13 +10,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.adaptations.sugeno import Sugeno
 from simnav.types import Array
 
 __all__ = ["FEATURES", "FORMAT", "FeatureSet", "Parameters", "ParametersError", "shipped"]
 
 FeatureSet = Literal["innovation", "motion", "recent"]
-#: The inputs of each set, in order (`estimators.adaptations.anfis`).
+#: The inputs of each set, in order (`simnav.estimators.adaptations.anfis`).
 FEATURES: dict[str, tuple[str, ...]] = {
     "innovation": ("innovation", "turn_rate", "change_of_speed"),
     "motion": ("speed", "turn_rate", "change_of_speed"),

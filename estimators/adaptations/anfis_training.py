@@ -1,4 +1,4 @@
-"""What the ANFIS of `estimators.adaptations.anfis` learns from: voyages of its own, on seeds never scored.
+"""What the ANFIS of `simnav.estimators.adaptations.anfis` learns from: voyages of its own, on seeds never scored.
 
 A reconstruction: of how paper 002 trained its network nothing is known. Here ships sail three voyages, with receivers
 of different quality, in five kinds of weather for GNSS: healthy; noise that grows; gross errors; multipath; all of
@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimators.adaptations.anfis import Features
-from estimators.adaptations.anfis_file import FEATURES, Parameters
-from estimators.adaptations.base import Adaptation, Innovation
-from estimators.adaptations.hybrid_learning import Learned, learn, rmse
-from estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.adaptations.anfis import Features
+from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.hybrid_learning import Learned, learn, rmse
+from simnav.estimators.adaptations.sugeno import Sugeno
 from simnav.types import Array, Instruments
 
 if TYPE_CHECKING:
@@ -219,8 +219,8 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
     ValueError
         On a seed that is not reserved for training: results might be scored on it.
     """
-    from estimators.models.ship import ShipModel
-    from estimators.solvers.kalman import KalmanEstimator
+    from simnav.estimators.models.ship import ShipModel
+    from simnav.estimators.solvers.kalman import KalmanEstimator
     from simnav.source import record
 
     inputs: dict[str, list[list[float]]] = {name: [] for name in FEATURES}

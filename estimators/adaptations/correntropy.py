@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation, posterior
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import NoiseAdaptation, posterior
 from simnav.types import Array, Instruments
 
 __all__ = ["MaximumCorrentropy", "correntropy_noise"]

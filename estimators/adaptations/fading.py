@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import exp
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.types import Array, Instruments
 
 __all__ = ["FadingMemory"]

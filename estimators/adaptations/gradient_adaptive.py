@@ -35,8 +35,8 @@ from typing import Literal
 
 import numpy as np
 
-from estimators.adaptations.weighting import Factors, Weighting
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.weighting import Factors, Weighting
 from simnav.types import Array, Instruments
 
 __all__ = ["GradientAdaptive", "Shape", "medians"]

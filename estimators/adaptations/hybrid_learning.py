@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.adaptations.sugeno import Sugeno
 from simnav.types import Array
 
 __all__ = ["Learned", "StepSize", "fit_consequents", "learn", "premise_gradient", "rmse"]

@@ -7,11 +7,11 @@ from math import exp, hypot, log, sqrt
 
 import numpy as np
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.prediction import PredictionTest
-from estimators.models.base import ErrorModel
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["ImmEstimator", "mixture_update"]

@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import EstimatedNoise, Posterior, Scope
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import EstimatedNoise, Posterior, Scope
 from simnav.types import Array, Instruments
 
 __all__ = ["InnovationBased", "adaptive_window"]

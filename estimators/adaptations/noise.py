@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from estimators.adaptations.base import Adaptation, Innovation
-from estimators.adaptations.prediction import PredictionTest
-from estimators.solvers.joseph import joseph_update
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.solvers.joseph import joseph_update
 from simnav.types import KINDS, Array, Instruments
 
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "normalised_square", "posterior", "scaled"]

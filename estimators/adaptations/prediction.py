@@ -6,8 +6,8 @@ from math import sqrt
 
 import numpy as np
 
-from estimators.adaptations.base import Innovation
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
 from simnav.types import Array, Instruments
 
 __all__ = ["PredictionTest", "chi_square_limits", "standardised"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import NoiseAdaptation, scaled
-from estimators.adaptations.prediction import standardised
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import NoiseAdaptation, scaled
+from simnav.estimators.adaptations.prediction import standardised
 from simnav.types import Array, Instruments
 
 __all__ = ["EquivalentWeights", "huber", "igg3"]

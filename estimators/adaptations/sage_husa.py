@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import EstimatedNoise, Scope
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import EstimatedNoise, Scope
 from simnav.types import Array, Instruments
 
 __all__ = ["SageHusa"]

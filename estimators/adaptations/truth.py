@@ -3,8 +3,8 @@
 A fault is known by its statistics, not by the value that it took. Of those that act on a measurement
 
 - a noise step changes the sigma, which is known;
-- multipath, a bias step and a ramp last: they are states (`estimators.models.fault_states`), since taking an error that
-  is correlated in time for noise makes a filter believe it more with every epoch;
+- multipath, a bias step and a ramp last: they are states (`simnav.estimators.models.fault_states`), since taking an
+  error that is correlated in time for noise makes a filter believe it more with every epoch;
 - a gross error is noise of the second moment of its distribution, and left out where that is more than `LIMIT` sigma;
 - a frozen or false value says nothing, and is left out.
 
@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from estimators.adaptations.base import Adaptation, Innovation
-from estimators.models.fault_states import FaultState
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.models.fault_states import FaultState
 from simnav.recording import AidStream, FaultLabel, Recording
 from simnav.sensors.faults import quantity_of
 from simnav.sensors.values import add_error

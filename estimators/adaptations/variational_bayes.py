@@ -6,9 +6,9 @@ from math import sqrt
 
 import numpy as np
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.noise import EstimatedNoise, Scope, posterior
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import EstimatedNoise, Scope, posterior
 from simnav.types import Array, Instruments
 
 __all__ = ["VariationalBayes", "variational_noise"]

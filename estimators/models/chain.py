@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from estimators.models.base import ErrorModel, Linearised
 from simnav.compiled import kernel
+from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
 
 __all__ = ["Chain", "Columns", "whitening"]

@@ -23,7 +23,7 @@ Source: Zhan et al. 2026 (paper 003), eqs. 1-2 and 13-21. Where it is unclear, t
 - One lever arm and one time error are shared by GNSS and DVL in eqs. 16 and 21. Here the GNSS antenna's lever arm is
   known and its time is right; both errors are the DVL's.
 - H1 of eq. 16 has 20 columns for 23 states and H2 of eq. 21 none for the time error; here the columns are as above.
-- F of eq. 13 is continuous; here it is integrated (`estimators.models.inertial`), and G has 23 rows.
+- F of eq. 13 is continuous; here it is integrated (`simnav.estimators.models.inertial`), and G has 23 rows.
 - The noise of the measurements is the datasheets'; the printed one is the preset ``paper``. None of the states is
   printed.
 - The paper's state begins with attitude, ours with position; the eight follow in its order: eta, dl, k, tau.
@@ -36,11 +36,11 @@ from typing import Literal
 
 import numpy as np
 
-from estimators.models.base import Linearised
-from estimators.models.inertial import InertialModel
-from estimators.models.measurements import DVL, observe
 from simnav.earth import ROTATION_RATE, gravity
 from simnav.estimator import UnsuitableScenario
+from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.measurements import DVL, observe
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
@@ -99,7 +99,7 @@ class DvlCalibrationModel(InertialModel):
         return [(float(s) ** 2, 0.0, 0.0) for s in sigmas]
 
     def measure(self, measurement: Measurement) -> Linearised | None:
-        """Linearise one measurement: the DVL as in the module, the others as in `estimators.models.measurements`."""
+        """Linearise one measurement: the DVL as in the module, others as in `simnav.estimators.models.measurements`."""
         if measurement.instrument == self._dvl.name:
             return self._measure_dvl(self._dvl, measurement.value)
         return super().measure(measurement)

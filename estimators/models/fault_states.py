@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
 
 __all__ = ["FaultState", "FaultStateModel"]

@@ -1,7 +1,7 @@
 """The 15-state inertial error model: position, velocity, attitude, gyroscope and accelerometer bias.
 
 The state is propagated by `simnav.strapdown` at IMU rate, its error in blocks of up to 0.2 s, and the covariance once a
-measurement (`estimators.models.propagation`).
+measurement (`simnav.estimators.models.propagation`).
 
 Error: estimate minus truth; position ``(R_M + h) dlat, (R_N + h) cos(lat) dlon, -dh`` [m], velocity [m/s] and the
 rotation vector phi of C_est C_true' [rad], all in north-east-down, and the biases [rad/s], [m/s^2]. Its dynamics
@@ -29,11 +29,11 @@ from math import atan2, hypot
 
 import numpy as np
 
-from estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
-from estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
-from estimators.models.measurements import CODES, HEADING, observe, uncalibrated_noise, white_noise
-from estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
 from simnav.estimator import UnsuitableScenario
+from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
+from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
+from simnav.estimators.models.measurements import CODES, HEADING, observe, uncalibrated_noise, white_noise
+from simnav.estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
 from simnav.rotation import dcm_from_rpy
 from simnav.types import (
     Array,
@@ -74,12 +74,12 @@ class InertialModel(ErrorModel):
     bias_at, scale_at : dict of str to int
         Index in the error state of an instrument's first bias, and of its scale factor.
     aid_parameters : dict of str to (int, (3,) array, int, int)
-        What `estimators.models.measurements.observe_inertial` is told of an instrument: its code, its lever arm, and
-        its places in ``bias_at`` and ``scale_at``, -1 for none.
+        What `simnav.estimators.models.measurements.observe_inertial` is told of an instrument: its code, its lever arm,
+        and its places in ``bias_at`` and ``scale_at``, -1 for none.
     noise : dict of str to (d, d) array
         White noise of an instrument.
     uncalibrated : set of str
-        Instruments whose noise grows with the velocity (`estimators.models.measurements.uncalibrated_noise`).
+        Instruments whose noise grows with the velocity (`simnav.estimators.models.measurements.uncalibrated_noise`).
     raw_rate, raw_force : (3,) array
         Angular rate at the time of the state (extrapolated) and specific force of the last IMU sample, as measured.
     transition, process_noise : (15, 15) array
@@ -229,7 +229,7 @@ class InertialModel(ErrorModel):
         return float(self._clock[2])
 
     def measure(self, measurement: Measurement) -> Linearised | None:
-        """Linearise one measurement (`estimators.models.measurements`)."""
+        """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         name = measurement.instrument
         code, arm, bias_at, scale_at = self.aid_parameters[name]
         jacobian, noise = self._jacobians[name], self.noise[name]
@@ -251,7 +251,7 @@ class InertialModel(ErrorModel):
         return super().nominal_noise(measurement)
 
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
-        """What a measurement says of the state (`estimators.models.inertial_update`)."""
+        """What a measurement says of the state (`simnav.estimators.models.inertial_update`)."""
         name = measurement.instrument
         if name not in self._fused:
             return super().innovate(measurement, covariance)
@@ -267,7 +267,7 @@ class InertialModel(ErrorModel):
         return innovation, cross, predicted, noise
 
     def absorb(self, observation: Observation, covariance: Array, correction: Array) -> float:
-        """Correct by what a measurement says (`estimators.models.inertial_update`)."""
+        """Correct by what a measurement says (`simnav.estimators.models.inertial_update`)."""
         if not self._fused:
             return super().absorb(observation, covariance, correction)
         innovation, cross, predicted, noise = observation
@@ -278,7 +278,7 @@ class InertialModel(ErrorModel):
         return nis
 
     def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
-        """Use a measurement with its nominal noise (`estimators.models.inertial_update`)."""
+        """Use a measurement with its nominal noise (`simnav.estimators.models.inertial_update`)."""
         name = measurement.instrument
         if name not in self._fused:
             return None

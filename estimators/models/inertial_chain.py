@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.models.chain import Chain
-from estimators.models.inertial import InertialModel
-from estimators.models.measurements import observe_inertial
-from estimators.models.propagation import correct_inertial
 from simnav.compiled import kernel
+from simnav.estimators.models.chain import Chain
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.measurements import observe_inertial
+from simnav.estimators.models.propagation import correct_inertial
 from simnav.rotation import cross, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments
 

@@ -22,11 +22,11 @@ from math import atan2, ceil, cos, sin, sqrt
 
 import numpy as np
 
-from estimators.models.inertial import InertialModel
-from estimators.models.measurements import HEADING, observe_inertial
-from estimators.models.points import PointModel
 from simnav.compiled import kernel
 from simnav.earth import radii_scalar
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.measurements import HEADING, observe_inertial
+from simnav.estimators.models.points import PointModel
 from simnav.rotation import cross, rotation_coefficients
 from simnav.strapdown import mechanize_step, sample_from_motion
 from simnav.types import Array, Measurement
@@ -140,7 +140,7 @@ def observe_points(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     code, arm, bias_at, scale_at, position, velocity, dcm, rate, bias, calibration
-        As of `estimators.models.measurements.observe_inertial`.
+        As of `simnav.estimators.models.measurements.observe_inertial`.
     errors : (k, n) array
         Of the points.
     differences : (k, d) array

@@ -9,10 +9,10 @@ from math import sqrt
 
 import numpy as np
 
-from estimators.models.measurements import observe_inertial
-from estimators.models.propagation import correct_inertial
-from estimators.solvers.joseph import joseph_update, project
 from simnav.compiled import kernel
+from simnav.estimators.models.measurements import observe_inertial
+from simnav.estimators.models.propagation import correct_inertial
+from simnav.estimators.solvers.joseph import joseph_update, project
 
 __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
 
@@ -30,7 +30,7 @@ def innovate_inertial(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration
-        As of `estimators.models.measurements.observe_inertial`.
+        As of `simnav.estimators.models.measurements.observe_inertial`.
     covariance : (n, n) array
         P.
     innovation : (d,) array
@@ -70,7 +70,7 @@ def absorb_inertial(  # type: ignore[no-untyped-def]
     noise : (d, d) array
         R.
     position, velocity, dcm, bias, calibration
-        As of `estimators.models.propagation.correct_inertial`.
+        As of `simnav.estimators.models.propagation.correct_inertial`.
     correction : (n,) array
         Overwritten with what was added to the state.
 

@@ -10,9 +10,9 @@ from math import atan2, cos, hypot, sin
 
 import numpy as np
 
-from estimators.models.base import ErrorModel, Linearised
-from estimators.models.measurements import radii, wrap
 from simnav.estimator import UnsuitableScenario
+from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.models.measurements import radii, wrap
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["KinematicModel"]

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.models.base import Linearised
-from estimators.models.inertial import InertialModel
+from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.inertial import InertialModel
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 __all__ = ["NineStateModel"]
@@ -81,7 +81,7 @@ class NineStateModel(InertialModel):
         error[:] = self.transition[:9, :9] @ error
 
     def measure(self, measurement: Measurement) -> Linearised | None:
-        """Linearise one measurement (`estimators.models.measurements`)."""
+        """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         linearised = super().measure(measurement)
         if linearised is None:
             return None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from estimators.models.base import ErrorModel
+from simnav.estimators.models.base import ErrorModel
 from simnav.types import Array, Measurement
 
 __all__ = ["PointModel"]

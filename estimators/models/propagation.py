@@ -3,7 +3,7 @@
 `advance_inertial` carries the state from one measurement to the next at IMU rate and sums it up in blocks of at most
 `BLOCK` seconds; `accumulate_error` makes the transition matrix and the process noise of these blocks, so that the
 covariance is touched once a measurement (`propagate_covariance`). The equations are those of
-`estimators.models.inertial`.
+`simnav.estimators.models.inertial`.
 """
 
 from __future__ import annotations

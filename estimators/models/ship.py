@@ -4,7 +4,8 @@ State: latitude and longitude; forward speed u through the water; heading psi; t
 and, as the datasheets ask for them, a bias for each compass and log and a scale factor for each log. Motion:
 
 - p' = u (cos psi, sin psi) + c
-- u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases after `estimators.models.base.gauss_markov`
+- u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases after
+  `simnav.estimators.models.base.gauss_markov`
 
 Speed and heading as states, with log and compass as measurements of them, let their biases be found while there is GNSS
 and carry the position through an outage. Height, roll and pitch are not estimated; a lever arm is turned by the heading
@@ -22,9 +23,10 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov
-from estimators.models.measurements import wrap
-from estimators.models.ship_kernels import (
+from simnav.estimator import UnsuitableScenario
+from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov
+from simnav.estimators.models.measurements import wrap
+from simnav.estimators.models.ship_kernels import (
     BODY_VELOCITY,
     HEADING,
     LOG,
@@ -39,7 +41,6 @@ from estimators.models.ship_kernels import (
     describe_ship,
     observe_ship,
 )
-from simnav.estimator import UnsuitableScenario
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["HEADING_KINDS", "POSITION_KINDS", "E", "N", "ShipModel", "require_ship_aids"]
@@ -83,7 +84,7 @@ class ShipModel(ErrorModel):
     decay, density : (n,) array
         Inverse of the correlation times [1/s], and noise densities.
     aids : dict of str to (3,) array of int, (7,) array, int
-        The instruments observed, as `estimators.models.ship_kernels` has them, and their number of components.
+        The instruments observed, as `simnav.estimators.models.ship_kernels` has them, and their number of components.
     bias_at, scale_at : dict of str to int
         Index in the state of an instrument's first bias, and of its scale factor.
     """
@@ -210,7 +211,7 @@ class ShipModel(ErrorModel):
 
 
 def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
-    """Kind and numbers of an instrument, for the kernels (`estimators.models.ship_kernels`)."""
+    """Kind and numbers of an instrument, for the kernels (`simnav.estimators.models.ship_kernels`)."""
     lx, ly, lz = sheet.lever_arm.tolist()
     fast = sheet.correlation_time < 0.5 / sheet.rate
     white = sheet.sigma**2 + (sheet.bias_instability**2 if fast else 0.0)

@@ -15,9 +15,11 @@ from math import atan2, cos, sin
 
 import numpy as np
 
-from estimators.models.chain import Chain
-from estimators.models.ship import ShipModel
-from estimators.models.ship_kernels import (
+from simnav.compiled import kernel
+from simnav.earth import radii_scalar
+from simnav.estimators.models.chain import Chain
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.ship_kernels import (
     E,
     N,
     decay_of,
@@ -28,8 +30,6 @@ from estimators.models.ship_kernels import (
     shift_ship,
     steps_of,
 )
-from simnav.compiled import kernel
-from simnav.earth import radii_scalar
 from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["ShipChain"]

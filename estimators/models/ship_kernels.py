@@ -3,7 +3,7 @@
 The state is a position (latitude, longitude, height) and a vector x of n numbers: those at the indices `U` to `CE`,
 then biases and scale factors; x[0] and x[1] are zero, or metres north and east of the position where many states share
 it.
-Equations and sources are those of `estimators.models.ship`.
+Equations and sources are those of `simnav.estimators.models.ship`.
 
 An instrument is a row of three integers (one of the kinds `POSITION` to `BODY_VELOCITY`; index of its first bias and of
 its scale factor, or -1) and a row of seven numbers: forward and starboard lever arm; variance of its two components;

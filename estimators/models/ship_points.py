@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.models.points import PointModel
-from estimators.models.ship import HEADING_KINDS, ShipModel
-from estimators.models.ship_kernels import move_ships, read_ships
+from simnav.estimators.models.points import PointModel
+from simnav.estimators.models.ship import HEADING_KINDS, ShipModel
+from simnav.estimators.models.ship_kernels import move_ships, read_ships
 from simnav.types import Array, Measurement
 
 __all__ = ["ShipPoints"]

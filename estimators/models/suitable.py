@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from estimators.models.inertial import InertialModel
-from estimators.models.ship import ShipModel, require_ship_aids
 from simnav.estimator import UnsuitableScenario
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.ship import ShipModel, require_ship_aids
 from simnav.types import Instruments
 
 __all__ = ["model_for", "require_inertial_aids"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
-from estimators.models.measurements import plausible
+from simnav.estimators.models.measurements import plausible
 from simnav.types import Instruments, Measurement, Measurements
 
 __all__ = ["LATE", "Admission"]

@@ -44,12 +44,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.adaptations.base import Adaptation
-from estimators.models.base import Observation
-from estimators.models.inertial import InertialModel
-from estimators.models.propagation import propagate_covariance
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import UnsuitableScenario
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.models.base import Observation
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.propagation import propagate_covariance
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["FederatedEstimator"]

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from estimators.solvers.smoother import smoother_gains
-from estimators.solvers.window import WindowEstimator
+from simnav.estimators.solvers.smoother import smoother_gains
+from simnav.estimators.solvers.window import WindowEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 __all__ = ["FullGraph"]
@@ -78,7 +78,7 @@ class FullGraph(WindowEstimator):
         return NavigationStates(times, *series)
 
     def _smoothed_covariances(self) -> Array:
-        """Of all nodes, from all measurements (`estimators.solvers.smoother`)."""
+        """Of all nodes, from all measurements (`simnav.estimators.solvers.smoother`)."""
         motions = self.chain.motions
         count = len(self.chain.nodes)
         predicted, filtered = self.chain.nodes["predicted"], self.chain.nodes["filtered"]

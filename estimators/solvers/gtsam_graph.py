@@ -1,11 +1,11 @@
 """The inertial navigation graph for GTSAM: nodes, factors, and the conversion of what comes out.
 
 A node is a pose (body to `TangentFrame`), a velocity and a bias, GTSAM's variables x, v, b; between nodes there is one
-`CombinedImuFactor` (`estimators.solvers.gtsam_preintegration`).
+`CombinedImuFactor` (`simnav.estimators.solvers.gtsam_preintegration`).
 
 Aids: `GPSFactorArm` for GNSS positions. For all others GTSAM has nothing that fits; they are `CustomFactor` with the
-measurement models of `estimators.models.measurements`, of 15 states: biases, scale factor and misalignment of the aids
-count as white noise. Their Jacobian is converted by the frame's error map.
+measurement models of `simnav.estimators.models.measurements`, of 15 states: biases, scale factor and misalignment of
+the aids count as white noise. Their Jacobian is converted by the frame's error map.
 
 A custom factor calls Python each time that it is linearised, for 17 us. The alternative is a container of the factor as
 it was linearised at first (`LinearContainerFactor`). Measured in the open sea it saves nothing, for few factors are
@@ -21,12 +21,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from estimators.models.base import Linearised
-from estimators.models.inertial import InertialModel
-from estimators.models.measurements import observe_inertial
-from estimators.solvers.gtsam_preintegration import Preintegration
-from estimators.solvers.tangent_frame import TangentFrame, tangent_state
 from simnav.compiled import kernel
+from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.measurements import observe_inertial
+from simnav.estimators.solvers.gtsam_preintegration import Preintegration
+from simnav.estimators.solvers.tangent_frame import TangentFrame, tangent_state
 from simnav.rotation import rpy_from_dcm
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
@@ -51,7 +51,7 @@ def observe_tangent(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     code, arm, value
-        As in `estimators.models.measurements.observe_inertial`.
+        As in `simnav.estimators.models.measurements.observe_inertial`.
     origin, axes : arrays
         Of the frame.
     rotation : (3, 3) array

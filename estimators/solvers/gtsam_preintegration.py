@@ -26,9 +26,9 @@ from typing import Any
 
 import numpy as np
 
-from estimators.models.propagation import HELD_ATTITUDE, HELD_VELOCITY, TURN_TIME, next_stretch
-from estimators.solvers.tangent_frame import TangentFrame
 from simnav.compiled import kernel
+from simnav.estimators.models.propagation import HELD_ATTITUDE, HELD_VELOCITY, TURN_TIME, next_stretch
+from simnav.estimators.solvers.tangent_frame import TangentFrame
 from simnav.rotation import cross
 from simnav.types import Array, ImuSamples
 
@@ -55,7 +55,7 @@ def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, n
     Parameters
     ----------
     clock : (15,) array
-        As of `estimators.models.propagation.advance_inertial`, but for the seconds held; updated.
+        As of `simnav.estimators.models.propagation.advance_inertial`, but for the seconds held; updated.
     memory : (6,) array
         Angle and velocity increment of the last whole sample; updated.
     bias : (6,) array
@@ -115,7 +115,7 @@ class Preintegration:
     Parameters
     ----------
     densities : (9,) array
-        As in `estimators.models.propagation.accumulate_error`.
+        As in `simnav.estimators.models.propagation.accumulate_error`.
     variance : (6,) array
         Initial variances of the biases, gyroscopes first.
     frame : TangentFrame

@@ -28,10 +28,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from estimators.models.suitable import require_inertial_aids
-from estimators.solvers.admission import LATE, Admission
-from estimators.solvers.gtsam_graph import InertialGraph, Observation
 from simnav.estimator import Estimator
+from simnav.estimators.models.suitable import require_inertial_aids
+from simnav.estimators.solvers.admission import LATE, Admission
+from simnav.estimators.solvers.gtsam_graph import InertialGraph, Observation
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 __all__ = ["BatchEstimator", "FixedLagEstimator", "GncEstimator", "GtsamEstimator", "Isam2Estimator"]

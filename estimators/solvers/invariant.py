@@ -40,9 +40,9 @@ from typing import Literal
 
 import numpy as np
 
-from estimators.adaptations.base import Adaptation
-from estimators.models.inertial import InertialModel
-from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.rotation import left_jacobian, skew
 from simnav.types import Array
 

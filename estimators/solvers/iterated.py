@@ -21,10 +21,10 @@ from math import sqrt
 
 import numpy as np
 
-from estimators.adaptations.base import Adaptation, Innovation
-from estimators.models.base import ErrorModel
-from estimators.solvers.joseph import joseph_update
-from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.solvers.joseph import joseph_update
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.rotation import left_jacobian
 from simnav.types import Array, Measurement
 

@@ -30,8 +30,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators.models.base import Linearised
-from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.models.base import Linearised
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["LinearKalmanEstimator"]

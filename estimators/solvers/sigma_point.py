@@ -24,8 +24,8 @@ Choices (``ALGORITHMS.md`` leaves them open; paper 000 compares with a UKF and g
   motion lack the process noise, and the innovation's covariance would lack H Q H'.
 - They are drawn once between measurements, not at every IMU sample: the motion of minutes is nearly linear in its
   errors, and the RMSE is the same.
-- The update of the covariance is Joseph's (`estimators.solvers.joseph.joseph_update`), and the square root accepts a
-  semi-definite matrix, so that a state known exactly does no harm.
+- The update of the covariance is Joseph's (`simnav.estimators.solvers.joseph.joseph_update`), and the square root
+  accepts a semi-definite matrix, so that a state known exactly does no harm.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from math import sqrt
 
 import numpy as np
 
-from estimators.adaptations.base import Adaptation
-from estimators.models.base import Observation
-from estimators.models.points import PointModel
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.models.base import Observation
+from simnav.estimators.models.points import PointModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 __all__ = ["SigmaPointEstimator", "draw_points"]

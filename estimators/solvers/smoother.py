@@ -18,7 +18,7 @@ The gain is solved for in units of the predicted sigmas, which keeps metres and 
 
 Source: H. E. Rauch, F. Tung and C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal
 3(8), 1965. The forward-backward smoothing of paper 004 (eqs. 24-25) is the same estimate in two-filter form
-(`estimators.solvers.two_filter`), which is its test.
+(`simnav.estimators.solvers.two_filter`), which is its test.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 __all__ = ["SmoothingEstimator", "Stretches", "scale_of", "smoother_gains"]

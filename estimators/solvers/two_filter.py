@@ -13,9 +13,9 @@ result instead: every measurement then counts twice, and the smoother promises u
 
 Both filters share one linearisation, the forward filter's: what it saw of each measurement (innovation, H, R) and of
 each stretch (Phi, and Q as what M has beyond Phi P Phi'). So the result equals the Rauch-Tung-Striebel smoother's
-(`estimators.solvers.smoother`) to rounding. The backward filter's state is delta, truth minus the forward filter's
-estimate, known as ``U delta = z + noise`` of unit covariance: the square root of its information, which need not be
-regular and loses no digits. Backward,
+(`simnav.estimators.solvers.smoother`) to rounding. The backward filter's state is delta, truth minus the forward
+filter's estimate, known as ``U delta = z + noise`` of unit covariance: the square root of its information, which need
+not be regular and loses no digits. Backward,
 
 - over a correction d of the forward filter, ``z += U d``: the estimate before it differs by d
 - a measurement adds the rows ``L^-1 H delta = L^-1 r``, with R = L L'
@@ -37,11 +37,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimators.adaptations.base import Adaptation, Innovation
-from estimators.models.base import Linearised
-from estimators.solvers.joseph import joseph_update
-from estimators.solvers.smoother import SmoothingEstimator, Stretches, scale_of
 from simnav.estimator import UnsuitableScenario
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.models.base import Linearised
+from simnav.estimators.solvers.joseph import joseph_update
+from simnav.estimators.solvers.smoother import SmoothingEstimator, Stretches, scale_of
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 __all__ = ["TwoFilterEstimator"]

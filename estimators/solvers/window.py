@@ -1,12 +1,12 @@
 """A sliding window: the newest states are estimated together, anew at every step, by Gauss-Newton.
 
-Every time of a measurement is a node of the graph (`estimators.models.chain`), every measurement and every stretch of
-motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares: linearise,
-weigh, solve (`estimators.solvers.block_tridiagonal`), retract, until the next step would be small. A step that raises
-the cost is taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what they say of the
-node that is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L. Matthies, G. Sukhatme,
-"Sliding window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So nothing is lost but
-the freedom to linearise or weigh it anew, and a window of one epoch is an iterated EKF.
+Every time of a measurement is a node of the graph (`simnav.estimators.models.chain`), every measurement and every
+stretch of motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares:
+linearise, weigh, solve (`simnav.estimators.solvers.block_tridiagonal`), retract, until the next step would be small. A
+step that raises the cost is taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what
+they say of the node that is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L.
+Matthies, G. Sukhatme, "Sliding window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So
+nothing is lost but the freedom to linearise or weigh it anew, and a window of one epoch is an iterated EKF.
 
 An epoch's first step takes the older nodes as they were eliminated in the last one, as incremental smoothing does
 (M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", Int. J. Robotics Research 31(2),
@@ -35,12 +35,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimators.adaptations.base import Adaptation, Innovation
-from estimators.adaptations.weighting import Factors, Weighting
-from estimators.models.chain import Chain
-from estimators.solvers.admission import Admission
-from estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 from simnav.estimator import Estimator
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.weighting import Factors, Weighting
+from simnav.estimators.models.chain import Chain
+from simnav.estimators.solvers.admission import Admission
+from simnav.estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["WindowEstimator"]

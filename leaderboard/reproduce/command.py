@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from leaderboard.console import Output, UserError, absolute, mistakes, sentence, session
-from leaderboard.reproduce import PAPERS
+from simnav.leaderboard.console import Output, UserError, absolute, mistakes, sentence, session
+from simnav.leaderboard.reproduce import PAPERS
 
 if TYPE_CHECKING:
-    from leaderboard.campaign import Progress
+    from simnav.leaderboard.campaign import Progress
 
 __all__ = ["register", "run"]
 
@@ -46,11 +46,11 @@ def run(
     out: Output, key: str, runs: int | None, output: Path | None, workers: int, methods: Sequence[str] = ()
 ) -> None:
     """Reproduce a paper and show it; all of it, or what is about some of its methods."""
-    from leaderboard.campaign import CampaignError
-    from leaderboard.reproduce import figures, page, paper, report
-    from leaderboard.reproduce.comparison import RULES
-    from leaderboard.reproduce.reproduction import reproduce
-    from leaderboard.store import StoreError
+    from simnav.leaderboard.campaign import CampaignError
+    from simnav.leaderboard.reproduce import figures, page, paper, report
+    from simnav.leaderboard.reproduce.comparison import RULES
+    from simnav.leaderboard.reproduce.reproduction import reproduce
+    from simnav.leaderboard.store import StoreError
 
     with mistakes(ValueError):
         chosen = paper.load(key)

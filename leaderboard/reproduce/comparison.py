@@ -26,7 +26,7 @@ from typing import Literal
 
 import numpy as np
 
-from leaderboard.reproduce.paper import Range, Rule
+from simnav.leaderboard.reproduce.paper import Range, Rule
 
 __all__ = [
     "FEWEST",

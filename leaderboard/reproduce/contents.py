@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from leaderboard.reproduce.paper import Paper
+    from simnav.leaderboard.reproduce.paper import Paper
 
 __all__ = ["Item", "contents"]
 
@@ -39,7 +39,7 @@ def contents(paper: Paper) -> list[Item]:
 
     Examples
     --------
-    >>> from leaderboard.reproduce.paper import load
+    >>> from simnav.leaderboard.reproduce.paper import load
     >>> [i.number for i in contents(load("001"))][:3]
     ['Table 1', 'Table 2', 'Table 3']
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from leaderboard.figures import (
+from simnav.leaderboard.figures import (
     GREY,
     INK,
     PAPER,

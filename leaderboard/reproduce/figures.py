@@ -1,4 +1,4 @@
-"""The papers' figures, drawn from our runs: each entry of a paper (`leaderboard.reproduce.paper.Figure`) becomes a PNG.
+"""The papers' figures from our runs: each one of a paper (`simnav.leaderboard.reproduce.paper.Figure`) becomes a PNG.
 
 Figures of one run show the first seed, which is run again for them: results do not hold what they need.
 """
@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from leaderboard.charts import fixes, outage_spans, relative_track, true_track
-from leaderboard.figures import Band, Curve, Style, error_cdf, error_over_time, save, trajectory
-from leaderboard.reproduce.comparison import Interval, mean, mean_ratio
-from leaderboard.reproduce.drawing import Bar, bars, curves_over_time
-from leaderboard.reproduce.measures import value_of
-from leaderboard.reproduce.paper import Figure, Gain, Range, Value
-from leaderboard.summary import Runs
+from simnav.leaderboard.charts import fixes, outage_spans, relative_track, true_track
+from simnav.leaderboard.figures import Band, Curve, Style, error_cdf, error_over_time, save, trajectory
+from simnav.leaderboard.reproduce.comparison import Interval, mean, mean_ratio
+from simnav.leaderboard.reproduce.drawing import Bar, bars, curves_over_time
+from simnav.leaderboard.reproduce.measures import value_of
+from simnav.leaderboard.reproduce.paper import Figure, Gain, Range, Value
+from simnav.leaderboard.summary import Runs
 from simnav.types import Array
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     import matplotlib.figure
 
-    from leaderboard.campaign import EstimatorRequest
-    from leaderboard.reproduce.reproduction import Reproduction
+    from simnav.leaderboard.campaign import EstimatorRequest
+    from simnav.leaderboard.reproduce.reproduction import Reproduction
     from simnav.recording import Recording
     from simnav.trial import Trial
 
@@ -177,7 +177,7 @@ class _Sketch:
 
     def _trial(self, scenario: str, method: str) -> Trial | None:
         """A method's run of the first seed, in a process of its own; None where it is not there or gives nothing."""
-        from leaderboard.isolation import isolate
+        from simnav.leaderboard.isolation import isolate
 
         request = self.found.stands_for[method]
         if request is None:

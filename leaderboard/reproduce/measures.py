@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from leaderboard.result import Result
+    from simnav.leaderboard.result import Result
 
 __all__ = ["Measure", "measure", "value_of"]
 

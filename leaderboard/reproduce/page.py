@@ -9,15 +9,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard.console import plain
-from leaderboard.pages import STATIC, TEMPLATES, environment
-from leaderboard.reproduce import PAPERS
-from leaderboard.reproduce.comparison import RULES
-from leaderboard.reproduce.report import NUMERIC, contents_rows, sheets, summary
+from simnav.leaderboard.console import plain
+from simnav.leaderboard.pages import STATIC, TEMPLATES, environment
+from simnav.leaderboard.reproduce import PAPERS
+from simnav.leaderboard.reproduce.comparison import RULES
+from simnav.leaderboard.reproduce.report import NUMERIC, contents_rows, sheets, summary
 
 if TYPE_CHECKING:
-    from leaderboard.reproduce.figures import Drawn
-    from leaderboard.reproduce.reproduction import Reproduction
+    from simnav.leaderboard.reproduce.figures import Drawn
+    from simnav.leaderboard.reproduce.reproduction import Reproduction
 
 __all__ = ["find", "install", "write"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Literal
 
-from leaderboard.reproduce import PAPERS
+from simnav.leaderboard.reproduce import PAPERS
 from simnav.scenario import Scenario
 from simnav.scenario import load as load_scenario
 
@@ -87,7 +87,7 @@ class Value:
     scenario, method : str
         A scenario of the catalogue, or one of the paper's variants; a name of the paper's methods.
     score : str
-        Name of a measure (`leaderboard.reproduce.measures`).
+        Name of a measure (`simnav.leaderboard.reproduce.measures`).
     paper : float, pair of float or None
         In the measure's unit; None where the paper has no figure: ours is shown all the same.
     rule : str
@@ -171,9 +171,9 @@ class Figure:
     methods : tuple of str
         For ``gains`` the first is the one that is compared with each of the others.
     series : mapping of str to str
-        Label of each panel, with its unit -> what is in it. ``run``: an error (`leaderboard.reproduce.figures.ERRORS`)
-        or a diagnostic (``weight.gnss``; a ``sigma_...`` gets the true one beside it). ``spread``: a series of the
-        results (`simnav.scoring.series`). ``bars``, ``gains``: a measure.
+        Label of each panel, with its unit -> what is in it. ``run``: an error
+        (`simnav.leaderboard.reproduce.figures.ERRORS`) or a diagnostic (``weight.gnss``; a ``sigma_...`` gets the true
+        one beside it). ``spread``: a series of the results (`simnav.scoring.series`). ``bars``, ``gains``: a measure.
     part : str
         Tells several figures of the same number apart.
     """
@@ -303,6 +303,6 @@ def load(key: str) -> Paper:
     """
     if key not in PAPERS:
         raise ValueError(f"there is no paper {key!r}; there are {', '.join(PAPERS)}")
-    paper = import_module(f"leaderboard.reproduce.paper_{key}").PAPER
+    paper = import_module(f"simnav.leaderboard.reproduce.paper_{key}").PAPER
     assert isinstance(paper, Paper)
     return paper

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from leaderboard.reproduce.paper import ATTITUDE, POSITION, VELOCITY, Figure, Gain, Left, Method, Paper, Table, Value
+from simnav.leaderboard.reproduce.paper import (
+    ATTITUDE,
+    POSITION,
+    VELOCITY,
+    Figure,
+    Gain,
+    Left,
+    Method,
+    Paper,
+    Table,
+    Value,
+)
 
 __all__ = ["PAPER"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from leaderboard.reproduce.paper import POSITION, Figure, Gain, Left, Method, Paper, Row, Table, Value
+from simnav.leaderboard.reproduce.paper import POSITION, Figure, Gain, Left, Method, Paper, Row, Table, Value
 
 __all__ = ["PAPER"]
 

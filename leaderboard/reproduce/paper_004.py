@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from leaderboard.reproduce.paper import (
+from simnav.leaderboard.reproduce.paper import (
     ATTITUDE,
     HORIZONTAL,
     HORIZONTAL_VELOCITY,

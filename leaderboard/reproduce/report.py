@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from leaderboard import tables
-from leaderboard.reproduce.contents import contents
-from leaderboard.reproduce.measures import measure
-from leaderboard.reproduce.paper import Gain, Range
+from simnav.leaderboard import tables
+from simnav.leaderboard.reproduce.contents import contents
+from simnav.leaderboard.reproduce.measures import measure
+from simnav.leaderboard.reproduce.paper import Gain, Range
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from leaderboard.reproduce.figures import Drawn
-    from leaderboard.reproduce.reproduction import Finding, Reproduction
+    from simnav.leaderboard.reproduce.figures import Drawn
+    from simnav.leaderboard.reproduce.reproduction import Finding, Reproduction
 
 __all__ = ["NUMERIC", "Sheet", "contents_rows", "contents_table", "paper_tables", "sheets", "summary", "write_csv"]
 

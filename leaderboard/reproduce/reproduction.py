@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from leaderboard.reproduce.comparison import Interval, Verdict, judge, judge_gain, mean, mean_ratio
-from leaderboard.reproduce.measures import measure, value_of
-from leaderboard.reproduce.paper import Gain, Method, Paper, Row
-from leaderboard.summary import NO_TRIAL
+from simnav.leaderboard.reproduce.comparison import Interval, Verdict, judge, judge_gain, mean, mean_ratio
+from simnav.leaderboard.reproduce.measures import measure, value_of
+from simnav.leaderboard.reproduce.paper import Gain, Method, Paper, Row
+from simnav.leaderboard.summary import NO_TRIAL
 
 if TYPE_CHECKING:
-    from leaderboard.campaign import EstimatorRequest, Progress
-    from leaderboard.result import Result
+    from simnav.leaderboard.campaign import EstimatorRequest, Progress
+    from simnav.leaderboard.result import Result
 
 __all__ = ["Finding", "Reproduction", "find", "find_method", "reproduce"]
 
@@ -121,9 +121,9 @@ def _row_dict(f: Finding) -> dict[str, Any]:
 
 def find_method(method: Method) -> EstimatorRequest | None:
     """The registered estimator that stands for a method; None where there is none yet."""
-    from leaderboard.arguments import split_estimators
-    from leaderboard.campaign import EstimatorRequest
     from simnav.estimator import EstimatorError, make, names
+    from simnav.leaderboard.arguments import split_estimators
+    from simnav.leaderboard.campaign import EstimatorRequest
 
     known = set(names())
     for text in method.rows:
@@ -165,11 +165,11 @@ def reproduce(
 
     Raises
     ------
-    leaderboard.campaign.CampaignError, leaderboard.store.StoreError
-        As `leaderboard.campaign.run_campaign`.
+    simnav.leaderboard.campaign.CampaignError, simnav.leaderboard.store.StoreError
+        As `simnav.leaderboard.campaign.run_campaign`.
     """
-    from leaderboard.campaign import run_campaign
-    from leaderboard.store import load
+    from simnav.leaderboard.campaign import run_campaign
+    from simnav.leaderboard.store import load
 
     stands_for = {m.name: find_method(m) for m in paper.methods}
     seeds, ids, results = range(runs), {}, []

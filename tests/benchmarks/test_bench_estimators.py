@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.ekf import Ekf
 from simnav.estimator import make
+from simnav.estimators.ekf import Ekf
 from simnav.recording import Recording
 from simnav.scenario import parse
 from simnav.source import record

@@ -11,8 +11,8 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from estimators.ship_graphs import ShipFgo, ShipFgoFull
 from simnav.estimator import Estimator, make
+from simnav.estimators.ship_graphs import ShipFgo, ShipFgoFull
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

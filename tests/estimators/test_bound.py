@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from estimators.bound import KINDS, Bound, bound, information
 from simnav.estimator import make
+from simnav.estimators.bound import KINDS, Bound, bound, information
 from simnav.scenario import Scenario, load
 from simnav.scoring import errors, smoothed_errors
 from simnav.scoring.consistency import GROUPS, nees, nees_band

@@ -10,12 +10,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from estimators.adaptations.base import Adaptation, Innovation
-from estimators.ekf import Ekf
-from estimators.models.base import ErrorModel, Linearised
-from estimators.solvers.joseph import joseph_update
-from estimators.solvers.kalman import KalmanEstimator
 from simnav.estimator import UnsuitableScenario, find, make, names
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.ekf import Ekf
+from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.solvers.joseph import joseph_update
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.truth import FisherNoise, MixtureNoise, TrueNoise, fisher_information
 from simnav.estimator import find, make
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.truth import FisherNoise, MixtureNoise, TrueNoise, fisher_information
 from simnav.recording import AidStream, FaultLabel
 from simnav.scenario import Scenario, load
 from simnav.scoring import errors

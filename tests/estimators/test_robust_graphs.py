@@ -183,7 +183,7 @@ def test_ships_without_an_imu(recording_of, name: str):
 
 
 def test_the_paper_has_nine_states():
-    from estimators.robust_graphs import GaFgoPaper, SwFgoPaper
+    from simnav.estimators.robust_graphs import GaFgoPaper, SwFgoPaper
 
     for row in (SwFgoPaper(), GaFgoPaper()):
         assert row.tolerance == 1e-6

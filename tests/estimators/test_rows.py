@@ -9,10 +9,10 @@ import pytest
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from estimators.dead_reckoning import DeadReckoning
-from estimators.filterpy_adapter import FilterpyEstimator
 from simnav.check import check
 from simnav.estimator import UnsuitableScenario, make, names
+from simnav.estimators.dead_reckoning import DeadReckoning
+from simnav.estimators.filterpy_adapter import FilterpyEstimator
 from simnav.recording import FaultLabel
 from simnav.scenario import load
 from simnav.source import record
@@ -159,7 +159,7 @@ def test_the_oracle_weighs_a_noise_step():
     oracle.reset(recording.start, recording.instruments)
     name, stream = next((n, s) for n, s in recording.data.aids.items() if s.faults.any())
     k = int(np.flatnonzero(stream.faults)[0])
-    from estimators.adaptations.base import Innovation
+    from simnav.estimators.adaptations.base import Innovation
     from simnav.types import Measurement
 
     d = stream.value.shape[1]

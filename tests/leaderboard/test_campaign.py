@@ -17,9 +17,9 @@ from typing import Any
 
 import pytest
 
-from leaderboard import campaign, store
-from leaderboard.campaign import CampaignError, EstimatorRequest, Progress, run_campaign
-from leaderboard.store import Result, StoreError
+from simnav.leaderboard import campaign, store
+from simnav.leaderboard.campaign import CampaignError, EstimatorRequest, Progress, run_campaign
+from simnav.leaderboard.store import Result, StoreError
 from simnav.scenario import Scenario, load, parse
 from simnav.warmup import warmup
 
@@ -163,7 +163,7 @@ def test_one_worker_and_two_give_the_same_and_a_second_start_does_nothing(tmp_pa
 RUN = """
 import sys
 from pathlib import Path
-from leaderboard.campaign import EstimatorRequest, run_campaign
+from simnav.leaderboard.campaign import EstimatorRequest, run_campaign
 from simnav.scenario import load
 
 def main(folder, results, seeds):

@@ -14,9 +14,9 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from leaderboard import arguments, cli
-from leaderboard.console import Output, Progress, UserError, plain
 from simnav import estimator
+from simnav.leaderboard import arguments, cli
+from simnav.leaderboard.console import Output, Progress, UserError, plain
 
 SCENARIO = """
 name = "pond"
@@ -422,7 +422,7 @@ def test_estimators_are_split_with_their_parameters():
 
 def entry(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """The command as the console script starts it, in a process of its own."""
-    code = "import sys; from leaderboard.cli import main; sys.argv[0] = 'simnav'; main()"
+    code = "import sys; from simnav.leaderboard.cli import main; sys.argv[0] = 'simnav'; main()"
     # No -c: like a console script, it does not search the working directory; PYTHONPATH with an empty entry does.
     script = cwd.parent / "simnav-script.py"
     script.write_text(code)

@@ -9,8 +9,8 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from leaderboard import figures
-from leaderboard.figures import PALETTE, Band, Curve, Dot, Style, Track
+from simnav.leaderboard import figures
+from simnav.leaderboard.figures import PALETTE, Band, Curve, Dot, Style, Track
 
 TIME = np.linspace(1.0, 1200.0, 240)
 LABELS = ["ekf", "dead-reckoning", "oracle"]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from leaderboard import fingerprint
-from leaderboard.fingerprint import digest, estimator_source, recording_digest, simulator_version, variant
 from simnav import estimator
 from simnav.estimator import find
+from simnav.leaderboard import fingerprint
+from simnav.leaderboard.fingerprint import digest, estimator_source, recording_digest, simulator_version, variant
 from simnav.scenario import Scenario, load
 
 FILE = """
@@ -105,18 +105,20 @@ def test_an_installed_package_counts_as_a_whole(folder: Path, monkeypatch: pytes
 
 
 def test_our_own_estimators_share_their_sources() -> None:
-    import estimators
+    import simnav.estimators
 
     assert estimator_source(find("pure-inertial")) == estimator_source(find("ekf"))
-    assert Path(estimators.__file__).parent.name == "estimators"
+    assert Path(simnav.estimators.__file__).parent.name == "estimators"
 
 
 def test_building_on_our_estimators_makes_them_count(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mine = write(folder / "fp_ours.py", imports="from estimators.ekf import Ekf")
+    mine = write(folder / "fp_ours.py", imports="from simnav.estimators.ekf import Ekf")
     alone = write(folder / "fp_not_ours.py", "Alone")
     before = [estimator_source(find(str(p))) for p in (mine, alone)]
     original = fingerprint._installed_digest
-    monkeypatch.setattr(fingerprint, "_installed_digest", lambda p: original(p) + ("*" if p == "estimators" else ""))
+    monkeypatch.setattr(
+        fingerprint, "_installed_digest", lambda p: original(p) + ("*" if p == "simnav.estimators" else "")
+    )
     after = [estimator_source(find(str(p))) for p in (mine, alone)]
     assert [a != b for a, b in zip(before, after, strict=True)] == [True, False]
 

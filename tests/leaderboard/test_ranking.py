@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from leaderboard.ranking import WORST, Ranking, ScenarioRow, rank
-from leaderboard.ranking_table import score_caption
-from leaderboard.result import Result
+from simnav.leaderboard.ranking import WORST, Ranking, ScenarioRow, rank
+from simnav.leaderboard.ranking_table import score_caption
+from simnav.leaderboard.result import Result
 
 
 def result(scenario: str, estimator: str, seed: int, rmse: float, **fields: Any) -> Result:

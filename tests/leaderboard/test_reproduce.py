@@ -14,20 +14,20 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from leaderboard.cli import app
-from leaderboard.figures import Style
-from leaderboard.reproduce import PAPERS, paper_001
-from leaderboard.reproduce import paper as papers
-from leaderboard.reproduce.comparison import Interval, judge, judge_gain, mean, mean_ratio
-from leaderboard.reproduce.contents import contents
-from leaderboard.reproduce.drawing import Bar, bars, broken
-from leaderboard.reproduce.figures import ERRORS
-from leaderboard.reproduce.measures import measure, value_of
-from leaderboard.reproduce.page import find as find_pages
-from leaderboard.reproduce.paper import Figure, Gain, Left, Method, Paper, Table, Value
-from leaderboard.reproduce.report import paper_tables, summary, write_csv
-from leaderboard.reproduce.reproduction import Reproduction, find, find_method
-from leaderboard.result import Result
+from simnav.leaderboard.cli import app
+from simnav.leaderboard.figures import Style
+from simnav.leaderboard.reproduce import PAPERS, paper_001
+from simnav.leaderboard.reproduce import paper as papers
+from simnav.leaderboard.reproduce.comparison import Interval, judge, judge_gain, mean, mean_ratio
+from simnav.leaderboard.reproduce.contents import contents
+from simnav.leaderboard.reproduce.drawing import Bar, bars, broken
+from simnav.leaderboard.reproduce.figures import ERRORS
+from simnav.leaderboard.reproduce.measures import measure, value_of
+from simnav.leaderboard.reproduce.page import find as find_pages
+from simnav.leaderboard.reproduce.paper import Figure, Gain, Left, Method, Paper, Table, Value
+from simnav.leaderboard.reproduce.report import paper_tables, summary, write_csv
+from simnav.leaderboard.reproduce.reproduction import Reproduction, find, find_method
+from simnav.leaderboard.result import Result
 from simnav.scenario import load
 from simnav.scoring import SCORES
 
@@ -419,7 +419,7 @@ def tiny(tmp_path, monkeypatch):
         left=(Left("Figure 7", "The pond", "a photograph"),),
         notes=("One note.",),
     )
-    monkeypatch.setattr("leaderboard.reproduce.paper.load", lambda key: paper)
+    monkeypatch.setattr("simnav.leaderboard.reproduce.paper.load", lambda key: paper)
     return tmp_path
 
 

@@ -12,11 +12,11 @@ from urllib.parse import unquote, urlparse
 import numpy as np
 import pytest
 
-from leaderboard import ranking, site
-from leaderboard.console import UserError
-from leaderboard.export import SCHEMA_VERSION
-from leaderboard.result import Result
-from leaderboard.summary import Runs, group, interval_of_median
+from simnav.leaderboard import ranking, site
+from simnav.leaderboard.console import UserError
+from simnav.leaderboard.export import SCHEMA_VERSION
+from simnav.leaderboard.result import Result
+from simnav.leaderboard.summary import Runs, group, interval_of_median
 from simnav.scoring import SCORES
 
 HOSTILE = '"><script>alert(1)</script> & {{ 7 * 7 }}/../x'

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from leaderboard.statistics import bootstrap_means, holm, interquartile_mean, interval, stratified_test, tiers
+from simnav.leaderboard.statistics import bootstrap_means, holm, interquartile_mean, interval, stratified_test, tiers
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from leaderboard import store
-from leaderboard.store import Result, StoreError, StoreWarning
+from simnav.leaderboard import store
+from simnav.leaderboard.store import Result, StoreError, StoreWarning
 
 
 def result(seed: int, label: str = "ekf", scenario: str = "bay-v1", recording: str = "r1", **changes: Any) -> Result:

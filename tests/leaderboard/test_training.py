@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from estimators.adaptations import anfis_training
-from estimators.adaptations.anfis_file import FEATURES, Parameters
-from leaderboard import cli
-from leaderboard.training import _Features
-from leaderboard.training_figures import LABELS
 from simnav.estimator import make
+from simnav.estimators.adaptations import anfis_training
+from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
+from simnav.leaderboard import cli
+from simnav.leaderboard.training import _Features
+from simnav.leaderboard.training_figures import LABELS
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

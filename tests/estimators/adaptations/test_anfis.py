@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimators.adaptations.anfis import Anfis, Features, Motion
-from estimators.adaptations.anfis_file import FEATURES, Parameters, ParametersError, shipped
-from estimators.adaptations.anfis_training import (
+from simnav.earth import relative_position
+from simnav.estimator import make
+from simnav.estimators.adaptations.anfis import Anfis, Features, Motion
+from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters, ParametersError, shipped
+from simnav.estimators.adaptations.anfis_training import (
     FIRST_TRAINING_SEED,
     FIRST_VALIDATION_SEED,
     gather,
@@ -20,12 +22,10 @@ from estimators.adaptations.anfis_training import (
     scenarios,
     train,
 )
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.sugeno import Sugeno
-from estimators.models.inertial import InertialModel
-from estimators.solvers.kalman import KalmanEstimator
-from simnav.earth import relative_position
-from simnav.estimator import make
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.scenario import load, parse
 from simnav.scoring import score
 from simnav.source import record
@@ -150,7 +150,7 @@ def test_it_works_without_compass_and_log_and_in_three_dimensions(recording_of):
 @pytest.mark.parametrize("features", ["innovation", "recent"])
 def test_a_noise_step_raises_sigma(name: str, features: str):
     """Sixfold noise: the sigma in use grows with it, and comes back."""
-    text = resources.files("scenarios").joinpath("ship-dead-reckoning.toml").read_text(encoding="utf-8")
+    text = resources.files("simnav.scenarios").joinpath("ship-dead-reckoning.toml").read_text(encoding="utf-8")
     scenario = parse(text[: text.index("[[fault]]")].replace("ship-dead-reckoning", "ship-noise-step") + NOISE_STEP)
     recording = record(scenario, 0)
     trial = run_trial(make(name, features=features), recording)
@@ -207,9 +207,9 @@ def test_the_target_is_the_variance_that_the_fixes_had():
 
 def test_seeds_of_training_and_validation_are_never_scored():
     """Campaigns, papers and bounds count from zero, by hundreds at most."""
-    from leaderboard import cli
-    from leaderboard.reproduce import PAPERS
-    from leaderboard.reproduce.paper import load as load_paper
+    from simnav.leaderboard import cli
+    from simnav.leaderboard.reproduce import PAPERS
+    from simnav.leaderboard.reproduce.paper import load as load_paper
 
     scored = max(cli._RUNS, cli._QUICK_RUNS, *(load_paper(key).full for key in PAPERS))
     for features in FEATURES:
@@ -227,7 +227,7 @@ def test_shipped_files_are_in_the_package_and_have_the_score_that_they_say():
     first, last = record_["validation_seeds"]
     data = gather(range(first, last + 1))
     for features in FEATURES:
-        file = resources.files("estimators.adaptations").joinpath(f"anfis_{features}.json")
+        file = resources.files("simnav.estimators.adaptations").joinpath(f"anfis_{features}.json")
         assert file.is_file()
         parameters = Parameters.load(Path(str(file)))
         error = np.sqrt(np.mean((parameters.log_factor(data.inputs[features]) - data.outputs) ** 2))
@@ -242,7 +242,7 @@ def test_shipped_files_are_in_the_package_and_have_the_score_that_they_say():
 
 def test_training_on_little_is_the_same_every_time(monkeypatch, tmp_path: Path):
     """Two voyages: what is learnt is the same, bit for bit, and survives its file."""
-    from estimators.adaptations import anfis_training
+    from simnav.estimators.adaptations import anfis_training
 
     few = scenarios()[1:3]
     monkeypatch.setattr(anfis_training, "scenarios", lambda: few)

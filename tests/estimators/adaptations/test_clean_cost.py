@@ -12,9 +12,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimators.adaptations.base import Adaptation
-from estimators.solvers.window import WindowEstimator
 from simnav.estimator import describe, make, names
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.solvers.window import WindowEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.scoring import score
@@ -29,7 +29,7 @@ def plain(name: str) -> str:
     estimator = make(name)
     attributes = [getattr(estimator, part, None) for part in ("adaptation", "weighting")]
     parts = [*type(estimator).__mro__, *map(type, attributes)]
-    if not any(p.__module__.startswith("estimators.adaptations.") and p is not Adaptation for p in parts):
+    if not any(p.__module__.startswith("simnav.estimators.adaptations.") and p is not Adaptation for p in parts):
         return ""
     window = isinstance(estimator, WindowEstimator)
     model = estimator.chain if window else estimator.model

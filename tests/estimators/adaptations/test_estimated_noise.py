@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.innovation_based import InnovationBased, adaptive_window
-from estimators.adaptations.noise import Posterior
-from estimators.adaptations.sage_husa import SageHusa
-from estimators.adaptations.variational_bayes import VariationalBayes
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.innovation_based import InnovationBased, adaptive_window
+from simnav.estimators.adaptations.noise import Posterior
+from simnav.estimators.adaptations.sage_husa import SageHusa
+from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.types import Datasheet, Instruments, Measurement
 
 GNSS = Instruments((Datasheet("gnss", "gnss_position", 1.0, np.array([1.0, 1.0, 2.0])),))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from estimators.adaptations.imm import _chain, mixture_update
-from estimators.solvers.joseph import joseph_update
 from simnav.estimator import EstimatorError, make
+from simnav.estimators.adaptations.imm import _chain, mixture_update
+from simnav.estimators.solvers.joseph import joseph_update
 
 
 def problem(seed: int, m: int = 3):

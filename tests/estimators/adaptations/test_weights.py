@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from estimators.adaptations.adkf import FACTORS, AdaptiveFactor
-from estimators.adaptations.base import Innovation
-from estimators.adaptations.correntropy import MaximumCorrentropy
-from estimators.adaptations.fading import FadingMemory
-from estimators.adaptations.gating import ChiSquareGate
-from estimators.adaptations.prediction import PredictionTest
-from estimators.adaptations.robust import EquivalentWeights, huber, igg3
+from simnav.estimators.adaptations.adkf import FACTORS, AdaptiveFactor
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.correntropy import MaximumCorrentropy
+from simnav.estimators.adaptations.fading import FadingMemory
+from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.adaptations.robust import EquivalentWeights, huber, igg3
 from simnav.types import Datasheet, Instruments, Measurement
 
 SHEETS = Instruments(

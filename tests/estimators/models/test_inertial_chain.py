@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.models.inertial import InertialModel
-from estimators.models.inertial_chain import InertialChain
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_chain import InertialChain
 from simnav.recording import Recording
 from simnav.rotation import left_jacobian, rotation_vector_from_dcm
 from simnav.scenario import load

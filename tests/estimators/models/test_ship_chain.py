@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimators.models.ship import ShipModel
-from estimators.models.ship_chain import ShipChain
-from estimators.ship_ekf import ShipEkf
-from estimators.ship_graphs import ShipFgo, ShipFgoFull
-from estimators.smoothers import ShipEkfRts
 from simnav import earth
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.ship_chain import ShipChain
+from simnav.estimators.ship_ekf import ShipEkf
+from simnav.estimators.ship_graphs import ShipFgo, ShipFgoFull
+from simnav.estimators.smoothers import ShipEkfRts
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

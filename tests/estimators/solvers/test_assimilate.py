@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.adaptations.base import Adaptation
-from estimators.ekf import Ekf
-from estimators.ekf_presets import Ekf23
-from estimators.models.inertial import InertialModel
-from estimators.solvers.joseph import project
-from estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.ekf import Ekf
+from simnav.estimators.ekf_presets import Ekf23
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.joseph import project
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Measurement
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.models.chain import whitening
-from estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.models.chain import whitening
+from simnav.estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 
 N, COUNT = 5, 6
 

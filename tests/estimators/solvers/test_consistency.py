@@ -5,9 +5,9 @@ without white noise, fed with zeros, delivers its turn-on bias and random walk, 
 own.
 
 The federated filter is exact where it resets and no instrument has states of its own, and is among the others there.
-Elsewhere its covariance is an upper bound (`estimators.solvers.federated`). How far it is above is found by taking the
-covariance of all local filters' errors together, which the filter does not know, through every step that it does; by
-that covariance its errors are in the band, and by its own never above.
+Elsewhere its covariance is an upper bound (`simnav.estimators.solvers.federated`). How far it is above is found by
+taking the covariance of all local filters' errors together, which the filter does not know, through every step that it
+does; by that covariance its errors are in the band, and by its own never above.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimators.federated import Federated, FederatedNoReset
-from estimators.models.propagation import propagate_covariance
 from simnav import earth, rotation
 from simnav.estimator import make
+from simnav.estimators.federated import Federated, FederatedNoReset
+from simnav.estimators.models.propagation import propagate_covariance
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.scoring import nees_band

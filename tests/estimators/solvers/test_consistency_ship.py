@@ -1,9 +1,9 @@
 """Ship filters and their window over 50 seeds on ships that move as their model supposes: ANEES in its 95 % band.
 
-The truth is the motion of `estimators.models.ship` driven by its noise, integrated here ten times a second and from
-random states: speed a random walk, turn rate and current Gauss-Markov, sideways velocity white. The instruments are
-those of the catalogue's ships, with constant biases and scale factor drawn from the datasheet. In the catalogue ships
-keep their course and speed better than that, and the filters are less sure of their velocity than they could be.
+The truth is the motion of `simnav.estimators.models.ship` driven by its noise, integrated here ten times a second and
+from random states: speed a random walk, turn rate and current Gauss-Markov, sideways velocity white. The instruments
+are those of the catalogue's ships, with constant biases and scale factor drawn from the datasheet. In the catalogue
+ships keep their course and speed better than that, and the filters are less sure of their velocity than they could be.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.models.ship import ShipModel
 from simnav import earth, rotation
 from simnav.estimator import make
+from simnav.estimators.models.ship import ShipModel
 from simnav.recording import AidStream, Block, Recording
 from simnav.types import Datasheet, InitialState, Instruments, NavigationStates
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimators.models.inertial import InertialModel
-from estimators.solvers.gtsam_graph import InertialGraph
-from estimators.solvers.gtsam_solvers import FixedLagEstimator
-from estimators.solvers.tangent_frame import TangentFrame
 from simnav import earth, rotation, strapdown
 from simnav.estimator import make
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.gtsam_graph import InertialGraph
+from simnav.estimators.solvers.gtsam_solvers import FixedLagEstimator
+from simnav.estimators.solvers.tangent_frame import TangentFrame
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from estimators.ekf import Ekf
-from estimators.invariant import InvariantEkf
 from simnav import earth
+from simnav.estimators.ekf import Ekf
+from simnav.estimators.invariant import InvariantEkf
 from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm, skew
 from simnav.types import Datasheet, Instruments, Measurement
 

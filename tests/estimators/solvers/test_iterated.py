@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
-from estimators.ekf import Ekf
-from estimators.iterated import IteratedEkf
+from simnav.estimators.ekf import Ekf
+from simnav.estimators.iterated import IteratedEkf
 from simnav.rotation import left_jacobian, rotation_vector_from_dcm, skew
 from simnav.types import Datasheet, Instruments, Measurement, Measurements
 

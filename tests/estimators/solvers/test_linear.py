@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimators.kf import Kf
-from estimators.models.inertial import InertialModel
 from simnav import earth, rotation, strapdown
 from simnav.estimator import make
+from simnav.estimators.kf import Kf
+from simnav.estimators.models.inertial import InertialModel
 from simnav.types import ImuDatasheet, TriadDatasheet
 
 DEG = np.pi / 180.0

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimators.models.base import Linearised
-from estimators.models.inertial import InertialModel
-from estimators.models.inertial_points import InertialPoints
-from estimators.models.points import PointModel
-from estimators.models.ship_points import ShipPoints
-from estimators.solvers.kalman import KalmanEstimator
-from estimators.solvers.sigma_point import SigmaPointEstimator, draw_points
 from simnav import earth, rotation
 from simnav.estimator import EstimatorError, make
+from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_points import InertialPoints
+from simnav.estimators.models.points import PointModel
+from simnav.estimators.models.ship_points import ShipPoints
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.sigma_point import SigmaPointEstimator, draw_points
 from simnav.types import (
     Datasheet,
     Estimate,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.models.base import ErrorModel, Linearised
-from estimators.solvers.kalman import KalmanEstimator
-from estimators.solvers.smoother import SmoothingEstimator, smoother_gains
 from simnav.estimator import make
+from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.smoother import SmoothingEstimator, smoother_gains
 from simnav.scenario import load
 from simnav.scoring import errors
 from simnav.scoring.consistency import GROUPS, nees, nees_band

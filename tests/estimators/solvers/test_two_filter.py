@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimators.adaptations.base import Adaptation
-from estimators.models.inertial import InertialModel
-from estimators.ship_ekf import ShipEkf
-from estimators.solvers.kalman import KalmanEstimator
-from estimators.solvers.smoother import SmoothingEstimator
-from estimators.solvers.two_filter import TwoFilterEstimator
 from simnav import earth
 from simnav.estimator import UnsuitableScenario, make
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.ship_ekf import ShipEkf
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.smoother import SmoothingEstimator
+from simnav.estimators.solvers.two_filter import TwoFilterEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.simulator import simulate

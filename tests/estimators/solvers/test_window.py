@@ -9,12 +9,12 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from estimators.adaptations.gating import ChiSquareGate
-from estimators.adaptations.weighting import Factors, Weighting
-from estimators.models.inertial import InertialModel
-from estimators.sliding_window import InertialWindow
-from estimators.solvers.window import WindowEstimator
 from simnav.estimator import Estimator, find, make, names
+from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.adaptations.weighting import Factors, Weighting
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.sliding_window import InertialWindow
+from simnav.estimators.solvers.window import WindowEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
