@@ -8,7 +8,7 @@ since (``begin_shift``, ``end_shift``), which is all it takes to linearise it an
 (preintegration: C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", IEEE Trans.
 Robotics 33(1), 2017; here about the predicted trajectory and on the rotating Earth).
 
-A subclass compiles three loops over a window: `linearise_motion`, `linearise_aids`, `retract`.
+A subclass compiles four loops over a window: `linearise_motion`, `linearise_aids`, `retract`, `along_motion`.
 """
 
 from __future__ import annotations
@@ -338,6 +338,15 @@ class Chain(ABC):
     @abstractmethod
     def retract(self, step: Array) -> None:
         """Add a (K, n) step to the nodes and to the shifts of the motion factors; take it off the prior's."""
+
+    @abstractmethod
+    def along_motion(self, step: Array) -> Array:
+        """A (K, n) step that leaves the same motion errors as a given one does in the linear solution.
+
+        The first node takes its step; each later node goes where the motion leads from there, plus the motion error
+        that the linearised factors say. Where rotations are large, a straight step leaves the motion, which is stiff,
+        at second order (the Maratos effect: J. Nocedal, S. J. Wright, *Numerical Optimization*, 2006, section 15.5).
+        """
 
     def turned(self, covariance: Array, shift: Array) -> Array:
         """A covariance about a state, about another that is away by a (n,) shift; a hook, as `less`."""

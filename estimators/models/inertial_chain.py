@@ -5,7 +5,8 @@ the shift ``s = x - x'`` (rotation phi, biases b), the same samples lead to ``f(
 rotating the increments adds beyond the first order: with ``E = exp(phi x)`` and the vectors u_p, u_v of the specific
 force's double and single integral in north-east-down, which stand in F (its block of the attitude is ``-[u x]``),
 
-- ``c_p = (E - 1 - phi x) u_p + (E - 1) F_pb b``, and c_v likewise with u_v and F_vb
+- ``c_p = (E - 1 - phi x) u_p + (E - 1) F_pb b``, and c_v likewise with u_v and F_vb; the derivative by the attitude
+  is ``-[E (u_p + F_pb b) x]``
 - attitude: the rotation vector of ``exp(F_phi,phi phi) exp(F_phi,b b)``
 
 F and its bias columns turn with the node (``F_pb = C B`` with B in body axes): these are the body-frame increments and
@@ -14,6 +15,8 @@ is outside of the integral). Curvature and rotation of the Earth are in y' and i
 """
 
 from __future__ import annotations
+
+from math import atan2, cos, sqrt
 
 import numpy as np
 
@@ -27,6 +30,9 @@ from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["InertialChain"]
 
+#: Rotations below this are composed by a series [rad].
+SERIES_ANGLE = 0.014
+
 
 @kernel()
 def _turn(r0, r1, r2, v0, v1, v2):  # type: ignore[no-untyped-def]
@@ -39,18 +45,111 @@ def _turn(r0, r1, r2, v0, v1, v2):  # type: ignore[no-untyped-def]
 
 @kernel()
 def _compose(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
-    """Rotation vector of ``exp(a x) exp(b x)``, to third order (Baker, Campbell, Hausdorff)."""
+    """Rotation vector of ``exp(a x) exp(b x)``.
+
+    A series of third order (Baker, Campbell, Hausdorff) below `SERIES_ANGLE`, where it is good to 2e-9 rad; the product
+    of the quaternions above it.
+    """
+    a, b = a0 * a0 + a1 * a1 + a2 * a2, b0 * b0 + b1 * b1 + b2 * b2
     x0, x1, x2 = cross(a0, a1, a2, b0, b1, b2)
-    y0, y1, y2 = cross(a0 - b0, a1 - b1, a2 - b2, x0, x1, x2)
-    t = 1.0 / 12.0
-    return a0 + b0 + 0.5 * x0 + t * y0, a1 + b1 + 0.5 * x1 + t * y1, a2 + b2 + 0.5 * x2 + t * y2
+    if a + b < SERIES_ANGLE * SERIES_ANGLE:
+        y0, y1, y2 = cross(a0 - b0, a1 - b1, a2 - b2, x0, x1, x2)
+        t = 1.0 / 12.0
+        return a0 + b0 + 0.5 * x0 + t * y0, a1 + b1 + 0.5 * x1 + t * y1, a2 + b2 + 0.5 * x2 + t * y2
+    # sin(x/2)/x and cos(x/2) of both angles
+    p, _ = rotation_coefficients(0.25 * a)
+    q, _ = rotation_coefficients(0.25 * b)
+    p, q, c, d = 0.5 * p, 0.5 * q, cos(0.5 * sqrt(a)), cos(0.5 * sqrt(b))
+    w = c * d - p * q * (a0 * b0 + a1 * b1 + a2 * b2)
+    v0 = p * d * a0 + c * q * b0 + p * q * x0
+    v1 = p * d * a1 + c * q * b1 + p * q * x1
+    v2 = p * d * a2 + c * q * b2 + p * q * x2
+    sine = sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    if w < 0.0:  # the shorter way round
+        w, v0, v1, v2 = -w, -v0, -v1, -v2
+    ratio = 2.0 if sine < 1e-12 else 2.0 * atan2(sine, w) / sine
+    return ratio * v0, ratio * v1, ratio * v2
+
+
+@kernel()
+def _move(F, s, moved, J):  # type: ignore[no-untyped-def]
+    """Where the motion takes a node that is shifted by s: the shift ``moved`` at its end, and its derivative J.
+
+    The equations are those of the module.
+    """
+    n = s.size
+    for i in range(n):
+        x = 0.0
+        for j in range(n):
+            J[i, j] = F[i, j]
+            x += F[i, j] * s[j]
+        moved[i] = x
+    p0, p1, p2 = s[6], s[7], s[8]
+    size = p0 * p0 + p1 * p1 + p2 * p2
+    if n >= 15:
+        for j in range(9, 15):
+            size += s[j] * s[j]
+    if size <= 1e-24:
+        return
+    if n >= 15:  # the bias columns turn with the attitude
+        for j in range(9, 15):
+            for i in range(0, 9, 3):
+                J[i, j], J[i + 1, j], J[i + 2, j] = _turn(p0, p1, p2, F[i, j], F[i + 1, j], F[i + 2, j])
+    for i in range(0, 6, 3):
+        u0 = 0.5 * (F[i + 1, 8] - F[i + 2, 7])
+        u1 = 0.5 * (F[i + 2, 6] - F[i, 8])
+        u2 = 0.5 * (F[i, 7] - F[i + 1, 6])
+        # E (u + F_b b) - u: what the bias shift adds turns with the node, so the attitude has a share in it.
+        w0, w1, w2 = _turn(p0, p1, p2, u0, u1, u2)
+        w0, w1, w2 = w0 - u0, w1 - u1, w2 - u2
+        x0, x1, x2 = cross(p0, p1, p2, u0, u1, u2)
+        moved[i] += w0 - x0
+        moved[i + 1] += w1 - x1
+        moved[i + 2] += w2 - x2
+        if n >= 15:
+            for j in range(9, 15):
+                for r in range(3):
+                    moved[i + r] += (J[i + r, j] - F[i + r, j]) * s[j]
+                w0 += J[i, j] * s[j]
+                w1 += J[i + 1, j] * s[j]
+                w2 += J[i + 2, j] * s[j]
+        J[i, 7] += w2
+        J[i, 8] -= w1
+        J[i + 1, 6] -= w2
+        J[i + 1, 8] += w0
+        J[i + 2, 6] += w1
+        J[i + 2, 7] -= w0
+    a0, a1, a2 = moved[6], moved[7], moved[8]
+    b0, b1, b2 = 0.0, 0.0, 0.0
+    if n >= 15:
+        for j in range(9, 15):
+            b0 += F[6, j] * s[j]
+            b1 += F[7, j] * s[j]
+            b2 += F[8, j] * s[j]
+        a0, a1, a2 = a0 - b0, a1 - b1, a2 - b2
+        h0, h1, h2 = _turn(p0, p1, p2, 0.5 * b0, 0.5 * b1, 0.5 * b2)
+        for j in range(9, 12):  # the left Jacobian of exp(b x), to first order
+            x0, x1, x2 = cross(h0, h1, h2, J[6, j], J[7, j], J[8, j])
+            J[6, j] += x0
+            J[7, j] += x1
+            J[8, j] += x2
+    moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1])")
 def _less(shift, step, out):  # type: ignore[no-untyped-def]
+    """A shift as seen from where a step leads: rotations compose."""
     for j in range(shift.size):
         out[j] = shift[j] - step[j]
     out[6], out[7], out[8] = _compose(shift[6], shift[7], shift[8], -step[6], -step[7], -step[8])
+
+
+@kernel()
+def _add(step, shift, out):  # type: ignore[no-untyped-def]
+    """A shift and a step after it."""
+    for j in range(shift.size):
+        out[j] = shift[j] + step[j]
+    out[6], out[7], out[8] = _compose(step[6], step[7], step[8], shift[6], shift[7], shift[8])
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1])")
@@ -78,54 +177,25 @@ def _linearise_motion(first, transition, begin_shift, end_shift, residual, jacob
     count, n = begin_shift.shape
     moved = np.empty(n)
     for k in range(first, count):
-        F, J, s, e = transition[k], jacobian[k], begin_shift[k], end_shift[k]
-        for i in range(n):
-            x = 0.0
-            for j in range(n):
-                J[i, j] = F[i, j]
-                x += F[i, j] * s[j]
-            moved[i] = x
-        p0, p1, p2 = s[6], s[7], s[8]
-        if p0 * p0 + p1 * p1 + p2 * p2 > 1e-24:
-            # The bias columns turn with the attitude.
-            if n >= 15:
-                for j in range(9, 15):
-                    for i in range(0, 9, 3):
-                        J[i, j], J[i + 1, j], J[i + 2, j] = _turn(p0, p1, p2, F[i, j], F[i + 1, j], F[i + 2, j])
-            for i in range(0, 6, 3):
-                u0 = 0.5 * (F[i + 1, 8] - F[i + 2, 7])
-                u1 = 0.5 * (F[i + 2, 6] - F[i, 8])
-                u2 = 0.5 * (F[i, 7] - F[i + 1, 6])
-                w0, w1, w2 = _turn(p0, p1, p2, u0, u1, u2)
-                x0, x1, x2 = cross(p0, p1, p2, u0, u1, u2)
-                moved[i] += w0 - u0 - x0
-                moved[i + 1] += w1 - u1 - x1
-                moved[i + 2] += w2 - u2 - x2
-                w0, w1, w2 = w0 - u0, w1 - u1, w2 - u2
-                J[i, 7] += w2
-                J[i, 8] -= w1
-                J[i + 1, 6] -= w2
-                J[i + 1, 8] += w0
-                J[i + 2, 6] += w1
-                J[i + 2, 7] -= w0
-                if n >= 15:
-                    for j in range(9, 15):
-                        for r in range(3):
-                            moved[i + r] += (J[i + r, j] - F[i + r, j]) * s[j]
-            a0, a1, a2 = moved[6], moved[7], moved[8]
-            b0, b1, b2 = 0.0, 0.0, 0.0
-            if n >= 15:
-                for j in range(9, 15):
-                    a0 -= F[6, j] * s[j]
-                    a1 -= F[7, j] * s[j]
-                    a2 -= F[8, j] * s[j]
-                    b0 += F[6, j] * s[j]
-                    b1 += F[7, j] * s[j]
-                    b2 += F[8, j] * s[j]
-            moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
-        for i in range(n):
-            residual[k, i] = e[i] - moved[i]
-        residual[k, 6], residual[k, 7], residual[k, 8] = _compose(e[6], e[7], e[8], -moved[6], -moved[7], -moved[8])
+        _move(transition[k], begin_shift[k], moved, jacobian[k])
+        _less(end_shift[k], moved, residual[k])
+
+
+@kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _along_motion(transition, jacobian, residual, begin_shift, end_shift, step, along):  # type: ignore[no-untyped-def]
+    count, n = begin_shift.shape
+    shift, moved, error, J = np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
+    along[0] = step[0]
+    for k in range(count):
+        for r in range(n):  # the motion error that the linear solution leaves
+            x = residual[k, r] + step[k + 1, r]
+            for c in range(n):
+                x -= jacobian[k, r, c] * step[k, c]
+            error[r] = x
+        _add(along[k], begin_shift[k], shift)
+        _move(transition[k], shift, moved, J)
+        _add(error, moved, shift)
+        _less(shift, end_shift[k], along[k + 1])
 
 
 @kernel(
@@ -219,6 +289,14 @@ class InertialChain(Chain):
             m["begin_shift"], m["end_shift"],
         )  # fmt: skip
         self.prior_shift = self.less(self.prior_shift, step[0])
+
+    def along_motion(self, step: Array) -> Array:
+        """As `Chain.along_motion`."""
+        m, along = self.motions, np.empty_like(step)
+        _along_motion(
+            m["transition"], m["jacobian"], m["residual"], m["begin_shift"], m["end_shift"], step, along
+        )  # fmt: skip
+        return along
 
     def turned(self, covariance: Array, shift: Array) -> Array:
         """``J P J'`` with the left Jacobian of the rotation (`simnav.rotation.left_jacobian`)."""

@@ -81,6 +81,37 @@ def _retract(step, position, x):  # type: ignore[no-untyped-def]
         shift_ship(position[k], x[k], step[k])
 
 
+@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])")
+def _along_motion(  # type: ignore[no-untyped-def]
+    time, position, x, rate, turn_time, residual, jacobian, step, along
+):
+    count, n = residual.shape
+    p, y, decay, error, F = np.empty(3), np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
+    along[0] = step[0]
+    for k in range(count):
+        for r in range(n):  # the motion error that the linear solution leaves
+            e = residual[k, r] + step[k + 1, r]
+            for c in range(n):
+                e -= jacobian[k, r, c] * step[k, c]
+            error[r] = e
+        for i in range(3):
+            p[i] = position[k, i]
+        for i in range(n):
+            y[i] = x[k, i]
+        shift_ship(p, y, along[k])
+        set_identity(F)
+        steps, dt, turning = steps_of(time[k + 1] - time[k], turn_time)
+        decay_of(rate, dt, decay)
+        for _ in range(steps):
+            sail_step(p, y, F, decay, turning, dt)
+        meridian, prime = radii_scalar(sin(position[k + 1, 0]))
+        east = p[1] - position[k + 1, 1]
+        along[k + 1, N] = error[N] + (p[0] - position[k + 1, 0]) * (meridian + p[2])
+        along[k + 1, E] = error[E] + atan2(sin(east), cos(east)) * (prime + p[2]) * cos(position[k + 1, 0])
+        for i in range(2, n):
+            along[k + 1, i] = error[i] + y[i] - x[k + 1, i]
+
+
 class ShipChain(Chain):
     """The chain of a ship model.
 
@@ -125,3 +156,13 @@ class ShipChain(Chain):
         """As `Chain.retract`; the motion factors need no shifts."""
         _retract(step, self.nodes["position"], self.nodes["x"])
         self.prior_shift = self.less(self.prior_shift, step[0])
+
+    def along_motion(self, step: Array) -> Array:
+        """As `Chain.along_motion`."""
+        nodes, m, front = self.nodes, self.motions, self.front
+        along = np.empty_like(step)
+        _along_motion(
+            nodes["time"], nodes["position"], nodes["x"], front.decay, front.turn_time, m["residual"], m["jacobian"],
+            step, along,
+        )  # fmt: skip
+        return along

@@ -15,6 +15,10 @@ weighting is asked again. A weight that would change the pull of its factor by n
 is; from the first node on that has to do with another one, nodes are eliminated again. Everything is linearised and
 eliminated anew where a step is large, or where it would move the nodes by more than the tolerance.
 
+A large step is taken only if it does not raise the cost. Motion factors are stiff: a straight step through a large
+rotation leaves the motion at second order, and the cost rises though the step is good (the Maratos effect). So a step
+that fails is tried again along the motion (`Chain.along_motion`), and damped only if that raises the cost, too.
+
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
 innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
 
@@ -241,12 +245,12 @@ class WindowEstimator(Estimator):
         damping, settled, linear, solved = 0.0, True, False, 0
         contraction = self._contraction = min(1.0, 2.0 * self._contraction)
         latest = since = before = 0.0  # size of the last step; of those since the linearisation; of those up to it
-        saved: list[Array] | None = None
+        accepted = True
         first = self._first_new(attached)
         self._linearise(first)
         while True:
             reweighted = len(nodes)
-            if saved is None and self.weighting is not None:
+            if accepted and self.weighting is not None:
                 settled, reweighted = self._weigh(solved)
             first = min(first, reweighted)
             if first == len(nodes) and settled and linear:  # the weights are as they were
@@ -262,26 +266,26 @@ class WindowEstimator(Estimator):
             weighed = self.weighting is None or (settled and _ratio(size, latest, damping) * size < self.tolerance)
             linear = contraction * since < self.tolerance
             latest, before = size, 0.0
-            saved = chain.copy_states() if size > CHECKED_STEP else None
-            cost = self._cost() if saved is not None else 0.0
-            chain.retract(nodes["step"])
-            moved += nodes["step"][-1]
-            if saved is None and ((weighed and linear) or solved == self.iterations):
-                break
-            if saved is None and not weighed and damping == 0.0 and self.incremental:
-                self._keep()
-                first = len(nodes)
-                continue
-            self._linearise()
-            first, before, since = 0, since, 0.0
-            if saved is not None and self._cost() > cost * (1.0 + 1e-9):
-                chain.restore_states(saved)
-                moved -= nodes["step"][-1]
-                damping = max(FIRST_DAMPING, DAMPING_FACTOR * damping)
-                self._linearise()
+            if size > CHECKED_STEP:
+                accepted = self._checked_step()
             else:
-                saved = None
+                accepted = True
+                chain.retract(nodes["step"])
+                if (weighed and linear) or solved == self.iterations:
+                    moved += nodes["step"][-1]
+                    break
+                if not weighed and damping == 0.0 and self.incremental:
+                    moved += nodes["step"][-1]
+                    self._keep()
+                    first = len(nodes)
+                    continue
+                self._linearise()
+            first, before, since = 0, since, 0.0
+            if accepted:
+                moved += nodes["step"][-1]
                 damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
+            else:
+                damping = max(FIRST_DAMPING, DAMPING_FACTOR * damping)
             if solved == self.iterations:
                 damping = max(damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
                 break
@@ -309,6 +313,21 @@ class WindowEstimator(Estimator):
             if not isfinite(size):
                 raise FloatingPointError(f"the window at {self.chain.time:g} s has no finite solution")
         return size, attached
+
+    def _checked_step(self) -> bool:
+        """Take a large step, if it does not raise the cost: straight, or else along the motion; linearise anew."""
+        chain, step = self.chain, self.chain.nodes["step"]
+        limit = self._cost() * (1.0 + 1e-9)
+        before, along = chain.copy_states(), chain.along_motion(step)
+        for way in (step, along):
+            chain.retract(way)
+            self._linearise()
+            if self._cost() <= limit:
+                step[:] = way
+                return True
+            chain.restore_states(before)
+        self._linearise()
+        return False
 
     def _first_new(self, attached: int) -> int:
         """The first node that new factors touch; those before it are eliminated, and 0 where they are not."""
