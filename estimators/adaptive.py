@@ -1,12 +1,12 @@
 """Adaptive and robust rows: the Kalman filter with one adaptation each.
 
 Every row takes the inertial model where there is an IMU and the ship model where there is none, so that it is ``ekf``
-or ``ship-ekf`` but for its adaptation.
+or ``ship-ekf`` but for its adaptation. All but ``imm`` have the parameter ``iterate_above_deg`` of ``ekf``.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from simnav.estimator import register
 from simnav.estimators.adaptations.adkf import AdaptiveFactor, Factor, Statistic
@@ -20,9 +20,9 @@ from simnav.estimators.adaptations.noise import Scope
 from simnav.estimators.adaptations.robust import EquivalentWeights, huber, igg3
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
+from simnav.estimators.ekf import PoorHeadingStart
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.suitable import model_for
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import InitialState, Instruments
 
 __all__ = [
@@ -43,11 +43,11 @@ __all__ = [
 ]
 
 
-class _Adaptive(KalmanEstimator):
+class _Adaptive(PoorHeadingStart):
     """A Kalman filter over the model that suits the instruments."""
 
-    def __init__(self, adaptation: Adaptation):
-        super().__init__(InertialModel(), adaptation)
+    def __init__(self, adaptation: Adaptation, **options: Any):
+        super().__init__(InertialModel(), adaptation, **options)
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and another instrument, or what the ship model needs."""
@@ -70,8 +70,9 @@ class SageHusaKf(_Adaptive):
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
+        **options: Any,
     ):
-        super().__init__(SageHusa(fading, prior, lowest, highest, full, scope))
+        super().__init__(SageHusa(fading, prior, lowest, highest, full, scope), **options)
 
 
 @register("sage-husa-paper")
@@ -82,9 +83,15 @@ class SageHusaPaper(_Adaptive):
     """
 
     def __init__(
-        self, fading: float = 1.0, prior: int = 0, lowest: float = 0.5, highest: float = 30.0, full: bool = False
+        self,
+        fading: float = 1.0,
+        prior: int = 0,
+        lowest: float = 0.5,
+        highest: float = 30.0,
+        full: bool = False,
+        **options: Any,
     ):
-        super().__init__(SageHusa(fading, prior, lowest, highest, full))
+        super().__init__(SageHusa(fading, prior, lowest, highest, full), **options)
 
 
 @register("iae")
@@ -106,11 +113,13 @@ class Iae(_Adaptive):
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
+        **options: Any,
     ):
         super().__init__(
             InnovationBased(
                 "innovation", shortest, longest, low, high, forgetting, newest, lowest, highest, full, scope
-            )
+            ),
+            **options,
         )
 
 
@@ -130,12 +139,14 @@ class IaeFixed(_Adaptive):
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
+        **options: Any,
     ):
         super().__init__(
             InnovationBased(
                 "innovation", window, window, forgetting=forgetting, newest=newest, lowest=lowest, highest=highest,
                 full=full, scope=scope,
-            )
+            ),
+            **options,
         )  # fmt: skip
 
 
@@ -154,6 +165,7 @@ class Rae(_Adaptive):
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "fixes",
+        **options: Any,
     ):
         super().__init__(
             InnovationBased(
@@ -165,7 +177,8 @@ class Rae(_Adaptive):
                 highest=highest,
                 full=full,
                 scope=scope,
-            )
+            ),
+            **options,
         )
 
 
@@ -185,8 +198,9 @@ class Adkf(_Adaptive):
         c0: float | None = None,
         c1: float | None = None,
         together: int = 3,
+        **options: Any,
     ):
-        super().__init__(AdaptiveFactor(statistic, factor, target, preset, c0, c1, together))
+        super().__init__(AdaptiveFactor(statistic, factor, target, preset, c0, c1, together), **options)
 
 
 @register("adkf-paper")
@@ -201,8 +215,9 @@ class AdkfPaper(_Adaptive):
         statistic: Statistic = "residual",
         factor: Factor = "three-segment",
         target: Literal["R", "P"] = "R",
+        **options: Any,
     ):
-        super().__init__(AdaptiveFactor(statistic, factor, target, "paper"))
+        super().__init__(AdaptiveFactor(statistic, factor, target, "paper"), **options)
 
 
 @register("igg3")
@@ -212,10 +227,10 @@ class Igg3(_Adaptive):
     See `simnav.estimators.adaptations.robust`.
     """
 
-    def __init__(self, k0: float = 2.5, k1: float = 8.0):
+    def __init__(self, k0: float = 2.5, k1: float = 8.0, **options: Any):
         if not 0.0 < k0 < k1:
             raise ValueError(f"k0 = {k0:g} and k1 = {k1:g}: it must be 0 < k0 < k1")
-        super().__init__(EquivalentWeights(lambda u: igg3(u, k0, k1)))
+        super().__init__(EquivalentWeights(lambda u: igg3(u, k0, k1)), **options)
 
 
 @register("huber-kf")
@@ -226,10 +241,10 @@ class HuberKf(_Adaptive):
     cost up to 8 % of RMSE on clean data.
     """
 
-    def __init__(self, k: float = 2.0):
+    def __init__(self, k: float = 2.0, **options: Any):
         if not k > 0.0:
             raise ValueError(f"k = {k:g}: it must be above 0")
-        super().__init__(EquivalentWeights(lambda u: huber(u, k)))
+        super().__init__(EquivalentWeights(lambda u: huber(u, k)), **options)
 
 
 @register("gated-ekf")
@@ -239,8 +254,8 @@ class GatedEkf(_Adaptive):
     See `simnav.estimators.adaptations.gating`, also for the parameters.
     """
 
-    def __init__(self, probability: float = 0.999, patience: float = 10.0):
-        super().__init__(ChiSquareGate(probability, patience))
+    def __init__(self, probability: float = 0.999, patience: float = 10.0, **options: Any):
+        super().__init__(ChiSquareGate(probability, patience), **options)
 
 
 @register("fading-ekf")
@@ -250,8 +265,8 @@ class FadingEkf(_Adaptive):
     See `simnav.estimators.adaptations.fading`, also for the parameters.
     """
 
-    def __init__(self, memory: float = 1000.0):
-        super().__init__(FadingMemory(memory))
+    def __init__(self, memory: float = 1000.0, **options: Any):
+        super().__init__(FadingMemory(memory), **options)
 
 
 @register("vb-akf")
@@ -269,8 +284,9 @@ class VbAkf(_Adaptive):
         lowest: float = 1.0,
         highest: float = 30.0,
         scope: Scope = "fixes",
+        **options: Any,
     ):
-        super().__init__(VariationalBayes(forgetting, prior, iterations, lowest, highest, scope))
+        super().__init__(VariationalBayes(forgetting, prior, iterations, lowest, highest, scope), **options)
 
 
 @register("mckf")
@@ -280,8 +296,14 @@ class Mckf(_Adaptive):
     See `simnav.estimators.adaptations.correntropy`, also for the parameters.
     """
 
-    def __init__(self, bandwidth: float = 4.0, iterations: int = 5, begin: Literal["update", "prediction"] = "update"):
-        super().__init__(MaximumCorrentropy(bandwidth, iterations, begin=begin))
+    def __init__(
+        self,
+        bandwidth: float = 4.0,
+        iterations: int = 5,
+        begin: Literal["update", "prediction"] = "update",
+        **options: Any,
+    ):
+        super().__init__(MaximumCorrentropy(bandwidth, iterations, begin=begin), **options)
 
 
 @register("imm")

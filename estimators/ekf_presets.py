@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from simnav.estimator import register
-from simnav.estimators.ekf import AidedInertial
+from simnav.estimators.ekf import AidedInertial, PoorHeadingStart
 from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.nine_state import NineStateModel
 
@@ -13,7 +13,7 @@ __all__ = ["Ekf9", "Ekf23"]
 
 
 @register("ekf-23", aliases=("ekf-paper-003",))
-class Ekf23(AidedInertial):
+class Ekf23(AidedInertial, PoorHeadingStart):
     """23-state EKF after paper 003: DVL misalignment, lever arm, scale factor and time error beside the 15.
 
     `simnav.estimators.models.dvl_calibration` says what is settled of the paper, and how.
@@ -26,14 +26,22 @@ class Ekf23(AidedInertial):
         Sigma of the DVL's time error [s].
     preset : "default" or "paper"
         "paper": the noise of GNSS and DVL as printed, 5 m and 0.1 m/s, instead of the datasheets'.
+    iterate_above_deg : float, optional
+        As of ``ekf``.
     """
 
-    def __init__(self, lever_arm: float = 0.02, delay: float = 0.005, preset: Literal["default", "paper"] = "default"):
-        super().__init__(DvlCalibrationModel(lever_arm, delay, preset))
+    def __init__(
+        self,
+        lever_arm: float = 0.02,
+        delay: float = 0.005,
+        preset: Literal["default", "paper"] = "default",
+        **options: Any,
+    ):
+        super().__init__(DvlCalibrationModel(lever_arm, delay, preset), **options)
 
 
 @register("ekf-9", aliases=("ekf-paper-000",))
-class Ekf9(AidedInertial):
+class Ekf9(AidedInertial, PoorHeadingStart):
     """9-state EKF after paper 000: position, velocity and attitude, fixed sigmas, no biases.
 
     Parameters
@@ -44,6 +52,8 @@ class Ekf9(AidedInertial):
         Of a GNSS position [m]; 0 for the datasheet's.
     sigma_dvl : float
         Of a DVL velocity [m/s]; 0 for the datasheet's.
+    iterate_above_deg : float, optional
+        As of ``ekf``.
     """
 
     def __init__(
@@ -54,10 +64,12 @@ class Ekf9(AidedInertial):
         sigma_gnss_horizontal: float = 2.5,
         sigma_gnss_vertical: float = 5.0,
         sigma_dvl: float = 0.1,
+        **options: Any,
     ):
         super().__init__(
             NineStateModel(
                 sigma_position, sigma_velocity, sigma_attitude_deg,
                 sigma_gnss_horizontal, sigma_gnss_vertical, sigma_dvl,
-            )
+            ),
+            **options,
         )  # fmt: skip

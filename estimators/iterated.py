@@ -5,13 +5,13 @@ from __future__ import annotations
 from simnav.estimator import register
 from simnav.estimators.ekf import AidedInertial
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.solvers.iterated import IteratedKalmanEstimator
+from simnav.estimators.solvers.iterated import Iteration
 
 __all__ = ["IteratedEkf"]
 
 
 @register("iekf", aliases=("iterated-ekf",))
-class IteratedEkf(IteratedKalmanEstimator, AidedInertial):
+class IteratedEkf(AidedInertial):
     """Iterated 15-state EKF: each measurement is linearised again until the correction stands still.
 
     Parameters
@@ -25,4 +25,4 @@ class IteratedEkf(IteratedKalmanEstimator, AidedInertial):
     """
 
     def __init__(self, limit: int = 10, threshold: float = 1e-3, calibrate: bool = True):
-        super().__init__(InertialModel(calibrate), limit=limit, threshold=threshold)
+        super().__init__(InertialModel(calibrate), iteration=Iteration(limit=limit, threshold=threshold))

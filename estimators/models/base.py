@@ -58,6 +58,8 @@ class ErrorModel(ABC):
     time: float
     #: Names of the arrays that `correct` changes.
     state: ClassVar[tuple[str, ...]] = ()
+    #: Place of the attitude, a rotation vector, in the error; None for a model without one.
+    attitude_at: ClassVar[int | None] = None
 
     @abstractmethod
     def begin(self, start: InitialState, instruments: Instruments) -> Array:

@@ -8,6 +8,10 @@ since (``begin_shift``, ``end_shift``), which is all it takes to linearise it an
 (preintegration: C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", IEEE Trans.
 Robotics 33(1), 2017; here about the predicted trajectory and on the rotating Earth).
 
+A measurement need not have a node of its own. It can be *folded* onto the newest node, some time before it: what it
+should read is then a function of that node through the motion between them, whose noise is added to the measurement's.
+Two measurements that are folded onto one node share a part of that noise; this correlation is neglected.
+
 A subclass compiles four loops over a window: `linearise_motion`, `linearise_aids`, `retract`, `along_motion`.
 """
 
@@ -18,6 +22,7 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimators.models.base import ErrorModel, Linearised
@@ -69,6 +74,25 @@ def _attach(noise, value, full, whitener, values):  # type: ignore[no-untyped-de
         for j in range(3):
             full[i, j] = noise[i, j] if max(i, j) < noise.shape[0] else 1.0 if i == j else 0.0
     whitening(full, whitener)
+
+
+@kernel("void(i8, i8[::1], f8[:, :, ::1], f8[:, :, ::1])")
+def through_motion(first, row, transition, jacobian):  # type: ignore[no-untyped-def]
+    """Take Jacobians at folds back to their nodes, in place."""
+    n = transition.shape[1]
+    at_node = np.empty(n)
+    for i in range(first, row.size):
+        if row[i] < 0:
+            continue
+        for r in range(3):
+            at_node[:] = 0.0
+            for j in range(n):
+                x = jacobian[i, r, j]
+                if x != 0.0:
+                    for c in range(n):
+                        at_node[c] += x * transition[row[i], j, c]
+            for c in range(n):
+                jacobian[i, r, c] = at_node[c]
 
 
 class Columns:
@@ -167,9 +191,15 @@ class Chain(ABC):
         Of the factor that leads to a node from the one before: ``transition``, ``noise``, ``whitener`` (n, n);
         ``begin_shift``, ``end_shift`` (n,); as linearised last, ``jacobian`` (n, n) and ``residual`` (n,); ``weight``.
     aids : Columns
-        ``node`` (number since the start of the run), ``instrument`` (index into ``names``), ``components``, ``time``,
-        ``value`` (3,), ``noise`` and ``whitener`` (3, 3); as linearised last ``residual`` (3,), ``jacobian`` (3, n);
-        ``weight``. In ascending order of their nodes.
+        ``node`` (number since the start of the run), ``fold`` (likewise, or -1), ``instrument`` (index into ``names``),
+        ``components``, ``time``, ``value`` (3,), ``noise`` and ``whitener`` (3, 3); as linearised last ``residual``
+        (3,), ``jacobian`` (3, n); ``weight``. In ascending order of their nodes.
+    folds : Columns
+        Times between nodes at which there are measurements: ``node`` (number of the node before), ``time``,
+        ``transition`` (n, n) from the node, ``shift`` (n,) by which the node has moved since, the model's arrays as
+        predicted then, and with ``now_`` before their names as the shifted node leads to; ``jacobian`` (n, n).
+    fold_base : int
+        Number of the first of them since the start of the run.
     names : tuple of str
         Of the instruments.
     base : int
@@ -201,10 +231,13 @@ class Chain(ABC):
             residual=(n,), jacobian=(n, n), whitened=(n,), norm=(), weight=(),
         )  # fmt: skip
         self.aids = Columns(
-            node=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,), noise=(3, 3),
+            node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,), noise=(3, 3),
             whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
         )  # fmt: skip
-        self.base = 0
+        self.folds = Columns(node=np.int64, time=(), transition=(n, n), shift=(n,), jacobian=(n, n))
+        self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
+        self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
+        self.base = self.fold_base = 0
         self._identity = np.eye(n)
         self._append_node()
         self._pending()
@@ -275,16 +308,33 @@ class Chain(ABC):
         return self.front.nominal_noise(measurement)
 
     def attach(self, measurement: Measurement, noise: Array) -> None:
-        """Make a measurement with the (m, m) noise a factor on the newest node."""
-        aids = self.aids
+        """Make a measurement at the front, with the (m, m) noise, a factor on the newest node."""
+        aids, fold = self.aids, -1
+        if self.ahead > 0.0:
+            fold = self._fold()
+            linearised = self.front.measure(measurement)
+            if linearised is not None:
+                H = linearised.jacobian
+                noise = noise + H @ self._noise @ H.T
         aids.append(
-            node=self.base + len(self.nodes) - 1, instrument=self._index[measurement.instrument], components=len(noise),
-            time=measurement.time, weight=1.0,
+            node=self.base + len(self.nodes) - 1, fold=fold, instrument=self._index[measurement.instrument],
+            components=len(noise), time=measurement.time, weight=1.0,
         )  # fmt: skip
         _attach(
             np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
             aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
         )  # fmt: skip
+
+    def _fold(self) -> int:
+        """The number of the fold at the front's time; a new one, if there is none yet."""
+        front, folds = self.front, self.folds
+        newest = self.base + len(self.nodes) - 1
+        if not len(folds) or folds["node"][-1] != newest or folds["time"][-1] != front.time:
+            folds.append(
+                node=newest, time=front.time, transition=self._transition, shift=0.0,
+                **{name: getattr(front, name) for name in self._kept},
+            )  # fmt: skip
+        return self.fold_base + len(folds) - 1
 
     def settle(self, moved: Array) -> None:
         """Set the front to the newest node, or, where it has run ahead of it, by how much that was ``moved``."""
@@ -303,17 +353,22 @@ class Chain(ABC):
         self.nodes.drop(count)
         self.motions.drop(count)
         self.aids.drop(int(np.searchsorted(self.aids["node"], self.base)))
+        folds = int(np.searchsorted(self.folds["node"], self.base))
+        self.fold_base += folds
+        self.folds.drop(folds)
 
     def copy_states(self) -> list[Array]:
         """What `retract` changes, for `restore_states`."""
         changed = [self.nodes[name].copy() for name in self.front.state]
-        return [*changed, self.motions["begin_shift"].copy(), self.motions["end_shift"].copy(), self.prior_shift.copy()]
+        shifts = self.motions["begin_shift"], self.motions["end_shift"], self.folds["shift"], self.prior_shift
+        return [*changed, *(shift.copy() for shift in shifts)]
 
     def restore_states(self, states: list[Array]) -> None:
         """Take a `retract` back."""
-        for name, value in zip(self.front.state, states[:-3], strict=True):
+        for name, value in zip(self.front.state, states[:-4], strict=True):
             self.nodes[name][...] = value
-        self.motions["begin_shift"][...], self.motions["end_shift"][...], self.prior_shift = states[-3:]
+        self.motions["begin_shift"][...], self.motions["end_shift"][...] = states[-4:-2]
+        self.folds["shift"][...], self.prior_shift = states[-2:]
 
     def estimate(self, covariance: Array) -> Estimate:
         """The front as an estimate."""
@@ -331,9 +386,40 @@ class Chain(ABC):
         respect to the older node.
         """
 
-    @abstractmethod
     def linearise_aids(self, first: int = 0) -> None:
         """Fill ``residual`` (measured less predicted) and ``jacobian`` (of the prediction) from a row on."""
+        aids, folds = self.aids, self.folds
+        jacobian, row = aids["jacobian"], aids["node"] - self.base
+        if not len(folds) or first == len(aids):
+            self.observe(first, row, self.nodes, "", jacobian)
+            return
+        at_node = aids["fold"] < 0
+        self.observe(first, np.where(at_node, row, -1), self.nodes, "", jacobian)
+        self.move_folds(int(np.searchsorted(folds["node"], aids["node"][first])))
+        row = np.where(at_node, -1, aids["fold"] - self.fold_base)
+        self.observe(first, row, folds, "now_", jacobian)
+        through_motion(first, row, folds["jacobian"], jacobian)
+
+    @abstractmethod
+    def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
+        """Fill ``residual``, ``components`` and the (M, 3, n) ``jacobian`` of the aids from one on.
+
+        Parameters
+        ----------
+        first : int
+        row : (M,) int array
+            Of each aid in ``states``; -1 for those to be left alone.
+        states : Columns
+            Nodes or folds.
+        prefix : str
+            Of the names of the model's state in them.
+        jacobian : (M, 3, n) array
+            Of the prediction with respect to the state there.
+        """
+
+    @abstractmethod
+    def move_folds(self, first: int) -> None:
+        """Fill ``now_...`` and ``jacobian`` of the folds, from a row on, for the nodes as they are."""
 
     @abstractmethod
     def retract(self, step: Array) -> None:

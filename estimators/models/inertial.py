@@ -87,6 +87,7 @@ class InertialModel(ErrorModel):
     """
 
     state = ("position", "velocity", "dcm", "bias", "calibration")
+    attitude_at = 6
 
     def __init__(self, calibrate: bool = True):
         self.calibrate = calibrate

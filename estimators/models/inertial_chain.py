@@ -19,9 +19,10 @@ from __future__ import annotations
 from math import atan2, cos, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.models.chain import Chain
+from simnav.estimators.models.chain import Chain, Columns
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
@@ -199,22 +200,46 @@ def _along_motion(transition, jacobian, residual, begin_shift, end_shift, step, 
 
 
 @kernel(
-    "void(i8, i8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8[:, ::1], "
+    "void(i8, i8[::1], i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8[:, ::1], "
     "f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], i8[::1])"
 )
 def _linearise_aids(  # type: ignore[no-untyped-def]
-    first, node, base, instrument, value, codes, arms, bias_at, scale_at,
+    first, row, instrument, value, codes, arms, bias_at, scale_at,
     position, velocity, dcm, rate, bias, calibration, residual, jacobian, components,
 ):  # fmt: skip
     innovation = np.empty(3)
-    for i in range(first, node.size):
-        k, s = node[i] - base, instrument[i]
+    for i in range(first, row.size):
+        k, s = row[i], instrument[i]
+        if k < 0:
+            continue
         components[i] = observe_inertial(
             codes[s], arms[s], bias_at[s], scale_at[s], value[i],
             position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k], innovation, jacobian[i],
         )  # fmt: skip
         for r in range(3):
             residual[i, r] = innovation[r] if r < components[i] else 0.0
+
+
+@kernel(
+    "void(i8, f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
+)
+def _move_folds(  # type: ignore[no-untyped-def]
+    first, transition, shift, position, velocity, dcm, bias, calibration, jacobian
+):
+    """Correct the states of folds by where their nodes' shifts lead, in place."""
+    count, n = shift.shape
+    moved, dx = np.empty(n), np.zeros(15 + calibration.shape[1])
+    for k in range(first, count):
+        _move(transition[k], shift[k], moved, jacobian[k])
+        for j in range(n):
+            dx[j] = moved[j]
+        correct_inertial(position[k], velocity[k], dcm[k], bias[k], calibration[k], dx)
+
+
+@kernel("void(f8[:, ::1], i8[::1], i8, f8[:, ::1])")
+def _retract_folds(step, node, base, shift):  # type: ignore[no-untyped-def]
+    for i in range(node.size):
+        _add(step[node[i] - base], shift[i].copy(), shift[i])
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -267,19 +292,29 @@ class InertialChain(Chain):
         m = self.motions
         _linearise_motion(first, m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"])
 
-    def linearise_aids(self, first: int = 0) -> None:
-        """As `Chain.linearise_aids`."""
-        nodes, aids = self.nodes, self.aids
-        jacobian = aids["jacobian"]
+    def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
+        """As `Chain.observe`."""
+        aids = self.aids
         wide = jacobian if self.size >= 15 else np.zeros((len(aids), 3, 15))
+        position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
         _linearise_aids(
-            first, aids["node"], self.base, aids["instrument"], aids["value"],
-            self._codes, self._arms, self._bias_at, self._scale_at,
-            nodes["position"], nodes["velocity"], nodes["dcm"], nodes["raw_rate"], nodes["bias"], nodes["calibration"],
+            first, row, aids["instrument"], aids["value"], self._codes, self._arms, self._bias_at, self._scale_at,
+            position, velocity, dcm, states["raw_rate"], bias, calibration,
             aids["residual"], wide, aids["components"],
         )  # fmt: skip
         if wide is not jacobian:
-            jacobian[first:] = wide[first:, :, : self.size]
+            here = np.flatnonzero(row[first:] >= 0) + first
+            jacobian[here] = wide[here, :, : self.size]
+
+    def move_folds(self, first: int) -> None:
+        """As `Chain.move_folds`."""
+        folds, names = self.folds, self.front.state
+        for name in names:
+            folds[f"now_{name}"][first:] = folds[name][first:]
+        position, velocity, dcm, bias, calibration = (folds[f"now_{name}"] for name in names)
+        _move_folds(
+            first, folds["transition"], folds["shift"], position, velocity, dcm, bias, calibration, folds["jacobian"]
+        )
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""
@@ -288,6 +323,8 @@ class InertialChain(Chain):
             step, nodes["position"], nodes["velocity"], nodes["dcm"], nodes["bias"], nodes["calibration"],
             m["begin_shift"], m["end_shift"],
         )  # fmt: skip
+        if len(self.folds):
+            _retract_folds(step, self.folds["node"], self.base, self.folds["shift"])
         self.prior_shift = self.less(self.prior_shift, step[0])
 
     def along_motion(self, step: Array) -> Array:

@@ -14,10 +14,11 @@ from __future__ import annotations
 from math import atan2, cos, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.earth import radii_scalar
-from simnav.estimators.models.chain import Chain
+from simnav.estimators.models.chain import Chain, Columns
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_kernels import (
     E,
@@ -59,20 +60,42 @@ def _linearise_motion(first, time, position, x, rate, turn_time, residual, jacob
 
 
 @kernel(
-    "void(i8, i8[::1], i8, i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-    "f8[:, :, ::1])"
+    "void(i8, i8[::1], i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
 )
 def _linearise_aids(  # type: ignore[no-untyped-def]
-    first, node, base, instrument, value, codes, aids, position, x, residual, jacobian
+    first, row, instrument, value, codes, aids, position, x, residual, jacobian
 ):
-    for i in range(first, node.size):
-        k, s = node[i] - base, instrument[i]
+    for i in range(first, row.size):
+        k, s = row[i], instrument[i]
+        if k < 0:
+            continue
         a, b = residual_of(codes[s], aids[s], position[k], x[k], value[i, 0], value[i, 1])
         residual[i, 0], residual[i, 1], residual[i, 2] = a, b, 0.0
         for r in range(3):
             for c in range(x.shape[1]):
                 jacobian[i, r, c] = 0.0
         fill_jacobian(codes[s], aids[s], x[k], jacobian[i])
+
+
+@kernel(
+    "void(i8, i8[::1], i8, f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, ::1], "
+    "f8[:, :, ::1])"
+)
+def _move_folds(  # type: ignore[no-untyped-def]
+    first, node, base, fold_time, time, position, x, rate, turn_time, now_position, now_x, jacobian
+):
+    decay = np.empty(rate.size)
+    for i in range(first, node.size):
+        k = node[i] - base
+        for j in range(3):
+            now_position[i, j] = position[k, j]
+        for j in range(rate.size):
+            now_x[i, j] = x[k, j]
+        set_identity(jacobian[i])
+        steps, dt, turning = steps_of(fold_time[i] - time[k], turn_time)
+        decay_of(rate, dt, decay)
+        for _ in range(steps):
+            sail_step(now_position[i], now_x[i], jacobian[i], decay, turning, dt)
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -144,12 +167,20 @@ class ShipChain(Chain):
             m["jacobian"],
         )  # fmt: skip
 
-    def linearise_aids(self, first: int = 0) -> None:
-        """As `Chain.linearise_aids`."""
-        nodes, aids = self.nodes, self.aids
+    def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
+        """As `Chain.observe`."""
+        aids = self.aids
         _linearise_aids(
-            first, aids["node"], self.base, aids["instrument"], aids["value"], self._codes, self._aids,
-            nodes["position"], nodes["x"], aids["residual"], aids["jacobian"],
+            first, row, aids["instrument"], aids["value"], self._codes, self._aids,
+            states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
+        )  # fmt: skip
+
+    def move_folds(self, first: int) -> None:
+        """As `Chain.move_folds`, by the model's own step."""
+        nodes, folds, front = self.nodes, self.folds, self.front
+        _move_folds(
+            first, folds["node"], self.base, folds["time"], nodes["time"], nodes["position"], nodes["x"], front.decay,
+            front.turn_time, folds["now_position"], folds["now_x"], folds["jacobian"],
         )  # fmt: skip
 
     def retract(self, step: Array) -> None:

@@ -155,7 +155,8 @@ def _return(adjoint, U, G, y, m, z):  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    "f8(f8[:, ::1], f8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], i8, i8[::1], f8[:, :, ::1], "
+    "UniTuple(f8, 2)(f8[:, ::1], f8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], "
+    "i8[::1], i8, i8[::1], f8[:, :, ::1], "
     "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], "
     "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], f8[:, ::1])"
 )
@@ -205,8 +206,9 @@ def solve_chain(  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    float
-        Largest component of the step, in its filtered sigmas; NaN or infinite where the step is of no use.
+    float, float
+        Largest component of the step, in its filtered sigmas, of all nodes and of those before ``first``; NaN or
+        infinite where the step is of no use.
     """
     count, n = step.shape
     total = node.size
@@ -255,7 +257,7 @@ def solve_chain(  # type: ignore[no-untyped-def]
             i += 1
 
     adjoint, after, z = np.zeros(n), np.empty(n), np.empty(3)
-    largest = 0.0
+    largest = older = 0.0
     i = total - 1
     for k in range(count - 1, -1, -1):
         if k < count - 1:
@@ -276,6 +278,8 @@ def solve_chain(  # type: ignore[no-untyped-def]
                 size = abs(step[k, r]) / sqrt(filtered[k, r, r])
                 if size > largest or size != size:
                     largest = size
+                if k < first and (size > older or size != size):
+                    older = size
         while i >= 0 and node[i] - base == k:
             if used[i] == 1:
                 _return(adjoint, cross[i], white[i], innovation[i], components[i], z)
@@ -284,7 +288,7 @@ def solve_chain(  # type: ignore[no-untyped-def]
             for r in range(n - 1, -1, -1):
                 if damp_used[k, r]:
                     _return(adjoint, damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r], 1, z)
-    return largest
+    return largest, older
 
 
 @kernel(

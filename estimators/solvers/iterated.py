@@ -17,101 +17,117 @@ Source: A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, sect
 
 from __future__ import annotations
 
-from math import sqrt
+from math import radians
+from typing import NamedTuple
 
 import numpy as np
 
-from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.base import ErrorModel, Observation
 from simnav.estimators.solvers.joseph import joseph_update
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.rotation import left_jacobian
 from simnav.types import Array, Measurement
 
-__all__ = ["IteratedKalmanEstimator"]
+__all__ = ["Iteration", "absorb_iterated"]
 
 
-class IteratedKalmanEstimator(KalmanEstimator):
-    """The solver of the module; the diagnostic ``iterations`` is the most linearisations that a measurement took.
+class Iteration(NamedTuple):
+    """Whether and how a filter linearises a measurement again.
 
-    Parameters
+    Attributes
     ----------
-    model : ErrorModel
-        With its attitude error, if it has one, at 6 to 8.
-    adaptation : Adaptation, optional
+    above_deg : float
+        Only while the heading's standard deviation is above this [deg]; 0: always.
     limit : int
         Most linearisations of one measurement; 1 is the EKF.
     threshold : float
         Change of the correction at which it has converged, in sigmas before the measurement.
-    attitude : bool
-        Whether the model's error has an attitude.
     """
 
-    def __init__(
-        self,
-        model: ErrorModel,
-        adaptation: Adaptation | None = None,
-        limit: int = 10,
-        threshold: float = 1e-3,
-        attitude: bool = True,
-    ):
-        super().__init__(model, adaptation)
-        if limit < 1:
-            raise ValueError(f"limit is {limit}; at least 1 linearisation is needed")
-        if not threshold > 0.0:
-            raise ValueError(f"threshold is {threshold}; it must be positive")
-        self.limit, self.threshold, self.attitude = limit, threshold, attitude
+    above_deg: float = 0.0
+    limit: int = 10
+    threshold: float = 1e-3
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Correct the state by one measurement."""
-        model, P = self.model, self.covariance
-        linearised = model.measure(m)
-        if linearised is None:
-            self._admission.skipped += 1
-            return
-        before = model.snapshot()
-        first, jacobian, noise = linearised
-        cross = P @ jacobian.T
-        predicted = jacobian @ cross
-        chosen = self.adaptation.adapt(Innovation(m, first, predicted, noise, P, cross))
-        if chosen is None:
-            flagged.append((m.instrument, m.time))
-            return
-        if self.adaptation.inflation != 1.0:
-            P *= self.adaptation.inflation
-            cross, predicted = cross * self.adaptation.inflation, predicted * self.adaptation.inflation
-        sigma = np.sqrt(np.diag(P)) + 1e-300
-        residual, correction, previous = first, self._correction, np.zeros(model.size)
-        first_nis = -1.0
-        for count in range(1, self.limit + 1):
-            posterior = P.copy()
-            nis = joseph_update(posterior, cross, predicted + chosen, residual, correction)
-            if nis < 0.0 or not np.isfinite(correction).all():
-                model.restore(before)
-                self._admission.skipped += 1
-                return
-            if count == 1:
-                first_nis = nis
-            converged = bool(np.all(np.abs(correction - previous) < self.threshold * sigma))
+    def check(self) -> Iteration:
+        """Itself; ValueError where a value makes no sense."""
+        if not self.above_deg >= 0.0:
+            raise ValueError(f"the iteration begins above a heading sigma of 0 deg or more, not {self.above_deg}")
+        if self.limit < 1:
+            raise ValueError(f"limit is {self.limit}; at least 1 linearisation is needed")
+        if not self.threshold > 0.0:
+            raise ValueError(f"threshold is {self.threshold}; it must be positive")
+        return self
+
+    def applies(self, model: ErrorModel, covariance: Array) -> bool:
+        """Whether measurements are to be iterated, by the (n, n) covariance of the model's error."""
+        if self.above_deg == 0.0:
+            return True
+        if model.attitude_at is None:
+            return False
+        heading = model.attitude_at + 2
+        return float(covariance[heading, heading]) > radians(self.above_deg) ** 2
+
+
+def absorb_iterated(
+    model: ErrorModel,
+    measurement: Measurement,
+    observation: Observation,
+    covariance: Array,
+    correction: Array,
+    iteration: Iteration,
+) -> tuple[float, int]:
+    """Correct a state and its covariance by a measurement (equations in the module).
+
+    Parameters
+    ----------
+    model : ErrorModel
+    measurement : Measurement
+    observation : tuple
+        The measurement as linearised at the state, with the noise that is to be used.
+    covariance : (n, n) array
+        Updated.
+    correction : (n,) array
+        Overwritten with what was added to the state.
+    iteration : Iteration
+
+    Returns
+    -------
+    nis : float
+        Normalised innovation squared of the first linearisation; -1 where an innovation's covariance is singular, and
+        nothing is changed.
+    count : int
+        Linearisations.
+    """
+    residual, cross, predicted, noise = observation
+    before, first_nis = model.snapshot(), -1.0
+    sigma = np.sqrt(np.diag(covariance)) + 1e-300
+    previous, at = np.zeros(model.size), model.attitude_at
+    attitude = slice(0) if at is None else slice(at, at + 3)
+    for count in range(1, iteration.limit + 1):
+        posterior = covariance.copy()
+        nis = joseph_update(posterior, cross, predicted + noise, residual, correction)
+        if nis < 0.0 or not np.isfinite(correction).all():
             model.restore(before)
-            model.correct(correction)
-            if converged or count == self.limit:
-                break
-            again = model.measure(m)
-            if again is None:
-                break
-            previous = correction.copy()
-            G = again.jacobian.copy()
-            if self.attitude:
-                G[:, 6:9] = G[:, 6:9] @ left_jacobian(correction[6:9])
-            cross = P @ G.T
-            predicted = G @ cross
-            residual = again.innovation + G @ correction
-        P[:] = posterior
-        if self.attitude:
-            J = left_jacobian(correction[6:9])
-            P[6:9] = J @ P[6:9]
-            P[:, 6:9] = P[:, 6:9] @ J.T
-        diagnostics["iterations"] = max(float(count), float(diagnostics.get("iterations", 0.0)))
-        diagnostics[f"innovation.{m.instrument}"] = sqrt(float(first @ first))
-        diagnostics[f"nis.{m.instrument}"] = first_nis
+            return -1.0, count
+        if count == 1:
+            first_nis = nis
+        converged = bool(np.all(np.abs(correction - previous) < iteration.threshold * sigma))
+        model.restore(before)
+        model.correct(correction)
+        if converged or count == iteration.limit:
+            break
+        again = model.measure(measurement)
+        if again is None:
+            break
+        previous = correction.copy()
+        G = again.jacobian.copy()
+        if at is not None:
+            G[:, attitude] = G[:, attitude] @ left_jacobian(correction[attitude])
+        cross = covariance @ G.T
+        predicted = G @ cross
+        residual = again.innovation + G @ correction
+    covariance[:] = posterior
+    if at is not None:
+        J = left_jacobian(correction[attitude])
+        covariance[attitude] = J @ covariance[attitude]
+        covariance[:, attitude] = covariance[:, attitude] @ J.T
+    return first_nis, count

@@ -19,6 +19,7 @@ from simnav.estimator import Estimator
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
 from simnav.estimators.solvers.admission import Admission
+from simnav.estimators.solvers.iterated import Iteration, absorb_iterated
 from simnav.estimators.solvers.joseph import joseph_update
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
@@ -36,6 +37,9 @@ class KalmanEstimator(Estimator):
     model : ErrorModel
     adaptation : Adaptation, optional
         None: every measurement counts with its nominal noise.
+    iteration : Iteration, optional
+        None: every measurement is linearised once. Where measurements are iterated, the diagnostic ``iterations`` is
+        the most linearisations that one of them took.
 
     Attributes
     ----------
@@ -43,9 +47,10 @@ class KalmanEstimator(Estimator):
         Of the model's error.
     """
 
-    def __init__(self, model: ErrorModel, adaptation: Adaptation | None = None):
+    def __init__(self, model: ErrorModel, adaptation: Adaptation | None = None, iteration: Iteration | None = None):
         self.model = model
         self.adaptation = adaptation or Adaptation()
+        self.iteration = None if iteration is None else iteration.check()
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
@@ -102,7 +107,10 @@ class KalmanEstimator(Estimator):
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         """Correct the state by one measurement."""
-        if self._plain:
+        iteration = self.iteration
+        if iteration is not None and not iteration.applies(self.model, self.covariance):
+            iteration = None
+        if self._plain and iteration is None:
             used = self.model.assimilate(m, self.covariance, self._correction)
             if used is not None:
                 self._note(m, *used, diagnostics)
@@ -120,7 +128,13 @@ class KalmanEstimator(Estimator):
         if inflation != 1.0:
             for matrix in (self.covariance, cross, predicted):
                 matrix *= inflation
-        if self._corrects:
+        if iteration is not None:
+            chosen_observation = residual, cross, predicted, chosen
+            nis, count = absorb_iterated(
+                self.model, m, chosen_observation, self.covariance, self._correction, iteration
+            )
+            diagnostics["iterations"] = max(float(count), float(diagnostics.get("iterations", 0.0)))
+        elif self._corrects:
             nis = self.model.absorb((residual, cross, predicted, chosen), self.covariance, self._correction)
         else:
             nis = joseph_update(self.covariance, cross, predicted + chosen, residual, self._correction)

@@ -19,6 +19,9 @@ A large step is taken only if it does not raise the cost. Motion factors are sti
 rotation leaves the motion at second order, and the cost rises though the step is good (the Maratos effect). So a step
 that fails is tried again along the motion (`Chain.along_motion`), and damped only if that raises the cost, too.
 
+A window that cannot explain its measurements says so (`simnav.estimators.solvers.cost_test`): the diagnostic
+``inconsistent`` is 1, and the covariance that it reports is multiplied by the variance factor.
+
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
 innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
 
@@ -45,6 +48,7 @@ from simnav.estimators.adaptations.weighting import Factors, Weighting
 from simnav.estimators.models.chain import Chain
 from simnav.estimators.solvers.admission import Admission
 from simnav.estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.solvers.cost_test import CostTest
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["WindowEstimator"]
@@ -75,6 +79,9 @@ class WindowEstimator(Estimator):
         largest change of a weight, and of the weight times the norm of a whitened residual, that does not count.
     iterations : int
         Most steps an epoch.
+    spacing : float
+        Measurements at times closer to the newest node than this [s] get no node of their own (`Chain`, folds), unless
+        they are the last of their step. 0: every time of a measurement is a node.
 
     Attributes
     ----------
@@ -97,6 +104,7 @@ class WindowEstimator(Estimator):
         window: int | None = 20,
         tolerance: float = 1e-3,
         iterations: int = 10,
+        spacing: float = 0.2,
     ):
         if window is not None and window < 1:
             raise ValueError(f"window is {window}; it must hold at least 1 epoch")
@@ -104,10 +112,12 @@ class WindowEstimator(Estimator):
             raise ValueError(f"tolerance is {tolerance}; it must be positive")
         if iterations < 1:
             raise ValueError(f"iterations is {iterations}; at least 1 is needed")
+        if not 0.0 <= spacing < np.inf:
+            raise ValueError(f"spacing is {spacing}; it is a time in seconds, 0 or more")
         self.chain = chain
         self.adaptation = adaptation
         self.weighting = weighting
-        self.window, self.tolerance, self.iterations = window, tolerance, iterations
+        self.window, self.tolerance, self.iterations, self.spacing = window, tolerance, iterations, spacing
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
@@ -120,13 +130,14 @@ class WindowEstimator(Estimator):
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
         self._counted = self._eliminated = 0
         self._contraction = 1.0
+        self._cost_test = CostTest()
         n = self.chain.size
         self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,))
         self.chain.aids.add(cross=(3, n), white=(3, n), innovation=(3,), used=np.int64)
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
         self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
-        self._blank |= {"iterations": 0.0, "cost": np.nan}
+        self._blank |= {"iterations": 0.0, "cost": np.nan, "variance_factor": np.nan, "inconsistent": 0.0}
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
@@ -136,9 +147,10 @@ class WindowEstimator(Estimator):
         flagged: list[tuple[str, float]] = []
         attached = 0
         samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
-        for m in self._admission.admit(measurements, chain.time):
+        admitted = self._admission.admit(measurements, chain.time)
+        for m in admitted:
             self._advance(min(m.time, measurements.time), samples)
-            attached += self._take(m, diagnostics, flagged)
+            attached += self._take(m, m.time == admitted[-1].time, diagnostics, flagged)
         if attached:
             self._optimise(attached, diagnostics, flagged)
             self._marginalise()
@@ -148,6 +160,9 @@ class WindowEstimator(Estimator):
             if what is not None:
                 diagnostics.update(what.diagnostics())
         estimate = chain.estimate(chain.predicted_covariance(self.covariance))
+        diagnostics["inconsistent"] = float(self._cost_test.inconsistent)
+        if self._cost_test.inconsistent and estimate.covariance is not None:
+            estimate.covariance *= self._cost_test.inflation
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 
@@ -166,8 +181,10 @@ class WindowEstimator(Estimator):
         self.covariance = self.chain.predicted_covariance(self.covariance)
         self.chain.extend()
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> bool:
-        """Make a measurement a factor; False if it is not used."""
+    def _take(
+        self, m: Measurement, last: bool, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]
+    ) -> bool:
+        """Make a measurement a factor, one of the step's ``last`` at a node of its own; False if it is not used."""
         chain = self.chain
         if self.adaptation is not None:
             noise = self._adapted_noise(m, self.adaptation, diagnostics, flagged)
@@ -175,7 +192,7 @@ class WindowEstimator(Estimator):
             self._admission.skipped += 1
         if noise is None:
             return False
-        if chain.ahead > 0.0:
+        if chain.ahead > 0.0 and (last or chain.ahead >= self.spacing):
             self._extend()
         chain.attach(m, noise)
         return True
@@ -210,7 +227,9 @@ class WindowEstimator(Estimator):
         chain = self.chain
         solved, cost, moved, attached = self._converge(attached)
         chain.settle(moved)
+        self._cost_test.add(cost, float(chain.aids["weight"] @ chain.aids["components"]))
         diagnostics["iterations"], diagnostics["cost"] = float(solved), cost
+        diagnostics["variance_factor"] = self._cost_test.variance_factor
         if attached:
             newest = [chain.aids[column][-attached:].tolist() for column in ("instrument", "time", "norm", "weight")]
             for index, time, norm, weight in zip(*newest):
@@ -300,16 +319,16 @@ class WindowEstimator(Estimator):
 
     def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
         """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
-        size = self._solve(damping, first)
-        if first and not size <= CHECKED_STEP:  # too far from where the older nodes were linearised
+        size, older = self._solve(damping, first)
+        if not older <= CHECKED_STEP:  # too far from where the older nodes were linearised
             self._linearise()
-            size = self._solve(damping)
+            size, _ = self._solve(damping)
         if not isfinite(size):
             self.chain.detach(attached)
             self._admission.skipped += attached
             attached = 0
             self._linearise()
-            size = self._solve(0.0)
+            size, _ = self._solve(0.0)
             if not isfinite(size):
                 raise FloatingPointError(f"the window at {self.chain.time:g} s has no finite solution")
         return size, attached
@@ -318,15 +337,16 @@ class WindowEstimator(Estimator):
         """Take a large step, if it does not raise the cost: straight, or else along the motion; linearise anew."""
         chain, step = self.chain, self.chain.nodes["step"]
         limit = self._cost() * (1.0 + 1e-9)
-        before, along = chain.copy_states(), chain.along_motion(step)
-        for way in (step, along):
-            chain.retract(way)
+        before = chain.copy_states()
+        for along in (False, True):
+            if along:
+                step[:] = chain.along_motion(step)
+            chain.retract(step)
             self._linearise()
             if self._cost() <= limit:
-                step[:] = way
                 return True
             chain.restore_states(before)
-        self._linearise()
+            self._linearise()
         return False
 
     def _first_new(self, attached: int) -> int:
@@ -374,11 +394,11 @@ class WindowEstimator(Estimator):
         )
         return cost
 
-    def _solve(self, damping: float, first: int = 0) -> float:
-        """One step of all nodes; its largest component in sigmas."""
+    def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
+        """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
         chain, nodes = self.chain, self.chain.nodes
         motions, aids = chain.motions, chain.aids
-        size: float = solve_chain(
+        sizes: tuple[float, float] = solve_chain(
             chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
             motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
             aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
@@ -386,7 +406,7 @@ class WindowEstimator(Estimator):
             nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
             aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"],
         )  # fmt: skip
-        return size
+        return sizes
 
     def _factors(self, iteration: int) -> Factors:
         motions, aids = self.chain.motions, self.chain.aids
