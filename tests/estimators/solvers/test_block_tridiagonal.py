@@ -91,12 +91,13 @@ def covariance(rng: np.random.Generator, n: int) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(3))
 def test_it_is_the_solution_of_the_normal_equations(seed: int):
     p = Problem(seed)
-    size, (_, _, filtered, _, step) = p.solve()
+    (size, older), (_, _, filtered, _, step) = p.solve()
     A, b = p.dense()
     np.testing.assert_allclose(step.ravel(), np.linalg.solve(A, b), rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(filtered[-1], np.linalg.inv(A)[-N:, -N:], rtol=1e-9)
     sigma = np.sqrt(np.diagonal(filtered, axis1=1, axis2=2))
     assert size == pytest.approx(np.max(np.abs(step) / sigma))
+    assert older == 0.0
 
 
 @pytest.mark.parametrize("node", range(1, COUNT))
@@ -132,9 +133,11 @@ def test_older_nodes_need_not_be_eliminated_again(first: int):
     p.r[aid:] = rng.normal(size=p.r[aid:].shape)
     p.v[aid:] *= 0.5
     p.e[first - 1 :] = rng.normal(size=p.e[first - 1 :].shape)
-    size, whole = p.solve()
-    same, part = p.solve(first=first, left=left)
+    (size, _), whole = p.solve()
+    (same, older), part = p.solve(first=first, left=left)
     assert same == size
+    sigma = np.sqrt(np.diagonal(whole[2], axis1=1, axis2=2))
+    assert older == pytest.approx(np.max(np.abs(whole[-1][:first]) / sigma[:first]))
     for ours, theirs in zip(part, whole):
         np.testing.assert_array_equal(ours, theirs)
 
