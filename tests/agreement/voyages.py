@@ -1,0 +1,232 @@
+"""Random clean voyages: do estimators that have the same information agree?
+
+A voyage takes 240 s and has no fault. Drawn are the vessel (ship, boat, AUV, ROV), the grade of the IMU (MEMS to
+navigation grade), how well the initial heading is known, the rates of DVL (1 to 25 Hz) and GNSS (0.2 to 10 Hz), lever
+arms, sea and latitude. ::
+
+    python -m tests.agreement.voyages run RESULTS.jsonl --count 200 --first 31000 --estimators ekf,ukf,sw-fgo
+    python -m tests.agreement.voyages run RESULTS.jsonl --count 40 --first 32000 --heading-off 90
+    python -m tests.agreement.voyages table RESULTS.jsonl
+
+A second call of ``run`` goes on where the first one was stopped. The table gives, for each estimator, the horizontal
+RMSE over the best of the estimators in `BEST_OF` on the same voyage: median, 90th percentile and maximum; how often
+the mean horizontal NEES by degree of freedom is above 5; and the processor time of an epoch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+import simnav
+from simnav.estimator import make
+from simnav.recording import Recording
+from simnav.rotation import wrap_angle
+from simnav.scenario import parse
+
+__all__ = ["BEST_OF", "run", "turned", "voyage"]
+
+DURATION = 240.0
+#: The error of an estimator is divided by the least one among these.
+BEST_OF = ("ekf", "iekf", "ukf", "inekf", "sw-fgo", "gnc-fgo", "huber-fgo")
+#: A mean NEES by degree of freedom above this is a divergence.
+LARGEST_NEES = 5.0
+SPEEDS = {"ship": (3.0, 10.0), "auv": (1.0, 2.5), "rov": (0.2, 1.0), "boat": (5.0, 20.0)}
+
+
+def voyage(number: int, lowest_heading: float = 0.1, highest_heading: float = 45.0) -> tuple[str, dict[str, Any]]:
+    """The TOML of a voyage, and what was drawn for it.
+
+    Parameters
+    ----------
+    number : int
+        Seed of the draws.
+    lowest_heading, highest_heading : float
+        Between which the sigma of the initial heading is drawn, log-uniformly [deg].
+    """
+    g = np.random.default_rng(number)
+
+    def log_uniform(low: float, high: float) -> float:
+        return float(np.exp(g.uniform(np.log(low), np.log(high))))
+
+    def arm(size: float) -> str:
+        return "[" + ", ".join(f"{g.uniform(-size, size):.2f}" for _ in range(3)) + "]"
+
+    vessel = str(g.choice(list(SPEEDS)))
+    under_water = vessel in ("auv", "rov")
+    grade = log_uniform(1e-3, 1.0)  # 1: MEMS
+    heading = log_uniform(lowest_heading, highest_heading)
+    tilt = min(5.0, 0.05 + heading / 8.0)
+    dvl, gnss, sigma = log_uniform(1.0, 25.0), log_uniform(0.2, 10.0), log_uniform(0.02, 5.0)
+    speed = float(g.uniform(*SPEEDS[vessel]))
+    lines = [
+        f'name = "voyage-{number}"',
+        "version = 1",
+        f'title = "Random voyage {number}"',
+        f"duration_s = {DURATION}",
+        "[start]",
+        f"latitude_deg = {g.uniform(-75.0, 75.0):.4f}",
+        f"longitude_deg = {g.uniform(-179.0, 179.0):.4f}",
+        f"heading_deg = {g.uniform(0.0, 360.0):.2f}",
+        f"speed_m_s = {speed:.3f}",
+        *([f"depth_m = {g.uniform(1.0, 60.0):.1f}"] if under_water else []),
+        "[initial_error]",
+        "position_m = [2.0, 2.0, 1.0]",
+        "velocity_m_s = [0.1, 0.1, 0.1]",
+        f"attitude_deg = [{tilt:.3f}, {tilt:.3f}, {heading:.3f}]",
+        "[vessel]",
+        f'kind = "{"uuv" if under_water else "ship"}"',
+        f"turn_rate_deg_s = {g.uniform(1.0, 8.0):.2f}",
+        "[[manoeuvre]]",
+        'kind = "hold"',
+        f"duration_s = {g.uniform(20.0, 60.0):.1f}",
+        "[[manoeuvre]]",
+        'kind = "zigzag"',
+        f"angle_deg = {g.uniform(10.0, 60.0):.1f}",
+        "duration_s = 150.0",
+    ]
+    if g.random() < 0.6:
+        lines += [
+            "[sea]",
+            f"significant_height_m = {log_uniform(0.2, 4.0):.2f}",
+            f"peak_period_s = {g.uniform(4.0, 12.0):.1f}",
+            f"direction_deg = {g.uniform(0.0, 360.0):.0f}",
+        ]
+    lines += [
+        "[instruments.imu]",
+        "rate_hz = 100.0",
+        "[instruments.imu.gyroscope]",
+        f"bias_deg_h = {1000.0 * grade:.4f}",
+        f"bias_instability_deg_h = {50.0 * grade:.5f}",
+        "correlation_time_s = 600.0",
+        f"random_walk_deg_sqrt_h = {grade:.6f}",
+        "[instruments.imu.accelerometer]",
+        f"bias_ug = {70000.0 * grade:.3f}",
+        f"bias_instability_ug = {300.0 * grade:.4f}",
+        "correlation_time_s = 600.0",
+        f"random_walk_ug_sqrt_hz = {1000.0 * grade:.4f}",
+        "[instruments.dvl]",
+        f"rate_hz = {dvl:.3f}",
+        f"sigma_m_s = {log_uniform(0.005, 0.1):.4f}",
+        f"scale_percent = {log_uniform(0.05, 1.0):.3f}",
+        f"misalignment_deg = {log_uniform(0.05, 2.0):.3f}",
+        f"lever_arm_m = {arm(3.0)}",
+        "[instruments.gnss]",
+        'kind = "gnss_position"',
+        f"rate_hz = {gnss:.3f}",
+        f"sigma_m = [{sigma:.3f}, {sigma:.3f}, {2.0 * sigma:.3f}]",
+        f"lever_arm_m = {arm(5.0)}",
+    ]
+    if g.random() < 0.4:
+        lines += [
+            "[instruments.gyrocompass]",
+            f"rate_hz = {log_uniform(0.5, 10.0):.2f}",
+            "sigma_deg = 0.5",
+            "bias_deg = 0.3",
+        ]
+    if under_water:
+        lines += ["[instruments.depth]", f"rate_hz = {log_uniform(1.0, 10.0):.2f}", "sigma_m = 0.1"]
+    drawn = {
+        "number": number, "vessel": vessel, "grade": grade, "heading_deg": heading, "dvl_hz": dvl, "gnss_hz": gnss,
+        "gnss_sigma_m": sigma, "speed_m_s": speed,
+    }  # fmt: skip
+    return "\n".join(lines), drawn
+
+
+def turned(recording: Recording, off_deg: float) -> Recording:
+    """The recording with an initial heading that is off by an angle, of which its sigma tells."""
+    start, off = recording.start, np.radians(off_deg)
+    attitude, covariance = start.attitude.copy(), start.covariance.copy()
+    attitude[2] = wrap_angle(recording.initial.attitude[0, 2] + off)
+    covariance[8, 8] = off**2
+    return replace(recording, start=replace(start, attitude=attitude, covariance=covariance))
+
+
+def run(recording: Recording, estimator: str) -> dict[str, Any]:
+    """The errors of an estimator, ``name`` or ``name:parameter=value``, on a voyage."""
+    name, *given = estimator.split(":")
+    parameters = dict(pair.split("=", 1) for pair in given)
+    begun = process_time()
+    trial = simnav.run_trial(make(name, **parameters), recording)
+    seconds = process_time() - begun
+    found: dict[str, Any] = {"status": trial.status, "milliseconds": 1e3 * seconds / max(len(trial), 1)}
+    if len(trial):
+        scores = simnav.score(trial, recording)
+        found |= {k: float(scores[k]) for k in ("horizontal_rmse", "heading_rmse", "nees_horizontal", "nees_attitude")}
+    return found
+
+
+def _run_all(arguments: argparse.Namespace) -> None:
+    path: Path = arguments.results
+    done = {json.loads(line)["number"] for line in path.read_text().splitlines()} if path.exists() else set()
+    for number in range(arguments.first, arguments.first + arguments.count):
+        if number in done:
+            continue
+        toml, row = voyage(number, *arguments.heading)
+        row["heading_off_deg"] = arguments.heading_off
+        recording = simnav.record(parse(toml), number)
+        if arguments.heading_off:
+            recording = turned(recording, arguments.heading_off)
+        row["errors"] = {e: run(recording, e) for e in arguments.estimators.split(",")}
+        with path.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+
+
+def _table(arguments: argparse.Namespace) -> None:
+    rows = [json.loads(line) for path in arguments.results for line in path.read_text().splitlines()]
+    for low, high in ((0.0, 2.0), (2.0, 10.0), (10.0, 180.0), (0.0, 180.0)):
+        some = [r for r in rows if low <= r["heading_deg"] < high]
+        if not some:
+            continue
+        print(f"\ninitial heading known to {low:g} to {high:g} deg, {len(some)} voyages")
+        print(f"{'estimator':30s} median    p90     max  (voyage)  NEES > {LARGEST_NEES:g}  not ok  ms an epoch")
+        for name in some[0]["errors"]:
+            ratios, numbers, high_nees, failed, cost = [], [], 0, 0, []
+            for r in some:
+                e = r["errors"]
+                best = min(e[b]["horizontal_rmse"] for b in BEST_OF if b in e and "horizontal_rmse" in e[b])
+                if e[name]["status"] != "ok":
+                    failed += 1
+                    continue
+                ratios.append(e[name]["horizontal_rmse"] / best)
+                numbers.append(r["number"])
+                high_nees += e[name]["nees_horizontal"] > LARGEST_NEES
+                cost.append(e[name]["milliseconds"])
+            if not ratios:
+                continue
+            worst = int(np.argmax(ratios))
+            print(
+                f"{name:30s} {np.median(ratios):6.3f} {np.percentile(ratios, 90):6.2f} {ratios[worst]:7.2f}"
+                f"  ({numbers[worst]})  {high_nees:6d}  {failed:9d}  {np.median(cost):8.2f}"
+            )
+
+
+def main() -> None:
+    """The command of the module."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(required=True)
+    runs = commands.add_parser("run", help="run estimators over voyages")
+    runs.add_argument("results", type=Path)
+    runs.add_argument("--first", type=int, default=31000, help="seed of the first voyage")
+    runs.add_argument("--count", type=int, default=200)
+    runs.add_argument("--heading", type=float, nargs=2, default=(0.1, 45.0), help="range of its initial sigma [deg]")
+    runs.add_argument("--heading-off", type=float, default=0.0, help="start off by this angle, and know it [deg]")
+    runs.add_argument("--estimators", default=",".join(BEST_OF))
+    runs.set_defaults(call=_run_all)
+    table = commands.add_parser("table", help="print the table")
+    table.add_argument("results", type=Path, nargs="+")
+    table.set_defaults(call=_table)
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    arguments.call(arguments)
+
+
+if __name__ == "__main__":
+    main()
