@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
+from simnav.estimators.models.nine_state import NineStateModel
 from simnav.recording import Recording
-from simnav.rotation import left_jacobian, rotation_vector_from_dcm
+from simnav.rotation import dcm_from_rotation_vector, left_jacobian, rotation_vector_from_dcm
 from simnav.scenario import load
 from simnav.source import record
 from simnav.types import Array
@@ -89,29 +91,187 @@ def test_preintegrated_motion_is_integrating_again(recording: Recording):
     assert np.max(np.abs(linear[3:6] - expected[3:6])) > 1e-3
 
 
-def test_the_motion_jacobian_is_its_derivative(recording: Recording):
-    chain = built(recording, 1.0)
-    n = chain.size
-    rng = np.random.default_rng(2)
-    step = np.zeros((2, n))
-    step[:, :15] = SCALE * rng.normal(size=(2, 15))
+#: Shifts that a poor start brings about: 100 m, 10 m/s, 0.5 rad, 1 deg/s, 0.1 g.
+LARGE = np.repeat([100.0, 10.0, 0.5, np.radians(1.0), 0.981], 3)
+#: Of the blocks of a Jacobian, what counts as small: an error of that in the row's unit for one of `LARGE` in the
+#: column's is far below what any motion factor knows (1e-3 m, 1e-4 m/s, 1e-6 rad).
+NEGLIGIBLE = np.repeat([1e-3, 1e-4, 1e-6, 1e-12, 1e-9], 3)
+
+
+def shifted(model: InertialModel, recording: Recording, until: float, seed: int) -> InertialChain:
+    """Two nodes, the first far from where it was predicted, the second where the motion leads from there."""
+    chain = InertialChain(model)
+    chain.begin(recording.start, recording.instruments)
+    packet = next(iter(recording.steps()))
+    chain.load(packet.imu)
+    chain.propagate(until)
+    chain.extend()
+    step = np.zeros((2, chain.size))
+    m = min(chain.size, 15)
+    step[0, :m] = LARGE[:m] * np.random.default_rng(seed).uniform(-1.0, 1.0, m)
     chain.retract(step)
+    for _ in range(2):
+        chain.linearise_motion()
+        step[:] = 0.0
+        step[1] = -chain.motions["residual"][0]
+        chain.retract(step)
     chain.linearise_motion()
-    jacobian, residual = chain.motions["jacobian"][0].copy(), chain.motions["residual"][0].copy()
-    states = chain.copy_states()
+    np.testing.assert_allclose(chain.motions["residual"][0], 0.0, atol=1e-9)
+    return chain
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("until", [0.2, 1.0])
+@pytest.mark.parametrize(
+    "model", [InertialModel, lambda: InertialModel(calibrate=False), NineStateModel, DvlCalibrationModel]
+)
+def test_the_motion_jacobian_is_its_derivative(model, recording: Recording, until: float, seed: int):
+    """Block by block, far from where the motion was predicted: also where a bias has moved with the attitude."""
+    chain = shifted(model(), recording, until, seed)
+    n, m = chain.size, min(chain.size, 15)
+    jacobian, states = chain.motions["jacobian"][0].copy(), chain.copy_states()
+    numeric = np.empty((n, n))
     for j in range(n):
-        size = 1e-4 * (SCALE[j] if j < 15 else 1.0)
-        derivative = []
+        size = 1e-5 * (LARGE[j] if j < 15 else 1.0)
+        ends = []
         for sign in (1.0, -1.0):
             step = np.zeros((2, n))
             step[0, j] = sign * size
             chain.retract(step)
             chain.linearise_motion()
-            derivative.append(chain.motions["residual"][0] - residual)
+            ends.append(chain.motions["residual"][0].copy())
             chain.restore_states(states)
-        numeric = -(derivative[0] - derivative[1]) / (2.0 * size)
-        tolerance = 2e-2 * np.max(np.abs(jacobian[:, j]))  # the derivative of the logarithm: half the residual's angle
-        np.testing.assert_allclose(jacobian[:, j], numeric, atol=tolerance, err_msg=f"column {j}")
+        numeric[:, j] = (ends[1] - ends[0]) / (2.0 * size)
+    for row in range(0, m, 3):
+        for column in range(0, m, 3):
+            ours, theirs = (J[row : row + 3, column : column + 3] for J in (jacobian, numeric))
+            tolerance = max(1e-4 * np.max(np.abs(theirs)), NEGLIGIBLE[row] / LARGE[column])
+            np.testing.assert_allclose(ours, theirs, atol=tolerance, err_msg=f"block {row}, {column}")
+    np.testing.assert_allclose(jacobian[m:], numeric[m:], atol=1e-9)
+    np.testing.assert_allclose(jacobian[:m, m:], 0.0, atol=0.0)
+
+
+def test_the_derivative_by_the_heading_holds_the_shift_of_the_bias(recording: Recording):
+    """With an accelerometer bias of 0.1 g that was found since, turning the node turns 0.1 g of specific force."""
+    chain = InertialChain(InertialModel())
+    chain.begin(recording.start, recording.instruments)
+    chain.load(next(iter(recording.steps())).imu)
+    chain.propagate(1.0)
+    chain.extend()
+    step = np.zeros((2, chain.size))
+    step[0, 12] = 0.981
+    chain.retract(step)
+    chain.linearise_motion()
+    added = (chain.motions["jacobian"][0] - chain.motions["transition"][0])[3:6, 8]
+    bias = chain.motions["transition"][0][3:6, 12] * 0.981
+    np.testing.assert_allclose(added, [-bias[1], bias[0], 0.0], atol=1e-9)
+    assert np.hypot(*added[:2]) > 0.5
+
+
+@pytest.mark.parametrize("sizes", [(1e-3, 1e-3), (9.8e-3, 9.8e-3), (0.01, 0.02), (0.5, 1.0), (3.0, 3.0), (3.0, 0.0)])
+def test_rotations_compose_exactly(sizes: tuple[float, float]):
+    """On both sides of where the series ends; through a shift taken off another."""
+    rng = np.random.default_rng(3)
+    chain = InertialChain(InertialModel())
+    for _ in range(20):
+        a, b = (size * v / np.linalg.norm(v) for size, v in zip(sizes, rng.normal(size=(2, 3))))
+        shift, step = np.zeros(15), np.zeros(15)
+        shift[6:9], step[6:9] = a, -b
+        expected = dcm_from_rotation_vector(a) @ dcm_from_rotation_vector(b)
+        found = dcm_from_rotation_vector(chain.less(shift, step)[6:9])
+        np.testing.assert_allclose(found, expected, atol=5e-9)
+
+
+def test_a_step_along_the_motion_leaves_the_linear_motion_errors(recording: Recording):
+    """However large the rotation, where a straight step leaves the motion by centimetres a second."""
+    chain = built(recording, 4.0)
+    rng = np.random.default_rng(4)
+    count, n = len(chain.nodes), chain.size
+    chain.linearise_motion()
+    m = chain.motions
+    # A large step that obeys the linear motion up to small errors
+    step, errors = np.zeros((count, n)), np.zeros((count - 1, n))
+    step[0, :15] = SCALE * rng.normal(size=15)
+    step[0, 8] = 0.7
+    errors[:, :15] = 1e-3 * SCALE * rng.normal(size=(count - 1, 15))
+    for k in range(count - 1):
+        step[k + 1] = m["jacobian"][k] @ step[k] - m["residual"][k] + errors[k]
+    along = chain.along_motion(step)
+    np.testing.assert_array_equal(along[0], step[0])
+    states = chain.copy_states()
+    chain.retract(step)
+    chain.linearise_motion()
+    straight = m["residual"].copy()
+    chain.restore_states(states)
+    chain.retract(along)
+    chain.linearise_motion()
+    np.testing.assert_allclose(m["residual"], errors, atol=1e-7)
+    assert np.max(np.abs(straight - errors)[:, 3:6]) > 0.03  # hundreds of sigmas of the motion
+
+
+def folded(recording: Recording, spread: bool) -> InertialChain:
+    """Measurements after the start: each at a node of its own, or all folded onto the first node."""
+    chain = InertialChain(InertialModel())
+    chain.begin(recording.start, recording.instruments)
+    for packet in recording.steps():
+        chain.load(packet.imu)
+        for measurement in packet.aids:
+            chain.propagate(measurement.time)
+            if spread and chain.ahead > 0.0:
+                chain.extend()
+            chain.attach(measurement, 0.01 * np.eye(len(measurement.value)))
+        break
+    return chain
+
+
+def test_a_folded_measurement_is_seen_through_the_motion(recording: Recording):
+    """Its residual is that at a node of its own that has no motion error; its Jacobian the derivative of that."""
+    at_nodes, onto_first = folded(recording, True), folded(recording, False)
+    n = onto_first.size
+    assert len(onto_first.nodes) == 1
+    assert len(onto_first.folds) == len(set(onto_first.aids["time"])) >= 2
+    shift = np.zeros(n)
+    shift[:15] = LARGE * np.random.default_rng(5).uniform(-0.5, 0.5, 15)
+    onto_first.retract(shift[None].copy())
+    step = np.zeros((len(at_nodes.nodes), n))
+    step[0] = shift
+    at_nodes.linearise_motion()
+    for k in range(1, len(step)):
+        step[k] = at_nodes.motions["jacobian"][k - 1] @ step[k - 1]
+    at_nodes.retract(at_nodes.along_motion(step))
+    at_nodes.linearise_motion()
+    np.testing.assert_allclose(at_nodes.motions["residual"], 0.0, atol=1e-7)
+    at_nodes.linearise_aids()
+    onto_first.linearise_aids()
+    np.testing.assert_allclose(onto_first.aids["residual"], at_nodes.aids["residual"], atol=2e-3)
+    jacobian, states = onto_first.aids["jacobian"].copy(), onto_first.copy_states()
+    for j in range(15):
+        size = 1e-5 * LARGE[j]
+        ends = []
+        for sign in (1.0, -1.0):
+            one = np.zeros((1, n))
+            one[0, j] = sign * size
+            onto_first.retract(one)
+            onto_first.linearise_aids()
+            ends.append(onto_first.aids["residual"].copy())
+            onto_first.restore_states(states)
+        numeric = (ends[1] - ends[0]) / (2.0 * size)
+        scale = np.abs(numeric).max(axis=1, keepdims=True)
+        assert np.all(np.abs(jacobian[:, :, j] - numeric) < 0.04 * scale + 1e-3 / LARGE[j]), f"column {j}"
+
+
+def test_folded_noise_is_the_measurements_and_the_motions(recording: Recording):
+    chain = folded(recording, False)
+    front = chain.front
+    for packet in recording.steps():
+        last = packet.aids[-1]
+        break
+    linearised = front.measure(last)
+    assert linearised is not None
+    H, d = linearised.jacobian, len(last.value)
+    expected = 0.01 * np.eye(d) + H @ chain._noise @ H.T
+    np.testing.assert_allclose(chain.aids["noise"][-1][:d, :d], expected, rtol=1e-9)
+    assert np.trace(expected) > 0.01 * d
 
 
 def test_all_aids_at_once_are_what_the_model_says_of_each(recording: Recording):

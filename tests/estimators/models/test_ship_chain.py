@@ -103,6 +103,72 @@ def test_derivatives_by_central_differences(chain: ShipChain):
                 np.testing.assert_allclose(aid_slope[i], expected, atol=3e-4)
 
 
+def test_a_step_along_the_motion_leaves_the_linear_motion_errors(chain: ShipChain):
+    rng = np.random.default_rng(6)
+    n = chain.size
+    residuals(chain)
+    jacobian, before = chain.motions["jacobian"].copy(), chain.motions["residual"].copy()
+    errors = 1e-3 * rng.standard_normal((2, n))
+    step = np.zeros((3, n))
+    step[0] = rng.standard_normal(n) * np.where(np.arange(n) < 2, 30.0, 0.02)
+    step[0, 3] = 1.0  # the heading
+    for k in range(2):
+        step[k + 1] = jacobian[k] @ step[k] - before[k] + errors[k]
+    along, states = chain.along_motion(step), chain.copy_states()
+    chain.retract(step)
+    straight = residuals(chain)[0]
+    chain.restore_states(states)
+    chain.retract(along)
+    motion, _ = residuals(chain)
+    np.testing.assert_allclose(motion, errors, atol=2e-5)  # the radii change over metres
+    assert np.max(np.abs(straight - errors)[:, :2]) > 0.3
+
+
+def test_a_folded_measurement_is_one_at_a_node_without_motion_error(recording_of):
+    """The same residual, and the derivative of it through the motion, far from where the front went."""
+    found = []
+    for spread in (True, False):
+        chain = ShipChain(ShipModel())
+        recording = recording_of(1, 5.0, imu=None)
+        chain.begin(recording.start, recording.instruments)
+        for m in next(iter(recording.steps())).aids:
+            if not chain.observes(recording.instruments[m.instrument]):
+                continue
+            chain.propagate(m.time)
+            if spread and chain.ahead > 0.0:
+                chain.extend()
+            chain.attach(m, np.eye(chain.front.nominal_noise(m).shape[0]))
+        found.append(chain)
+    nodes, first = found
+    n = first.size
+    assert len(first.nodes) == 1
+    assert len(first.folds) >= 2
+    step = np.zeros((len(nodes.nodes), n))
+    step[0] = np.random.default_rng(7).standard_normal(n) * np.where(np.arange(n) < 2, 30.0, 0.02)
+    step[0, 3] = 0.8
+    first.retract(step[:1].copy())
+    nodes.linearise_motion()
+    for k in range(1, len(step)):
+        step[k] = nodes.motions["jacobian"][k - 1] @ step[k - 1]
+    nodes.retract(nodes.along_motion(step))
+    np.testing.assert_allclose(residuals(nodes)[0], 0.0, atol=2e-5)
+    first.linearise_aids()
+    np.testing.assert_allclose(first.aids["residual"], nodes.aids["residual"], atol=1e-3)  # one step or several
+    jacobian = first.aids["jacobian"].copy()
+    for k in range(n):
+        h = 1.0 if k < 2 else 1e-5
+        ends = []
+        for sign in (1.0, -2.0):
+            one = np.zeros((1, n))
+            one[0, k] = sign * h
+            first.retract(one)
+            first.linearise_aids()
+            ends.append(first.aids["residual"].copy())
+        one[0, k] = h
+        first.retract(one)
+        np.testing.assert_allclose(jacobian[:, :, k], (ends[1] - ends[0]) / (2 * h), atol=3e-4)
+
+
 def test_aids_are_those_of_the_model(chain: ShipChain):
     """All at once on their nodes, and one by one at the front: the same."""
     residuals(chain)

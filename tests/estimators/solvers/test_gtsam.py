@@ -169,9 +169,10 @@ def test_motion_spreads_errors_as_the_inertial_model_does(seconds: float):
     )
 
 
+@pytest.mark.parametrize("bias_size", [1e-3, 0.981], ids=["usual bias", "0.1 g"])
 @pytest.mark.parametrize("lever", [True, False])
 @pytest.mark.parametrize("kind", KINDS)
-def test_aiding_factors_against_finite_differences(kind: str, lever: bool):
+def test_aiding_factors_against_finite_differences(kind: str, lever: bool, bias_size: float):
     sigma, value = KINDS[kind]
     sheet = Datasheet("aid", kind, 1.0, np.array(sigma), lever_arm=ARM if lever else np.zeros(3))
     _, samples, _, velocity, rpy = seaway(2.0)
@@ -181,7 +182,8 @@ def test_aiding_factors_against_finite_differences(kind: str, lever: bool):
     linearised = graph.linearise(measurement)
     assert linearised is not None
     _, values = graph.extend()
-    bias = gtsam.imuBias.ConstantBias(np.array([1e-3, -2e-3, 3e-3]), np.array([1e-4, 2e-4, -3e-4]))
+    gyroscope = min(bias_size / 10.0, np.radians(1.0)) * np.array([1.0, 2.0, -3.0])
+    bias = gtsam.imuBias.ConstantBias(bias_size * np.array([1.0, -2.0, 3.0]), gyroscope)
     factor = graph.aid(graph.observe(measurement, linearised.noise))
     # The error is prediction less measurement; of GNSS positions in the axes of the frame, all but those of the place.
     np.testing.assert_allclose(factor.unwhitenedError(values), -linearised.innovation, atol=2e-5)

@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
+from simnav.estimator import make
 from simnav.estimators.ekf import Ekf
 from simnav.estimators.iterated import IteratedEkf
 from simnav.rotation import left_jacobian, rotation_vector_from_dcm, skew
@@ -116,3 +117,45 @@ def test_small_errors_take_two_linearisations_and_give_the_ekf(recording_of, run
 def test_bad_parameters(parameters: dict, sentence: str):
     with pytest.raises(ValueError, match=sentence):
         IteratedEkf(**parameters)
+
+
+def test_a_filter_may_iterate_until_the_heading_is_known(recording_of):
+    """Above the limit it is ``iekf``, below it ``ekf``."""
+    recording = recording_of(5, 60.0, aids=(GNSS, DVL))  # without a compass, the heading takes a while
+    poor = np.diag(recording.start.covariance).copy()
+    poor[8] = np.radians(30.0) ** 2
+    start = replace(recording.start, covariance=np.diag(poor))
+    both = {"iekf": IteratedEkf(), "ekf": Ekf(), "switch": Ekf(iterate_above_deg=10.0)}
+    for estimator in both.values():
+        estimator.reset(start, recording.instruments)
+    sigmas, iterated = [], []
+    for packet in recording.steps():
+        out = {name: estimator.update(packet) for name, estimator in both.items()}
+        if len(sigmas) == 0:
+            np.testing.assert_array_equal(out["switch"].position, out["iekf"].position)
+            assert np.any(out["switch"].position != out["ekf"].position)
+        sigmas.append(np.degrees(np.sqrt(out["switch"].covariance[8, 8])))
+        iterated.append("iterations" in out["switch"].diagnostics)
+    assert iterated[0]
+    assert sigmas[-1] < 10.0
+    assert not iterated[-1]
+
+
+@pytest.mark.parametrize("name", ["ekf", "ekf-23", "ekf-9", "iae", "huber-kf", "vb-akf", "mckf"])
+def test_rows_over_the_inertial_model_take_it(name: str, recording_of):
+    recording = recording_of(5, 3.0)
+    estimator = make(name, iterate_above_deg="0")
+    estimator.reset(recording.start, recording.instruments)
+    assert estimator.update(next(iter(recording.steps()))).diagnostics["iterations"] >= 1.0
+
+
+def test_a_model_without_an_attitude_does_not_iterate_by_its_heading(recording_of):
+    recording = recording_of(5, 3.0, imu=None)
+    estimator = make("huber-kf", iterate_above_deg=0.001)
+    estimator.reset(recording.start, recording.instruments)
+    assert "iterations" not in estimator.update(next(iter(recording.steps()))).diagnostics
+
+
+def test_a_limit_that_makes_no_sense():
+    with pytest.raises(ValueError, match="0 deg or more, not -1"):
+        Ekf(iterate_above_deg=-1.0)
