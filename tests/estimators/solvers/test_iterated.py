@@ -125,7 +125,7 @@ def test_a_filter_may_iterate_until_the_heading_is_known(recording_of):
     poor = np.diag(recording.start.covariance).copy()
     poor[8] = np.radians(30.0) ** 2
     start = replace(recording.start, covariance=np.diag(poor))
-    both = {"iekf": IteratedEkf(), "ekf": Ekf(), "switch": Ekf(iterate_above_deg=10.0)}
+    both = {"iekf": IteratedEkf(), "ekf": Ekf(), "switch": Ekf(iterate_above_deg=1.5)}
     for estimator in both.values():
         estimator.reset(start, recording.instruments)
     sigmas, iterated = [], []
@@ -137,7 +137,7 @@ def test_a_filter_may_iterate_until_the_heading_is_known(recording_of):
         sigmas.append(np.degrees(np.sqrt(out["switch"].covariance[8, 8])))
         iterated.append("iterations" in out["switch"].diagnostics)
     assert iterated[0]
-    assert sigmas[-1] < 10.0
+    assert sigmas[-1] < 1.5
     assert not iterated[-1]
 
 
