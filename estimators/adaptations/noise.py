@@ -186,6 +186,11 @@ class NoiseAdaptation(Adaptation):
 class EstimatedNoise(NoiseAdaptation):
     """An adaptation that estimates R; holds its bounds and says whose R is estimated. A subclass gives `estimate`.
 
+    An innovation of covariance ``H P H' + R`` says little of R where the prediction is less certain than the
+    measurement, as after a start from a poor heading, in an outage, or with centimetre positions. There the noise that
+    was used last stands, and the estimate does not see the innovation. Without this rule, random clean voyages cost
+    ``iae-fgo`` up to twice the error of ``sw-fgo``.
+
     Parameters
     ----------
     lowest, highest : float
@@ -196,9 +201,7 @@ class EstimatedNoise(NoiseAdaptation):
         False: variances only, with the nominal correlations. An instrument's components err independently by its
         datasheet, and m (m - 1)/2 covariances that are zero cost accuracy to estimate.
     scope : "fixes" or "all"
-        Whose noise is estimated: GNSS positions and terrain fixes (as in paper 001), or every instrument's. Where the
-        prediction is less certain than the measurement, as often for a DVL or a compass, an innovation says little of
-        R.
+        Whose noise is estimated: GNSS positions and terrain fixes (as in paper 001), or every instrument's.
 
     Raises
     ------
@@ -220,9 +223,12 @@ class EstimatedNoise(NoiseAdaptation):
         """The (m, m) noise estimated, within the bounds, this innovation included."""
 
     def choose(self, innovation: Innovation) -> Array:
-        """The estimate, or the nominal noise where the instrument is out of scope."""
+        """The estimate; the nominal noise of an instrument out of scope; the last one after a poor prediction."""
         if self.scope == "fixes" and innovation.measurement.kind not in self.FIXES:
             return innovation.noise
+        before = self._reported.get(innovation.measurement.instrument, innovation.noise)
+        if innovation.predicted.trace() > before.trace():
+            return before
         return self.estimate(innovation)
 
     def bounded(self, estimate: Array, nominal: Array) -> Array:

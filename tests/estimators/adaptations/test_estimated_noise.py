@@ -106,19 +106,36 @@ def test_a_fixed_window_is_eqs_16_to_18():
 def test_each_innovation_has_its_own_prediction():
     """With a P that shrinks, eq. 17 as printed is biased upwards; the default is not."""
     rng = np.random.default_rng(4)
-    noise = np.diag([2.0, 2.0, 8.0])
+    noise, nominal = np.diag([2.0, 2.0, 8.0]), 30.0 * np.eye(3)
     given = []
     for k in range(400):
-        p = np.eye(3) * 200.0 * 0.99**k
+        p = np.eye(3) * 25.0 * 0.99**k  # always better than the nominal measurement
         v = rng.multivariate_normal(np.zeros(3), p + noise)
-        given.append(Innovation(Measurement(k, "gnss", "gnss_position", np.zeros(3)), v, p, NOMINAL))
+        given.append(Innovation(Measurement(k, "gnss", "gnss_position", np.zeros(3)), v, p, nominal))
     window = {"shortest": 200, "longest": 200, "forgetting": 1.0, "lowest": 1e-3}
-    printed = np.diag(feed(InnovationBased(**window, newest=True), given)[-1])
-    default = np.diag(feed(InnovationBased(**window), given)[-1])
+    found = {}
+    for newest in (True, False):
+        adaptation = InnovationBased(**window, newest=newest)
+        adaptation.reset(GNSS)
+        found[newest] = np.diag([adaptation.estimate(i) for i in given][-1])
     variances = [i.predicted[0, 0] for i in given[200:]]
-    np.testing.assert_allclose(printed - default, np.mean(variances) - variances[-1])
-    assert np.mean(variances) - variances[-1] > 5.0
-    np.testing.assert_allclose(default, np.diag(noise), atol=4.0)
+    np.testing.assert_allclose(found[True] - found[False], np.mean(variances) - variances[-1])
+    assert np.mean(variances) - variances[-1] > 0.5
+    np.testing.assert_allclose(found[False], np.diag(noise), atol=2.0)
+
+
+@pytest.mark.parametrize(
+    "adaptation", [SageHusa(), InnovationBased(), VariationalBayes()], ids=["sage-husa", "iae", "vb"]
+)
+def test_an_innovation_of_a_poor_prediction_says_nothing_of_the_noise(adaptation):
+    """The noise used last stands, and the estimate goes on as if the innovation had not been."""
+    usual, poor = innovations(60), innovations(30, seed=1, predicted=1e4 * np.eye(3))
+    adaptation.together = 0
+    with_poor = feed(adaptation, [*usual[:40], *poor, *usual[40:]])
+    np.testing.assert_array_equal(with_poor[40:70], [with_poor[39]] * 30)
+    without = feed(adaptation, usual)
+    np.testing.assert_allclose(with_poor[70:], without[40:], rtol=1e-12)
+    assert np.ptp([noise[0, 0] for noise in without]) > 0.0
 
 
 def test_the_window_of_eq_20():
