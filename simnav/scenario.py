@@ -25,7 +25,7 @@ from pydantic import Field, field_validator, model_validator
 
 from simnav.catalogue import NAME, Header, gym_id, headers
 from simnav.log.spec import RecordedSpec
-from simnav.sensors import FaultSpec, ImuSpec, InstrumentSpec
+from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
 from simnav.spec import Positive, Spec, SpecError, closest, entries, quantity
 from simnav.types import KINDS, Array, Instruments
 from simnav.world import Current, Manoeuvre, Sea, Start, Vessel
@@ -99,10 +99,10 @@ class Scenario(Spec):
     manoeuvres: tuple[Manoeuvre, ...] = entries("manoeuvre", (), description="in order; the last holds to the end")
     sea: Sea | None = Field(None, description="waves; absent: flat calm")
     current: Current | None = Field(None, description="absent: none")
-    instruments: dict[str, InstrumentSpec | ImuSpec] = Field(
+    instruments: dict[str, AnyInstrument] = Field(
         default_factory=dict, description="by name; the IMU, if there is one, is called imu"
     )
-    faults: tuple[FaultSpec, ...] = entries("fault", (), description="laid over the measurements, in order")
+    faults: tuple[AnyFault, ...] = entries("fault", (), description="laid over the measurements, in order")
     log: RecordedSpec | None = Field(None, description="files of a recorded run; then there is no simulated world")
 
     @property
@@ -132,7 +132,7 @@ class Scenario(Spec):
         return spec if isinstance(spec, ImuSpec) else None
 
     @property
-    def aids(self) -> dict[str, InstrumentSpec]:
+    def aids(self) -> dict[str, AidSpec]:
         """The instruments beside the IMU, by name, in order."""
         return {n: s for n, s in self.instruments.items() if not isinstance(s, ImuSpec)}
 

@@ -34,6 +34,7 @@ from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, O
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from simnav.estimators.models.measurements import CODES, HEADING, observe, uncalibrated_noise, white_noise
 from simnav.estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
+from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.rotation import dcm_from_rpy
 from simnav.types import (
     Array,
@@ -150,7 +151,7 @@ class InertialModel(ErrorModel):
                 gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
                 for b, s in zip(sheet.bias, sheet.bias_instability)
             ]
-            if sheet.kind == "speed_log":
+            if sheet.equation == WATER_SPEED:
                 current = GaussMarkov(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME, 0.0)
                 states = [GaussMarkov(states[0].variance + current.variance, current.decay, current.noise, 0.0)]
             fast = sheet.correlation_time < 0.5 / sheet.rate
@@ -160,16 +161,16 @@ class InertialModel(ErrorModel):
             elif any(s.variance or s.noise for s in states):
                 self.bias_at[sheet.name] = _NAV + len(self._states)
                 self._states += [(s.variance, s.decay, s.noise) for s in states]
-            if sheet.kind in ("dvl", "speed_log") and (sheet.scale or np.any(sheet.misalignment)):
+            if sheet.equation in (BODY_VELOCITY, WATER_SPEED) and (sheet.scale or np.any(sheet.misalignment)):
                 if self.calibrate:
                     self.scale_at[sheet.name] = _NAV + len(self._states)
-                    extra = sheet.misalignment if sheet.kind == "dvl" else ()
+                    extra = sheet.misalignment if sheet.equation == BODY_VELOCITY else ()
                     self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
                 else:
                     self.uncalibrated.add(sheet.name)
             self.noise[sheet.name] = white_noise(sheet, white, self._rate_variance)
             self.aid_parameters[sheet.name] = (
-                CODES[sheet.kind], np.array(sheet.lever_arm, dtype=np.float64),
+                CODES[sheet.equation], np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
         # A subclass that measures or corrects in a way of its own does so step by step.
@@ -187,8 +188,8 @@ class InertialModel(ErrorModel):
         return []
 
     def observes(self, instrument: Datasheet) -> bool:
-        """Every kind of instrument."""
-        return instrument.kind in CODES
+        """Every kind of instrument that has a measurement equation."""
+        return instrument.equation in CODES
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""

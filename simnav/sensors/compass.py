@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from simnav.earth import ROTATION_RATE, principal_radii
-from simnav.sensors.instrument import AidSpec, Instrument
+from simnav.kinds import HEADING, Component, Kind
+from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.spec import NonNegative, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["Gyrocompass", "MagneticCompass"]
 
+HEADING_COMPONENT = (Component("heading", "deg", cyclic=True),)
 
+
+@register_instrument(Kind("true heading", "heading", HEADING_COMPONENT, HEADING), example={"sigma_deg": 1.0})
 class MagneticCompass(AidSpec):
     """Heading of a magnetic compass, corrected for variation.
 
@@ -21,6 +25,8 @@ class MagneticCompass(AidSpec):
     Practical Navigator*, 2019, chapter 8: the semicircular coefficients); B and C are drawn with ``deviation``, on top
     of ``fixed_deviation`` = (B, C). The constant coefficient A is the bias.
     """
+
+    errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "deviation")
 
     kind: Literal["magnetic_compass"] = "magnetic_compass"
     sigma: NonNegative = quantity("deg")
@@ -50,6 +56,7 @@ class _MagneticCompass(Instrument):
         return value
 
 
+@register_instrument(Kind("true heading", "heading", HEADING_COMPONENT, HEADING), example={"sigma_deg": 0.5})
 class Gyrocompass(AidSpec):
     """Heading of a gyrocompass.
 

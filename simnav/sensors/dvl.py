@@ -3,19 +3,38 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.kinds import BODY_VELOCITY, Kind, speed_components
 from simnav.rotation import dcm_from_rotation_vector
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, turn_to_body
+from simnav.sensors.instrument import (
+    ZERO,
+    AidSpec,
+    Instrument,
+    SigmaTriple,
+    Triple,
+    register_instrument,
+    turn_to_body,
+)
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["Dvl"]
 
 
+@register_instrument(
+    Kind(
+        "velocity over the ground of the transducer, in body axes",
+        "velocity",
+        speed_components("forward", "starboard", "down"),
+        BODY_VELOCITY,
+        log_columns=("ground_forward", "ground_starboard", "=0"),
+    ),
+    example={"phase_s": 0.3, "sigma_m_s": 0.02},
+)
 class Dvl(AidSpec):
     """Velocity of the transducer over the ground, along axes that are the body axes up to the misalignment::
 
@@ -26,6 +45,8 @@ class Dvl(AidSpec):
     |u|)^2; the datasheet gives sigma. The bottom is in reach while the transducer's altitude is between
     ``minimum_altitude`` and ``maximum_altitude``; without a water depth it always is.
     """
+
+    errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "speed_noise")
 
     kind: Literal["dvl"] = "dvl"
     sigma: SigmaTriple = quantity("m_s")

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, turn_to_body
+from simnav.kinds import WATER_SPEED, Kind, speed_components
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument, turn_to_body
 from simnav.spec import NonNegative, Vector, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["SpeedLog"]
 
 
+@register_instrument(
+    Kind("forward speed through the water", "velocity", speed_components("speed"), WATER_SPEED),
+    example={"sigma_m_s": 0.1},
+)
 class SpeedLog(AidSpec):
     """Forward component of the sensor's velocity through the water, (1 + k) (C' (v - current) + omega x l)_forward."""
 

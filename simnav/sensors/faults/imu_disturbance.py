@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from simnav.recording import ImuLabels
-from simnav.sensors.faults.fault import FaultLayer, FaultSpec, Names
+from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, Names, register_fault
 from simnav.sensors.instrument import ZERO, SigmaTriple, Triple
 from simnav.spec import SpecError, quantity
 from simnav.types import ImuSamples
@@ -17,12 +17,14 @@ from simnav.types import ImuSamples
 __all__ = ["ImuDisturbance"]
 
 
+@register_fault
 class ImuDisturbance(FaultSpec):
     """A constant and white noise on the IMU's output, by body axis; one number is for all three.
 
     ``specific_force_noise`` and ``angular_rate_noise`` are the sigma of a sample.
     """
 
+    effect: ClassVar[Effect] = "imu"
     kind: Literal["imu_disturbance"] = "imu_disturbance"
     instruments: Names = ("imu",)
     specific_force: Triple = quantity("m_s2", ZERO)

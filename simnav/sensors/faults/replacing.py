@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import AidStream
-from simnav.sensors.faults.fault import FaultLayer, FaultSpec
-from simnav.sensors.values import error_between
-from simnav.types import Array
+from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, register_fault
+from simnav.types import KINDS, Array
 
 __all__ = ["FalseZero", "Frozen", "Outage"]
 
 
+@register_fault
 class Outage(FaultSpec):
     """Nothing is delivered; the times of what is missing go to ``AidStream.dropped``."""
 
+    effect: ClassVar[Effect] = "missing"
     kind: Literal["outage"] = "outage"
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
@@ -45,15 +46,17 @@ class _Replacing(FaultLayer):
         self, stream: AidStream, rows: NDArray[np.intp], values: Array, interval: NDArray[np.intp]
     ) -> AidStream:
         value, faults, fault_error = stream.value.copy(), stream.faults.copy(), stream.fault_error.copy()
-        fault_error[rows] += error_between(stream.kind, values, value[rows])
+        fault_error[rows] += KINDS[stream.kind].difference(values, value[rows])
         value[rows] = values
         faults[rows] |= self._bits(interval)
         return replace(stream, value=value, faults=faults, fault_error=fault_error)
 
 
+@register_fault
 class Frozen(FaultSpec):
     """The instrument repeats the last value that it delivered before the interval (or else its first one within)."""
 
+    effect: ClassVar[Effect] = "replaced"
     kind: Literal["frozen"] = "frozen"
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
@@ -87,9 +90,11 @@ class _Frozen(_Replacing):
         return self._replace(stream, rows, values, interval)
 
 
+@register_fault
 class FalseZero(FaultSpec):
     """The instrument says zero on all axes: a DVL that lost lock, or a receiver in the Gulf of Guinea."""
 
+    effect: ClassVar[Effect] = "replaced"
     kind: Literal["false_zero"] = "false_zero"
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
