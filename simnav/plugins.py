@@ -22,7 +22,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Generic, TypeVar
 
-__all__ = ["PluginError", "Registry", "import_file", "place_of"]
+__all__ = ["PluginError", "Registry", "import_file", "load_plugin", "place_of"]
 
 C = TypeVar("C")
 
@@ -80,6 +80,26 @@ def import_file(
         place = f"{path.name}, line {line}" if line else path.name
         raise error(f"{place}: it cannot be imported: {type(cause).__name__}: {text}") from cause
     return module
+
+
+def load_plugin(path: str | Path) -> None:
+    """Load a Python file that registers instruments, faults or estimators; a file that is loaded already is left alone.
+
+    A scenario names such files itself (``plugins = ["beacon.py"]``); packages have entry points instead.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    PluginError
+        If there is no such file, or it cannot be imported: one sentence with its name and the line.
+    """
+    file = Path(path).expanduser().resolve()
+    if not file.is_file():
+        raise PluginError(f"there is no plug-in file {str(path)!r}")
+    import_file(file)
 
 
 def place_of(cls: type) -> tuple[str, int]:

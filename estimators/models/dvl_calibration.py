@@ -89,7 +89,7 @@ class DvlCalibrationModel(InertialModel):
         self._dvl = dvls[0]
         self._gravity = np.array([0.0, 0.0, float(gravity(start.position[0], start.position[2]))])
         covariance = super().begin(start, instruments)
-        self._fused = set(self.noise) - self.uncalibrated - {self._dvl.name}
+        self._fused = set(self.noise) - self.uncalibrated - set(self.own) - {self._dvl.name}
         if self.preset == "paper":
             for sheet in instruments.of_equation(*_PRINTED):
                 self.noise[sheet.name] = _PRINTED[sheet.equation] ** 2 * np.eye(3)

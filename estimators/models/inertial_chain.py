@@ -20,7 +20,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.models.chain import Chain
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import observe_inertial
+from simnav.estimators.models.measurements import OWN, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
 from simnav.rotation import cross, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments
@@ -186,6 +186,9 @@ class InertialChain(Chain):
         front = self.front
         nothing = (0, np.zeros(3), -1, -1)
         known = [front.aid_parameters.get(name, nothing) for name in self.names]
+        for i, name in enumerate(self.names):
+            if name in front.own:  # the compiled loop has no use for its states
+                known[i] = (OWN, np.zeros(3), -1, -1)
         self._codes = np.array([code for code, *_ in known], dtype=np.int64)
         self._arms = np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3)
         self._bias_at = np.array([at for *_, at, _ in known], dtype=np.int64)
@@ -208,8 +211,22 @@ class InertialChain(Chain):
             nodes["position"], nodes["velocity"], nodes["dcm"], nodes["raw_rate"], nodes["bias"], nodes["calibration"],
             aids["residual"], wide, aids["components"],
         )  # fmt: skip
+        if self.front.own:
+            self._linearise_own(first, wide)
         if wide is not jacobian:
             jacobian[first:] = wide[first:, :, : self.size]
+
+    def _linearise_own(self, first: int, jacobian: Array) -> None:
+        """Likewise those aids whose kind has a measurement equation of its own."""
+        nodes, aids, front = self.nodes, self.aids, self.front
+        columns = [nodes[c] for c in ("position", "velocity", "dcm", "raw_rate", "bias", "calibration")]
+        for i in first + np.flatnonzero(self._codes[aids["instrument"][first:]] == OWN):
+            name, node = self.names[aids["instrument"][i]], aids["node"][i] - self.base
+            d = len(front.noise[name])
+            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
+            found = front.observe_own(name, aids["time"][i], aids["value"][i, :d], *(c[node] for c in columns))
+            if found is not None:
+                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""

@@ -44,7 +44,7 @@ class MagneticCompass(AidSpec):
 class _MagneticCompass(Instrument):
     def __init__(self, spec: MagneticCompass, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self.deviation = self._drawn("deviation", np.full(2, spec.deviation)) + spec.fixed_deviation
+        self.deviation = self.drawn("deviation", np.full(2, spec.deviation)) + spec.fixed_deviation
         self._deviates = bool(self.deviation.any())
 
     def observe(self, tap: TapStates) -> Array:

@@ -41,6 +41,6 @@ class Depth(AidSpec):
 class _Depth(Instrument):
     def observe(self, tap: TapStates) -> Array:
         depth = -tap.position[:, 2:]
-        if self._levered:
+        if self.levered:
             depth = depth + self.lever_displacement(tap)[:, 2:]
         return (1.0 + self.scale) * depth

@@ -70,7 +70,7 @@ class Dvl(AidSpec):
 class _Dvl(Instrument):
     def __init__(self, spec: Dvl, name: str, seed: int, water_depth: float | None):
         super().__init__(spec, name, seed)
-        turn = self._drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
+        turn = self.drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
         self.misalignment = turn
         self._matrix: Array = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
         self._speed_noise = spec.speed_noise
@@ -79,7 +79,7 @@ class _Dvl(Instrument):
 
     def observe(self, tap: TapStates) -> Array:
         velocity = turn_to_body(tap.attitude, tap.velocity)
-        if self._levered:
+        if self.levered:
             velocity += self.lever_velocity(tap)
         (x, y, z), m = velocity.T, self._matrix
         # Written out: a matrix product may round differently with the number of rows.
@@ -95,6 +95,6 @@ class _Dvl(Instrument):
         if self._water_depth is None:
             return None
         altitude = self._water_depth + tap.position[:, 2]
-        if self._levered:
+        if self.levered:
             altitude -= self.lever_displacement(tap)[:, 2]
         return (altitude >= self._altitudes[0]) & (altitude <= self._altitudes[1])

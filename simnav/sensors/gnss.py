@@ -52,7 +52,7 @@ class GnssPosition(AidSpec):
 
 class _Position(Instrument):
     def observe(self, tap: TapStates) -> Array:
-        return earth.displace(tap.position, self.lever_displacement(tap)) if self._levered else tap.position
+        return earth.displace(tap.position, self.lever_displacement(tap)) if self.levered else tap.position
 
 
 @register_instrument(
@@ -82,6 +82,6 @@ class GnssVelocity(AidSpec):
 
 class _Velocity(Instrument):
     def observe(self, tap: TapStates) -> Array:
-        if not self._levered:
+        if not self.levered:
             return tap.velocity
         return tap.velocity + turn_to_ned(tap.attitude, self.lever_velocity(tap))

@@ -253,6 +253,18 @@ class Instrument(ABC):
     spec : AidSpec
     name : str
     seed : int
+
+    Attributes
+    ----------
+    definition : Kind
+    sigma, bias : (d,) array
+        White noise, and the bias of this run.
+    scale : float
+        Scale-factor error of this run [-].
+    lever_arm : (3,) array
+        [m]
+    levered : bool
+        Whether the lever arm is not zero.
     """
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
@@ -261,16 +273,17 @@ class Instrument(ABC):
         sheet = spec.datasheet(name)
         self.sigma = sheet.sigma
         self.lever_arm = sheet.lever_arm
-        self.bias = self._drawn("bias", sheet.bias) + spec.figure("fixed_bias")
-        self.scale = float(self._drawn("scale", np.array([sheet.scale]))[0] + spec.figure("fixed_scale"))
+        self.bias = self.drawn("bias", sheet.bias) + spec.figure("fixed_bias")
+        self.scale = float(self.drawn("scale", np.array([sheet.scale]))[0] + spec.figure("fixed_scale"))
         self._noise = stream(seed, "instrument", name, "noise") if self.sigma.any() else None
         self._instability = None
         if sheet.bias_instability.any():
             rng = stream(seed, "instrument", name, "bias_instability")
             self._instability = GaussMarkov(sheet.bias_instability, sheet.correlation_time, rng)
-        self._levered = bool(self.lever_arm.any())
+        self.levered = bool(self.lever_arm.any())
 
-    def _drawn(self, process: str, sigma: Array) -> Array:
+    def drawn(self, process: str, sigma: Array) -> Array:
+        """Values of this run, drawn with one-sigma figures from a random stream that is named after the process."""
         if not sigma.any():
             return np.zeros(len(sigma))
         return sigma * stream(self._seed, "instrument", self.name, process).standard_normal(len(sigma))

@@ -36,6 +36,6 @@ class SpeedLog(AidSpec):
 class _SpeedLog(Instrument):
     def observe(self, tap: TapStates) -> Array:
         velocity = turn_to_body(tap.attitude, tap.velocity - tap.water_velocity)
-        if self._levered:
+        if self.levered:
             velocity += self.lever_velocity(tap)
         return (1.0 + self.scale) * velocity[:, :1]

@@ -37,5 +37,5 @@ class TerrainFix(AidSpec):
 
 class _TerrainFix(Instrument):
     def observe(self, tap: TapStates) -> Array:
-        position = earth.displace(tap.position, self.lever_displacement(tap)) if self._levered else tap.position
+        position = earth.displace(tap.position, self.lever_displacement(tap)) if self.levered else tap.position
         return position[:, :2]

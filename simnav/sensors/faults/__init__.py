@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from simnav.recording import FaultLabel
-from simnav.sensors.faults.additive import BiasStep, GrossError, Multipath, NoiseStep, Ramp
+from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, Multipath, NoiseStep, Ramp
 from simnav.sensors.faults.fault import (
     FAULTS,
     Activity,
@@ -25,12 +25,13 @@ from simnav.sensors.faults.fault import (
     size_range,
 )
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
-from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage
+from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
 from simnav.spec import OneOf
 
 __all__ = [
     "FAULTS",
     "Activity",
+    "AdditiveLayer",
     "AnyFault",
     "BiasStep",
     "Effect",
@@ -45,6 +46,7 @@ __all__ = [
     "NoiseStep",
     "Outage",
     "Ramp",
+    "ReplacingLayer",
     "Size",
     "build_layers",
     "effect_of",

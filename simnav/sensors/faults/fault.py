@@ -305,7 +305,8 @@ class FaultSpec(Spec):
         """What the fault's random streams are named after, besides its occurrence."""
         return self.name or f"{self.kind}:{','.join(self.instruments)}"
 
-    def _key_of_streams(self, index: int, occurrence: int | None) -> str:
+    def key_of_streams(self, index: int, occurrence: int | None) -> str:
+        """The key of the random streams of one run's layer, from what `build` is given."""
         return f"{self.stream_name}#{index if occurrence is None else occurrence}"
 
 
@@ -352,14 +353,14 @@ class Activity:
     """
 
     def __init__(self, spec: FaultSpec, rng: np.random.Generator):
-        self._spec, self._rng = spec, rng
+        self.spec, self._rng = spec, rng
         self._random = spec.mean_active is not None
         intervals = spec.intervals or (() if self._random else ((spec.start, spec.end),))
         self.starts = np.array([a for a, _ in intervals])
         self.ends = np.array([b for _, b in intervals])
 
     def _extend(self, until: float) -> None:
-        spec = self._spec
+        spec = self.spec
         assert spec.mean_active is not None
         assert spec.mean_gap is not None
         end = float(self.ends[-1]) if len(self.ends) else spec.start
@@ -408,21 +409,32 @@ class FaultLayer:
     seed : int
     key : str
         Of its random streams.
+
+    Attributes
+    ----------
+    spec : FaultSpec
+    activity : Activity
+        When it acts.
     """
 
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
-        self._spec, self._index, self._seed, self._key = spec, index, seed, key
-        self.activity = Activity(spec, self._rng("intervals"))
+        self.spec, self._index, self._seed, self._key = spec, index, seed, key
+        self._generators: dict[tuple[str, ...], np.random.Generator] = {}
+        self.activity = Activity(spec, self.rng("intervals"))
 
-    def _rng(self, *names: str) -> np.random.Generator:
-        return random_stream(self._seed, "fault", self._key, *names)
+    def rng(self, *names: str) -> np.random.Generator:
+        """A random stream of this fault's own, the same generator for the same names: "gnss", "noise"."""
+        if names not in self._generators:
+            self._generators[names] = random_stream(self._seed, "fault", self._key, *names)
+        return self._generators[names]
 
     def touches(self, stream: AidStream) -> bool:
         """Whether the fault is one of this instrument's."""
-        return stream.name in self._spec.instruments or stream.kind in self._spec.instruments
+        return stream.name in self.spec.instruments or stream.kind in self.spec.instruments
 
-    def _bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
-        number = interval if self._spec.intervals else np.zeros_like(interval)
+    def bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
+        """The label of measurements in intervals of the given numbers."""
+        number = interval if self.spec.intervals else np.zeros_like(interval)
         return np.left_shift(np.uint32(1), (self._index + number).astype(np.uint32))
 
     def apply(self, stream: AidStream) -> AidStream:

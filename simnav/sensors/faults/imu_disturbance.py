@@ -54,7 +54,7 @@ class ImuDisturbance(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _ImuDisturbance(self, index, seed, self._key_of_streams(index, occurrence))
+        return _ImuDisturbance(self, index, seed, self.key_of_streams(index, occurrence))
 
 
 class _ImuDisturbance(FaultLayer):
@@ -62,7 +62,7 @@ class _ImuDisturbance(FaultLayer):
         super().__init__(spec, index, seed, key)
         self._constant = np.array(spec.angular_rate + spec.specific_force)
         self._sigma = np.array(spec.angular_rate_noise + spec.specific_force_noise)
-        self._noise = self._rng("noise")
+        self._noise = self.rng("noise")
 
     def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
         n = len(samples)
@@ -79,7 +79,7 @@ class _ImuDisturbance(FaultLayer):
         angular_rate[rows] += error[:, :3]
         specific_force[rows] += error[:, 3:]
         faults, fault_error = labels.faults.copy(), labels.fault_error.copy()
-        faults[rows] |= self._bits(interval)
+        faults[rows] |= self.bits(interval)
         fault_error[rows] += error
         return (
             ImuSamples(samples.time, samples.interval, angular_rate, specific_force),

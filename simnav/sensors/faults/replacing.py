@@ -12,7 +12,7 @@ from simnav.recording import AidStream
 from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, register_fault
 from simnav.types import KINDS, Array
 
-__all__ = ["FalseZero", "Frozen", "Outage"]
+__all__ = ["FalseZero", "Frozen", "Outage", "ReplacingLayer"]
 
 
 @register_fault
@@ -24,7 +24,7 @@ class Outage(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _Outage(self, index, seed, self._key_of_streams(index, occurrence))
+        return _Outage(self, index, seed, self.key_of_streams(index, occurrence))
 
 
 class _Outage(FaultLayer):
@@ -39,16 +39,17 @@ class _Outage(FaultLayer):
         return AidStream(stream.name, stream.kind, **kept, dropped=dropped)
 
 
-class _Replacing(FaultLayer):
+class ReplacingLayer(FaultLayer):
     """Puts other values in the place of the measurements within the intervals."""
 
-    def _replace(
+    def replace_values(
         self, stream: AidStream, rows: NDArray[np.intp], values: Array, interval: NDArray[np.intp]
     ) -> AidStream:
+        """Replace the rows of a stream, and label them with the numbers of their intervals."""
         value, faults, fault_error = stream.value.copy(), stream.faults.copy(), stream.fault_error.copy()
         fault_error[rows] += KINDS[stream.kind].difference(values, value[rows])
         value[rows] = values
-        faults[rows] |= self._bits(interval)
+        faults[rows] |= self.bits(interval)
         return replace(stream, value=value, faults=faults, fault_error=fault_error)
 
 
@@ -61,10 +62,10 @@ class Frozen(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _Frozen(self, index, seed, self._key_of_streams(index, occurrence))
+        return _Frozen(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _Frozen(_Replacing):
+class _Frozen(ReplacingLayer):
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
         super().__init__(spec, index, seed, key)
         self._last: dict[str, Array] = {}
@@ -87,7 +88,7 @@ class _Frozen(_Replacing):
                 before = stream.value[first - 1] if first > 0 else last
                 self._held[name] = int(number), (stream.value[first] if before is None else before).copy()
             values[here] = self._held[name][1]
-        return self._replace(stream, rows, values, interval)
+        return self.replace_values(stream, rows, values, interval)
 
 
 @register_fault
@@ -99,13 +100,13 @@ class FalseZero(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _FalseZero(self, index, seed, self._key_of_streams(index, occurrence))
+        return _FalseZero(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _FalseZero(_Replacing):
+class _FalseZero(ReplacingLayer):
     def apply(self, stream: AidStream) -> AidStream:
         found = self.activity.locate(stream.time) if self.touches(stream) else None
         if found is None:
             return stream
         rows, interval = found
-        return self._replace(stream, rows, np.zeros((len(rows), stream.value.shape[1])), interval)
+        return self.replace_values(stream, rows, np.zeros((len(rows), stream.value.shape[1])), interval)
