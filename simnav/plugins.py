@@ -22,9 +22,12 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Generic, TypeVar
 
-__all__ = ["PluginError", "Registry", "import_file", "load_plugin", "place_of"]
+__all__ = ["PluginError", "Registry", "import_file", "is_file_module", "load_plugin", "place_of", "source_digest"]
 
 C = TypeVar("C")
+
+#: Of the names of modules that were imported from single files.
+_PREFIX = "simnav_file_"
 
 
 class PluginError(ValueError):
@@ -52,8 +55,9 @@ def import_file(
     PluginError
         If the file cannot be imported: one sentence with its name and the line.
     """
-    digest = hashlib.blake2b(f"{path}\0".encode() + path.read_bytes(), digest_size=6).hexdigest()
-    name = f"simnav_file_{re.sub(r'[^0-9a-zA-Z]', '_', path.stem)}_{digest}"
+    source = path.read_bytes()
+    digest = hashlib.blake2b(f"{path}\0".encode() + source, digest_size=6).hexdigest()
+    name = f"{_PREFIX}{re.sub(r'[^0-9a-zA-Z]', '_', path.stem)}_{digest}"
     if name in sys.modules:
         return sys.modules[name]
     if str(path.parent) not in sys.path:
@@ -63,6 +67,7 @@ def import_file(
         raise error(f"{path.name} cannot be imported as Python")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    _sources[name] = _digest(source)
     if before is not None:
         before(path)
     try:
@@ -80,6 +85,11 @@ def import_file(
         place = f"{path.name}, line {line}" if line else path.name
         raise error(f"{place}: it cannot be imported: {type(cause).__name__}: {text}") from cause
     return module
+
+
+def is_file_module(name: str) -> bool:
+    """Whether a module of this name was imported from a single file by `import_file`."""
+    return name.startswith(_PREFIX)
 
 
 def load_plugin(path: str | Path) -> None:
@@ -100,6 +110,21 @@ def load_plugin(path: str | Path) -> None:
     if not file.is_file():
         raise PluginError(f"there is no plug-in file {str(path)!r}")
     import_file(file)
+
+
+def source_digest(module: str) -> str:
+    """Hexadecimal digest of the source of a module, as it was when it was imported from a single file."""
+    if module in _sources:
+        return _sources[module]
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return _digest(Path(file).read_bytes()) if file is not None and Path(file).is_file() else ""
+
+
+_sources: dict[str, str] = {}  # by the name of the module
+
+
+def _digest(source: bytes) -> str:
+    return hashlib.blake2b(source, digest_size=16).hexdigest()
 
 
 def place_of(cls: type) -> tuple[str, int]:
@@ -196,7 +221,10 @@ class Registry(Generic[C]):
 
 
 def _same(old: type, new: type) -> bool:
-    """Whether a class is another version of an old one: of the same name, in the same module or file."""
+    """Whether a class is another version of an old one: of the same name, in the same module or file, or in a copy."""
     if old.__qualname__ != new.__qualname__:
         return False
-    return old.__module__ == new.__module__ or place_of(old)[0] == place_of(new)[0] != "?"
+    if old.__module__ == new.__module__:
+        return True
+    before, after = (Path(place_of(cls)[0]) for cls in (old, new))
+    return after.is_file() and (before == after or (before.is_file() and before.read_bytes() == after.read_bytes()))

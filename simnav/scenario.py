@@ -27,7 +27,7 @@ from pydantic import Field, field_validator, model_validator
 
 from simnav.catalogue import NAME, Header, gym_id, headers
 from simnav.log.spec import RecordedSpec
-from simnav.plugins import PluginError, load_plugin
+from simnav.plugins import PluginError, is_file_module, load_plugin, source_digest
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
 from simnav.spec import Positive, Spec, SpecError, closest, entries, quantity
 from simnav.types import KINDS, Array, Instruments
@@ -159,20 +159,18 @@ class Scenario(Spec):
         content = self.model_dump(mode="python", exclude={"title", "description", "source", "tags", "plugins"})
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.
         digest = hashlib.blake2b(json.dumps(content, default=str).encode(), digest_size=16)
-        for file in self._foreign_files():
-            digest.update(file.read_bytes())
+        for module in sorted({type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)}):
+            if not module.startswith("simnav."):  # what others' instruments and faults do is not in simnav's version
+                digest.update(source_digest(module).encode())
         return digest.hexdigest()
-
-    def _foreign_files(self) -> list[Path]:
-        """The source files of instruments and faults that do not come with simnav."""
-        names = {type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)}
-        modules = [sys.modules.get(name) for name in sorted(names) if not name.startswith("simnav.")]
-        return [Path(m.__file__) for m in modules if m is not None and m.__file__ is not None]
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
         """For another process, which has to load the plug-in files before it can make their instruments."""
+        names = [type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)]
+        files = [sys.modules[name].__file__ for name in names if is_file_module(name) and name in sys.modules]
         reduced = super().__reduce_ex__(protocol)
-        return (_restore, (self.plugins, pickle.dumps(reduced))) if self.plugins else reduced
+        plugins = tuple(dict.fromkeys((*self.plugins, *filter(None, files))))
+        return (_restore, (plugins, pickle.dumps(reduced))) if plugins else reduced
 
     @model_validator(mode="after")
     def _check(self) -> Self:

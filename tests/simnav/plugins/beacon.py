@@ -21,7 +21,7 @@ def observe(point, sheet):
     """What the beacon should read at a state, and the Jacobian over position, velocity and attitude."""
     place = np.array([sheet.details[name] for name in ("latitude", "longitude", "height")])
     arm = point.dcm @ sheet.lever_arm
-    north, east, down = to_beacon = relative_position(place, displace(point.position, arm))
+    north, east, _ = to_beacon = relative_position(place, displace(point.position, arm))
     distance, level = np.linalg.norm(to_beacon), np.hypot(north, east)
     if level < NEAREST:
         return None
