@@ -26,10 +26,11 @@ import numpy as np
 from simnav.earth import gravity
 from simnav.estimator import Estimator, UnsuitableScenario, register
 from simnav.estimators.models.base import triad_bias
-from simnav.estimators.models.measurements import plausible, radii, wrap
+from simnav.estimators.models.measurements import radii, wrap
+from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED
 from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.strapdown import mechanize
-from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurements
+from simnav.types import KINDS, Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurements
 
 __all__ = ["DeadReckoning"]
 
@@ -61,8 +62,8 @@ class DeadReckoning(Estimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs a DVL or a speed log, and an IMU or a compass."""
-        compasses = instruments.of_kind("gyrocompass", "magnetic_compass")
-        speeds = [*instruments.of_kind("dvl"), *instruments.of_kind("speed_log")]
+        compasses = instruments.of_equation(HEADING)
+        speeds = [*instruments.of_equation(BODY_VELOCITY), *instruments.of_equation(WATER_SPEED)]
         if not speeds:
             raise UnsuitableScenario("dead reckoning needs a DVL or a speed log; there is neither")
         if not compasses and instruments.imu is None:
@@ -70,7 +71,7 @@ class DeadReckoning(Estimator):
         self._imu = instruments.imu
         self._compass = compasses[0] if compasses else None
         self._speeds = {s.name: s for s in speeds}
-        self._depth = next(iter(instruments.of_kind("depth")), None)
+        self._depth = next(iter(instruments.of_equation(DEPTH)), None)
         self._position = np.array(start.position, dtype=np.float64)
         self._dcm = np.ascontiguousarray(dcm_from_rpy(start.attitude))
         self._body = self._dcm.T @ start.velocity  # velocity of the reference point, body axes
@@ -98,8 +99,8 @@ class DeadReckoning(Estimator):
         speed = hypot(*self._body[:2].tolist())
         slow = sheet.bias**2 + sheet.bias_instability**2
         ahead = float(slow[0]) + (sheet.scale * speed) ** 2
-        abeam = float(slow[1]) + (sheet.misalignment[2] * speed) ** 2 if sheet.kind == "dvl" else 0.0
-        extra = 0.0 if sheet.kind == "dvl" else self.current**2
+        abeam = float(slow[1]) + (sheet.misalignment[2] * speed) ** 2 if sheet.equation == BODY_VELOCITY else 0.0
+        extra = 0.0 if sheet.equation == BODY_VELOCITY else self.current**2
         P = self._covariance
         P[4:, :], P[:, 4:] = 0.0, 0.0
         P[_AHEAD, _AHEAD], P[_ABEAM, _ABEAM] = ahead + extra, abeam + extra
@@ -141,7 +142,7 @@ class DeadReckoning(Estimator):
         if self._compass is None or dt <= 0.0:
             return
         reading = measurements.latest(self._compass.name)
-        if reading is None or not plausible(reading.kind, reading.value):
+        if reading is None or not KINDS[reading.kind].plausible(reading.value):
             self._skipped += reading is not None
             return
         first, last = (float(np.arctan2(c[1, 0], c[0, 0])) for c in (begin, self._dcm))
@@ -156,7 +157,7 @@ class DeadReckoning(Estimator):
         for m in measurements.aids:
             sheet = self._speeds.get(m.instrument)
             if sheet is not None:
-                if not plausible(m.kind, m.value) or not time - 1e-4 <= m.time <= measurements.time + 1e-4:
+                if not KINDS[m.kind].plausible(m.value) or not time - 1e-4 <= m.time <= measurements.time + 1e-4:
                     self._skipped += 1
                     continue
                 self._heard[sheet.name] = m.time
@@ -167,12 +168,12 @@ class DeadReckoning(Estimator):
                 self._silent = False
                 time = self._carry(time, m.time, begin, dt)
                 turning = np.cross(self._rate, sheet.lever_arm) if self._imu is not None else np.zeros(3)
-                body = m.value if sheet.kind == "dvl" else np.array([float(m.value[0]), 0.0, 0.0])
-                self._body = body - (turning if sheet.kind == "dvl" else turning * (1.0, 0.0, 0.0))
+                body = m.value if sheet.equation == BODY_VELOCITY else np.array([float(m.value[0]), 0.0, 0.0])
+                self._body = body - (turning if sheet.equation == BODY_VELOCITY else turning * (1.0, 0.0, 0.0))
         self._carry(time, measurements.time, begin, dt)
         if self._depth is not None:
             reading = measurements.latest(self._depth.name)
-            if reading is not None and plausible(reading.kind, reading.value):
+            if reading is not None and KINDS[reading.kind].plausible(reading.value):
                 self._position[2] = float((self._dcm @ self._depth.lever_arm)[2]) - float(reading.value[0])
 
     def _preferred(self, sheet: Datasheet, time: float) -> bool:
@@ -263,7 +264,7 @@ class DeadReckoning(Estimator):
         estimated = None
         attitude = rpy_from_dcm(c)
         if self._imu is None:
-            dvl = self._source.kind == "dvl"
+            dvl = self._source.equation == BODY_VELOCITY
             estimated = np.array([True, True, self._depth is not None, True, True, dvl, False, False, True])
             attitude[:2] = 0.0
         diagnostics = {"skipped": float(self._skipped), "silent": float(self._silent)}

@@ -18,7 +18,17 @@ import numpy as np
 from simnav.earth import displace, relative_position
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.estimators.solvers.admission import Admission
-from simnav.types import COMPONENTS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement, Measurements
+from simnav.types import (
+    COMPONENTS,
+    KINDS,
+    Array,
+    Datasheet,
+    Estimate,
+    InitialState,
+    Instruments,
+    Measurement,
+    Measurements,
+)
 
 __all__ = ["FilterpyEstimator"]
 
@@ -34,7 +44,8 @@ class FilterpyEstimator(Estimator):
     needs : tuple of str
         Kinds of instruments without which the scenario is unsuitable.
     uses : tuple of str
-        Kinds of instruments that it uses besides.
+        Kinds of instruments that it uses besides, or measurement equations (`simnav.kinds.EQUATIONS`), which stand for
+        all kinds that have them.
     """
 
     components: ClassVar[tuple[str, ...]] = ()
@@ -59,7 +70,8 @@ class FilterpyEstimator(Estimator):
             if not instruments.of_kind(kind):
                 raise UnsuitableScenario(f"{self.name} needs an instrument of kind {kind}; there is none")
         self.origin = np.array(start.position, dtype=np.float64)
-        self.sheets = {s.name: s for s in instruments.of_kind(*self.needs, *self.uses)}
+        used = (*self.needs, *self.uses)
+        self.sheets = {s.name: s for s in instruments.values() if s.kind in used or s.equation in self.uses}
         self.kf = self.build(start, instruments)
         self._time = start.time
         self._admission = Admission(instruments, self.sheets)
@@ -77,11 +89,11 @@ class FilterpyEstimator(Estimator):
         self._time = max(self._time, time)
 
     def _local(self, m: Measurement) -> Array:
-        if m.kind == "gnss_position":
+        if not KINDS[m.kind].geodetic:
+            return m.value
+        if len(m.value) == 3:
             return relative_position(m.value, self.origin)
-        if m.kind == "terrain_fix":
-            return relative_position(np.append(m.value, self.origin[2]), self.origin)[:2]
-        return m.value
+        return relative_position(np.append(m.value, self.origin[2]), self.origin)[:2]
 
     def _estimate(self) -> Estimate:
         at = [COMPONENTS.index(c) for c in self.components]

@@ -24,11 +24,12 @@ from simnav.earth import displace
 from simnav.estimator import register
 from simnav.estimators.filterpy_adapter import FilterpyEstimator
 from simnav.estimators.models.measurements import radii, wrap
-from simnav.estimators.models.ship import HEADING_KINDS, POSITION_KINDS, E, N
+from simnav.estimators.models.ship import OBSERVED, E, N
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.ship_row import ShipRow
 from simnav.estimators.solvers.sigma_point import draw_points
-from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from simnav.kinds import HEADING
+from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["FilterpyUkf"]
 
@@ -43,7 +44,7 @@ class _Unscented(FilterpyEstimator):
         Of the sigma points.
     """
 
-    uses = (*POSITION_KINDS, *HEADING_KINDS, "gnss_velocity", "dvl", "speed_log")
+    uses = OBSERVED
 
     def __init__(self, model: ShipPoints, *, alpha: float = 0.5, beta: float = 2.0, kappa: float = 0.0):
         if not 0.0 < alpha < np.inf:
@@ -106,7 +107,7 @@ class _Unscented(FilterpyEstimator):
         return np.asarray(self.model.read(self._measurement, x[None, :])[0])
 
     def _difference(self, a: Array, b: Array) -> Array:
-        if self._measurement.kind in HEADING_KINDS:
+        if KINDS[self._measurement.kind].equation == HEADING:
             return np.array([wrap(float(a[0] - b[0]))])
         return a - b
 

@@ -10,7 +10,8 @@ import numpy as np
 from simnav.earth import relative_position
 from simnav.leaderboard.figures import Curve, Style, Track, run_chart
 from simnav.scoring import errors
-from simnav.types import Array
+from simnav.sensors.faults import effect_of
+from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["fixes", "outage_spans", "relative_track", "run_figure", "true_track"]
 
-_POSITION_KINDS = ("gnss_position", "terrain_fix")
 _AXES = (
     ("North error [m]", 0, 1.0),
     ("East error [m]", 1, 1.0),
@@ -57,7 +57,7 @@ def fixes(recording: Recording, most: int = 1500) -> dict[str, Track]:
     """Position fixes as delivered, by instrument, thinned to ``most``."""
     found = {}
     for stream in recording.data.aids.values():
-        if stream.kind in _POSITION_KINDS and len(stream):
+        if KINDS[stream.kind].role == "fix" and len(stream):
             value = stream.value[:: max(1, len(stream) // most)]
             if value.shape[1] == 2:  # a horizontal fix
                 value = np.column_stack([value, np.zeros(len(value))])
@@ -69,7 +69,7 @@ def outage_spans(recording: Recording, most: int = 12) -> list[tuple[float, floa
     """Start, end [s] and name of the run's outages; none where there are too many to tell apart."""
     spans: dict[tuple[float, float], list[str]] = {}
     for fault in recording.faults:
-        if fault.kind == "outage":
+        if effect_of(fault.kind) == "missing":
             spans.setdefault((fault.start, min(fault.end, recording.duration)), []).extend(fault.instruments)
     if len(spans) > most:
         return []

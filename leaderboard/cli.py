@@ -79,8 +79,20 @@ def root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
+    plugin: Annotated[
+        list[Path] | None,
+        typer.Option(help="Python file that registers instruments or faults of others; may be given several times."),
+    ] = None,
 ) -> None:
     """The open benchmark for marine integrated navigation: simulate, estimate, score, rank."""
+    if plugin:
+        from simnav.plugins import PluginError, load_plugin
+
+        for path in plugin:
+            try:
+                load_plugin(path)
+            except PluginError as error:
+                raise typer.BadParameter(str(error), param_hint="--plugin") from None
 
 
 @app.command("list")

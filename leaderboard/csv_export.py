@@ -7,12 +7,14 @@ the conversion from radians.
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.spec import UNITS
 from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
@@ -20,19 +22,16 @@ if TYPE_CHECKING:
 
 __all__ = ["write"]
 
-_UNITS = {
-    "latitude": "deg",
-    "longitude": "deg",
-    "heading": "deg",
-    "roll": "deg",
-    "pitch": "deg",
-    "yaw": "deg",
+#: Columns of the truth and of the IMU, with their units.
+_TRUTH = {
+    **dict.fromkeys(("latitude", "longitude"), "deg"),
     "height": "m",
-    "depth": "m",
-    "angular_rate": "deg_s",
-    "specific_force": "m_s2",
+    **dict.fromkeys(("velocity_north", "velocity_east", "velocity_down"), "m_s"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "deg"),
 }
-_VELOCITY = "m_s"
+_IMU = {
+    f"{name}_{axis}": unit for name, unit in (("angular_rate", "deg_s"), ("specific_force", "m_s2")) for axis in "xyz"
+}
 
 
 def write(recording: Recording, folder: Path) -> list[Path]:
@@ -45,44 +44,27 @@ def write(recording: Recording, folder: Path) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     truth = recording.data.truth
-    names = [
-        "latitude",
-        "longitude",
-        "height",
-        "velocity_north",
-        "velocity_east",
-        "velocity_down",
-        "roll",
-        "pitch",
-        "yaw",
-    ]
     written = [
-        _table(folder / "truth.csv", truth.time, names, np.hstack([truth.position, truth.velocity, truth.attitude]))
+        _table(folder / "truth.csv", truth.time, _TRUTH, np.hstack([truth.position, truth.velocity, truth.attitude]))
     ]
     imu = recording.data.imu
     if imu is not None:
-        names = [f"{q}_{axis}" for q in ("angular_rate", "specific_force") for axis in "xyz"]
-        written.append(_table(folder / "imu.csv", imu.time, names, np.hstack([imu.angular_rate, imu.specific_force])))
+        written.append(_table(folder / "imu.csv", imu.time, _IMU, np.hstack([imu.angular_rate, imu.specific_force])))
     for stream in recording.data.aids.values():
-        written.append(
-            _table(
-                folder / f"{stream.name}.csv", stream.time, list(KINDS[stream.kind].values), stream.value, stream.faults
-            )
-        )
+        units = {c.name: c.unit for c in KINDS[stream.kind].components}
+        written.append(_table(folder / f"{stream.name}.csv", stream.time, units, stream.value, stream.faults))
     return written
 
 
-def _unit(name: str) -> str:
-    stem = name[:-2] if name[-2:] in ("_x", "_y", "_z") else name
-    return _UNITS.get(stem, _VELOCITY)
-
-
-def _table(path: Path, time: Array, names: list[str], values: Array, faults: NDArray[np.uint32] | None = None) -> Path:
-    units = [_unit(n) for n in names]
-    scale = np.array([np.degrees(1.0) if u.startswith("deg") else 1.0 for u in units])
-    header = ["time_s", *(f"{n}_{u}" for n, u in zip(names, units, strict=True))]
+def _table(
+    path: Path, time: Array, units: Mapping[str, str], values: Array, faults: NDArray[np.uint32] | None = None
+) -> Path:
+    """Write the columns, of the given names and units."""
+    # Degrees as NumPy has them: 180 / pi, where a division by pi / 180 may differ in the last digit.
+    scale = np.array([np.degrees(1.0) if u in ("deg", "deg_s") else 1.0 / UNITS[u] for u in units.values()])
+    header = ["time_s", *(f"{name}_{unit}" for name, unit in units.items())]
     columns = [time[:, None], values * scale]
-    formats = ["%.17g"] * (1 + len(names))
+    formats = ["%.17g"] * (1 + len(units))
     if faults is not None:
         header.append("faults")  # bit mask of the faults that touched the measurement
         columns.append(np.asarray(faults, dtype=np.float64)[:, None])

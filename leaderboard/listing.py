@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import typing
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard import tables
@@ -58,31 +56,16 @@ def estimators() -> list[dict[str, Any]]:
 def instruments() -> list[dict[str, Any]]:
     """Every kind of instrument, with its keys in a scenario file."""
     from simnav import sensors
-    from simnav.types import KINDS
 
-    found = [_kind(s, "angular rate and specific force") for s in _specs(sensors.ImuSpec)]
-    for spec in _specs(sensors.InstrumentSpec):
-        kind = _name(spec)
-        found.append(_kind(spec, KINDS[kind].quantity if kind in KINDS else ""))
-    return found
+    imu = _kind(sensors.ImuSpec, "angular rate and specific force")
+    return [imu, *(_kind(spec, spec.definition.quantity) for spec in sensors.instrument_specs())]
 
 
 def faults() -> list[dict[str, Any]]:
     """Every kind of fault, with its keys in a scenario file."""
     from simnav import sensors
 
-    return [_kind(spec, "") for spec in _specs(sensors.FaultSpec)]
-
-
-def _specs(annotation: Any) -> Iterator[type[Spec]]:
-    """The Spec classes of a (nested, annotated) union."""
-    from simnav.spec import Spec
-
-    if isinstance(annotation, type) and issubclass(annotation, Spec):
-        yield annotation
-    else:
-        for part in typing.get_args(annotation):
-            yield from _specs(part)
+    return [_kind(spec, "") for spec in sensors.fault_specs()]
 
 
 def _name(spec: type[Spec]) -> str:

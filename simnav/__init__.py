@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from simnav.agent import EstimatorAgent
     from simnav.environment import NavigationEnv
     from simnav.estimator import Estimator, UnsuitableScenario, register
+    from simnav.kinds import Component, Kind
+    from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.scoring import score
+    from simnav.sensors import register_fault, register_instrument
     from simnav.source import open_source, record
     from simnav.trial import Trial, run_trial
     from simnav.types import (
@@ -43,6 +46,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COMPONENTS",
     "KINDS",
+    "Component",
     "Datasheet",
     "Estimate",
     "Estimator",
@@ -51,6 +55,7 @@ __all__ = [
     "ImuSamples",
     "InitialState",
     "Instruments",
+    "Kind",
     "Measurement",
     "Measurements",
     "NavigationEnv",
@@ -61,9 +66,12 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "load_plugin",
     "open_source",
     "record",
     "register",
+    "register_fault",
+    "register_instrument",
     "run_trial",
     "score",
 ]
@@ -72,9 +80,12 @@ _HOMES = {
     "agent": ("EstimatorAgent",),
     "environment": ("NavigationEnv",),
     "estimator": ("Estimator", "UnsuitableScenario", "register"),
+    "kinds": ("Component", "Kind"),
+    "plugins": ("load_plugin",),
     "recording": ("Recording",),
     "scenario": ("Scenario",),
     "scoring": ("score",),
+    "sensors": ("register_fault", "register_instrument"),
     "source": ("open_source", "record"),
     "trial": ("Trial", "run_trial"),
     "types": (

@@ -9,9 +9,11 @@ from __future__ import annotations
 import copy
 import hashlib
 import pickle
+import tomllib
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +21,15 @@ from numpy.typing import NDArray
 from simnav.estimator import Estimator, make
 from simnav.recording import AidStream, Block, Recording
 from simnav.trial import Trial, run_trial
-from simnav.types import Estimate, ImuSamples, Instruments
+from simnav.types import KINDS, Estimate, ImuSamples, Instruments
+
+if TYPE_CHECKING:
+    from simnav.scenario import Scenario
+    from simnav.sensors import AidSpec
 
 __all__ = ["Finding", "Report", "check"]
 
-#: The scenario of the contract test.
+#: The scenario of the contract test, but for the aiding instruments: one of every kind (`_contract_scenario`).
 SCENARIO = """
 name = "contract"
 version = 1
@@ -49,27 +55,6 @@ peak_period_s = 6.0
 rate_hz = 20.0
 gyroscope = { bias_deg_h = 1.0, random_walk_deg_sqrt_h = 0.05 }
 accelerometer = { bias_ug = 200.0, random_walk_ug_sqrt_hz = 50.0 }
-[instruments.gnss_position]
-sigma_m = [1.5, 1.5, 3.0]
-lever_arm_m = [1.0, 0.0, -3.0]
-[instruments.gnss_velocity]
-rate_hz = 2.0
-sigma_m_s = [0.1, 0.1, 0.1]
-[instruments.dvl]
-phase_s = 0.3
-sigma_m_s = 0.02
-[instruments.gyrocompass]
-sigma_deg = 0.5
-[instruments.magnetic_compass]
-sigma_deg = 1.0
-[instruments.speed_log]
-sigma_m_s = 0.1
-[instruments.depth]
-rate_hz = 0.5
-sigma_m = 0.2
-[instruments.terrain_fix]
-rate_hz = 0.3
-sigma_m = [5.0, 5.0]
 """
 
 _HALF = 30.0  # s
@@ -160,11 +145,42 @@ def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report
 
 
 def contract_recording(seed: int) -> Recording:
-    """The recording of the contract test."""
-    from simnav.scenario import parse
+    """The recording of the contract test, with one instrument of every kind that is known.
+
+    A kind of a third party whose instrument fails is named in a warning and left out.
+    """
+    from simnav.sensors import instrument_specs
     from simnav.source import record
 
-    return record(parse(SCENARIO, source="the contract test"), seed)
+    specs = instrument_specs()
+    try:
+        return record(_contract_scenario(specs), seed)
+    except Exception:
+        own = [cls for cls in specs if cls.__module__.startswith("simnav.")]
+        sound = list(own)
+        for cls in specs:
+            if cls in own:
+                continue
+            try:
+                record(_contract_scenario([cls]), seed)
+                sound.append(cls)
+            except Exception as error:
+                warnings.warn(
+                    f"instruments of kind {cls.model_fields['kind'].default!r} are left out of the contract test: "
+                    f"{type(error).__name__}: {error}",
+                    stacklevel=2,
+                )
+        if len(sound) == len(specs):
+            raise
+        return record(_contract_scenario(sound), seed)
+
+
+def _contract_scenario(specs: Sequence[type[AidSpec]]) -> Scenario:
+    from simnav.scenario import Scenario
+
+    table = tomllib.loads(SCENARIO)
+    table["instruments"] |= {cls.model_fields["kind"].default: cls.example for cls in specs}
+    return Scenario.from_toml(table, source="the contract test")
 
 
 def _guarded(test: Callable[[Factory, Recording], Finding], factory: Factory, recording: Recording) -> Finding:
@@ -322,7 +338,7 @@ def _altered(recording: Recording, after: float) -> Recording:
     aids = {}
     for name, stream in data.aids.items():
         late = stream.time > after + 1e-6
-        small = 1e-6 if stream.kind in ("gnss_position", "terrain_fix") else 0.1
+        small = 1e-6 if KINDS[stream.kind].geodetic else 0.1
         changed = replace(stream, value=np.where(late[:, None], stream.value + small, stream.value))
         aids[name] = _rows(changed, ~late | (np.arange(len(late)) % 3 > 0))
     return replace(recording, data=replace(data, imu=imu, aids=aids))

@@ -22,7 +22,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Kernel", "cache_directory", "kernel", "kernels", "prune"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Array", "Kernel", "cache_directory", "kernel", "kernels", "prune"]
+
+#: What kernels, and everything else in simnav, work on.
+Array = NDArray[np.float64]
 
 #: Cache directories that were not used for this long are deleted by `prune` [s].
 KEEP = 60 * 86400.0

@@ -12,8 +12,7 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
-from simnav.types import Array
+from simnav.compiled import Array, kernel
 
 __all__ = [
     "ECCENTRICITY_SQUARED",

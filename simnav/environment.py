@@ -307,7 +307,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         stretch, i = self._stretch, self._row
         assert stretch is not None
         for name, stream in stretch.aids.items():
-            if stream.kind in ("gnss_position", "terrain_fix"):
+            if KINDS[stream.kind].role == "fix":
                 cut = slice(*stretch.cuts[name][i : i + 2])
                 chart.add_fixes(stream.value[cut, :2], stream.faults[cut] != 0)
         chart.add(float(stretch.intervals[i, 1]), stretch.truth[i, 0], np.array(estimate[:3]))

@@ -11,12 +11,8 @@ from __future__ import annotations
 
 import ast
 import contextlib
-import hashlib
-import importlib.util
 import inspect
 import re
-import sys
-import traceback
 import types
 import typing
 import warnings
@@ -27,6 +23,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from simnav.plugins import PluginError, import_file, place_of
 from simnav.spec import closest
 from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
 
@@ -104,7 +101,7 @@ class UnsuitableScenario(Exception):  # noqa: N818 (not an error of the estimato
     """Raised by `Estimator.reset`: the instruments that this estimator needs are not there."""
 
 
-class EstimatorError(ValueError):
+class EstimatorError(PluginError):
     """An estimator that cannot be registered, found or made; the message is one sentence."""
 
 
@@ -236,7 +233,7 @@ def find(name_or_path: str) -> type[Estimator]:
 def describe(name_or_path: str) -> Description:
     """What an estimator is, where it is defined, and what parameters it takes."""
     cls = find(name_or_path)
-    file, line = _where(cls)
+    file, line = place_of(cls)
     lines = (inspect.getdoc(cls) or "").strip().splitlines() if cls.__doc__ else []
     return Description(
         name=cls.name,
@@ -385,38 +382,16 @@ def _from_file(path: Path, wanted: str | None) -> type[Estimator]:
 def _load(path: Path) -> types.ModuleType:
     """Import a file by its path; modules beside it can be imported, but hide nothing."""
     _discover()
-    digest = hashlib.blake2b(f"{path}\0".encode() + path.read_bytes(), digest_size=6).hexdigest()
-    name = f"simnav_file_{re.sub(r'[^0-9a-zA-Z]', '_', path.stem)}_{digest}"
-    if name in sys.modules:
-        return sys.modules[name]
-    if str(path.parent) not in sys.path:
-        sys.path.append(str(path.parent))
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise EstimatorError(f"{path.name} cannot be imported as Python")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    # An edited file takes the place of its older self: its old names must not stand in its way.
+    return import_file(path, error=EstimatorError, before=_forget)
+
+
+def _forget(path: Path) -> None:
+    """An edited file takes the place of its older self: its old names must not stand in its way."""
     for n, c in list(_classes.items()):
-        if _where(c)[0] == str(path):
+        if place_of(c)[0] == str(path):
             del _classes[n]
             for alias in [a for a, m in _aliases.items() if m == n]:
                 del _aliases[alias]
-    try:
-        spec.loader.exec_module(module)
-    except EstimatorError:
-        del sys.modules[name]
-        raise
-    except (Exception, SystemExit) as error:
-        del sys.modules[name]
-        if isinstance(error, SyntaxError) and error.lineno is not None:
-            line, text = error.lineno, error.msg
-        else:
-            frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-            line, text = (frames[-1].lineno or 0) if frames else 0, str(error)
-        place = f"{path.name}, line {line}" if line else path.name
-        raise EstimatorError(f"{place}: it cannot be imported: {type(error).__name__}: {text}") from error
-    return module
 
 
 _TRUE, _FALSE, _NONE = ("true", "yes", "on", "1"), ("false", "no", "off", "0"), ("none", "null", "")
@@ -479,17 +454,6 @@ def _label(cls: Any) -> str:
     return getattr(cls, "__qualname__", repr(cls))
 
 
-def _where(cls: type) -> tuple[str, int]:
-    try:
-        file = inspect.getsourcefile(cls) or "?"
-    except TypeError:  # typed in at a prompt
-        return "?", 0
-    try:
-        return file, inspect.getsourcelines(cls)[1]
-    except (OSError, TypeError):
-        return file, 0
-
-
 def _place(cls: type) -> str:
-    file, line = _where(cls)
+    file, line = place_of(cls)
     return f"{file}, line {line}"

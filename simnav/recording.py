@@ -288,8 +288,14 @@ _STATE_ARRAYS = ("time", "position", "velocity", "attitude")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
-    """A datasheet for JSON."""
-    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in asdict(sheet).items()}
+    """A datasheet for JSON; without ``details`` where there are none."""
+    return {k: _plain(v) for k, v in asdict(sheet).items() if k != "details" or v}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {k: _plain(v) for k, v in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _to_arrays(recording: Recording) -> dict[str, Any]:

@@ -12,8 +12,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
-from simnav.types import Array
+from simnav.compiled import Array, kernel
 
 __all__ = [
     "cross",

@@ -14,18 +14,21 @@ import hashlib
 import json
 import math
 import os
+import pickle
 import re
+import sys
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, SupportsIndex
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from simnav.catalogue import NAME, Header, gym_id, headers
 from simnav.log.spec import RecordedSpec
-from simnav.sensors import FaultSpec, ImuSpec, InstrumentSpec
+from simnav.plugins import PluginError, is_file_module, load_plugin, source_digest
+from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
 from simnav.spec import Positive, Spec, SpecError, closest, entries, quantity
 from simnav.types import KINDS, Array, Instruments
 from simnav.world import Current, Manoeuvre, Sea, Start, Vessel
@@ -83,6 +86,9 @@ class Scenario(Spec):
     description: str = Field("", description="what happens and why, for the reader of the board")
     source: str = Field("", description="paper or data that it follows")
     tags: tuple[str, ...] = Field((), description="free words to select by")
+    plugins: tuple[str, ...] = Field(
+        (), description="Python files that register the instruments and faults of others, from the folder of this file"
+    )
     duration: Annotated[float, Field(gt=0.0, le=_LONGEST)] = quantity(
         "s", description="length of a run; a multiple of the step"
     )
@@ -99,10 +105,10 @@ class Scenario(Spec):
     manoeuvres: tuple[Manoeuvre, ...] = entries("manoeuvre", (), description="in order; the last holds to the end")
     sea: Sea | None = Field(None, description="waves; absent: flat calm")
     current: Current | None = Field(None, description="absent: none")
-    instruments: dict[str, InstrumentSpec | ImuSpec] = Field(
+    instruments: dict[str, AnyInstrument] = Field(
         default_factory=dict, description="by name; the IMU, if there is one, is called imu"
     )
-    faults: tuple[FaultSpec, ...] = entries("fault", (), description="laid over the measurements, in order")
+    faults: tuple[AnyFault, ...] = entries("fault", (), description="laid over the measurements, in order")
     log: RecordedSpec | None = Field(None, description="files of a recorded run; then there is no simulated world")
 
     @property
@@ -132,7 +138,7 @@ class Scenario(Spec):
         return spec if isinstance(spec, ImuSpec) else None
 
     @property
-    def aids(self) -> dict[str, InstrumentSpec]:
+    def aids(self) -> dict[str, AidSpec]:
         """The instruments beside the IMU, by name, in order."""
         return {n: s for n, s in self.instruments.items() if not isinstance(s, ImuSpec)}
 
@@ -150,10 +156,21 @@ class Scenario(Spec):
 
         Title, description, source and tags are words and do not count; neither do the files of a log.
         """
-        content = self.model_dump(mode="python", exclude={"title", "description", "source", "tags"})
+        content = self.model_dump(mode="python", exclude={"title", "description", "source", "tags", "plugins"})
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.
-        text = json.dumps(content, default=str)
-        return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+        digest = hashlib.blake2b(json.dumps(content, default=str).encode(), digest_size=16)
+        for module in sorted({type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)}):
+            if not module.startswith("simnav."):  # what others' instruments and faults do is not in simnav's version
+                digest.update(source_digest(module).encode())
+        return digest.hexdigest()
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
+        """For another process, which has to load the plug-in files before it can make their instruments."""
+        names = [type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)]
+        files = [sys.modules[name].__file__ for name in names if is_file_module(name) and name in sys.modules]
+        reduced = super().__reduce_ex__(protocol)
+        plugins = tuple(dict.fromkeys((*self.plugins, *filter(None, files))))
+        return (_restore, (plugins, pickle.dumps(reduced))) if plugins else reduced
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -165,6 +182,16 @@ class Scenario(Spec):
             _check_log(self, self.log)
         _check_faults(self)
         return self
+
+
+def _restore(plugins: tuple[str, ...], reduced: bytes) -> Any:
+    """A pickled scenario with plug-in files."""
+    for path in plugins:
+        load_plugin(path)
+    function, arguments, state, *_ = pickle.loads(reduced)
+    scenario = function(*arguments)
+    scenario.__setstate__(state)
+    return scenario
 
 
 def _check_head(s: Scenario) -> None:
@@ -249,14 +276,16 @@ def _check_faults(s: Scenario) -> None:
         raise ValueError(f"fault: {bits} intervals are too many; the labels have room for {_MOST_BITS}")
 
 
-def parse(text: str, *, source: str = "<toml>") -> Scenario:
-    """Read a scenario from the text of a TOML file.
+def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> Scenario:
+    """Read a scenario from the text of a TOML file; load the plug-ins that it names.
 
     Parameters
     ----------
     text : str
     source : str
         What messages call it.
+    folder : Path, optional
+        From where plug-in files are named; by default the working directory.
 
     Raises
     ------
@@ -267,7 +296,22 @@ def parse(text: str, *, source: str = "<toml>") -> Scenario:
         table: dict[str, Any] = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SpecError(f"{source}: not valid TOML: {error}") from None
+    if "plugins" in table:
+        table["plugins"] = _load_plugins(table["plugins"], source, folder or Path.cwd())
     return Scenario.from_toml(table, source=source)
+
+
+def _load_plugins(names: Any, source: str, folder: Path) -> list[str]:
+    """Load plug-in files; their absolute paths."""
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise SpecError(f"{source}: plugins = {names!r} should be a list of Python files, like ['beacon.py']")
+    paths = [str((folder / Path(name).expanduser()).resolve()) for name in names]
+    for name, path in zip(names, paths, strict=True):
+        try:
+            load_plugin(path)
+        except PluginError as error:
+            raise SpecError(f"{source}: plugins = {name!r}: {error}") from None
+    return paths
 
 
 def names() -> list[str]:
@@ -324,4 +368,4 @@ def _read(path: Path) -> Scenario:
         raise SpecError(f"{path}: not a TOML file, for it is not UTF-8 text") from None
     except OSError as error:
         raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
-    return parse(text, source=str(path))
+    return parse(text, source=str(path), folder=path.parent)

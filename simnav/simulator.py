@@ -15,7 +15,7 @@ import numpy as np
 from simnav.recording import Block, ImuLabels, Recording
 from simnav.scenario import Scenario
 from simnav.sensors.faults import build_layers, labels
-from simnav.spec import Spec, SpecError
+from simnav.spec import SpecError
 from simnav.start import draw_start
 from simnav.types import Array, InitialState, NavigationStates
 from simnav.world import Vessel, World, WorldBlock
@@ -217,23 +217,6 @@ def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recordin
         yield _recording(Simulator(scenario, seed, truth=truth))
 
 
-#: What is wrong with an instrument: its specification's fields of these names, and of these with ``fixed_`` before.
-_ERRORS = ("sigma", "bias", "bias_instability", "scale", "misalignment", "deviation", "speed_noise", "random_walk",
-           "rate_random_walk", "quantization")  # fmt: skip
-
-
-def _perfect(spec: Spec) -> Spec:
-    """A copy of an instrument's specification without its errors."""
-    changes: dict[str, object] = {"range": np.inf} if "range" in type(spec).model_fields else {}
-    for name in type(spec).model_fields:
-        value = getattr(spec, name)
-        if isinstance(value, Spec):
-            changes[name] = _perfect(value)
-        elif name.removeprefix("fixed_") in _ERRORS:
-            changes[name] = (0.0,) * len(value) if isinstance(value, tuple) else 0.0
-    return spec.model_copy(update=changes)
-
-
 def ideal(scenario: Scenario, seed: int) -> Recording:
     """A run as perfect instruments would see it: what bounds and Jacobians at the truth are taken from.
 
@@ -254,7 +237,7 @@ def ideal(scenario: Scenario, seed: int) -> Recording:
     assert first._world is not None
     truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))
     real = _recording(Simulator(scenario, seed, truth=truth))
-    instruments = {name: _perfect(spec) for name, spec in scenario.instruments.items()}
+    instruments = {name: spec.ideal() for name, spec in scenario.instruments.items()}
     perfect = scenario.model_copy(update={"instruments": instruments, "faults": ()})
     clean = _recording(Simulator(perfect, seed, truth=truth)).data
     aids = {}

@@ -19,16 +19,17 @@ import difflib
 import math
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
+from pydantic_core import CoreSchema, PydanticUndefined, core_schema
 
 __all__ = [
     "UNITS",
     "NonNegative",
+    "OneOf",
     "Positive",
     "Spec",
     "SpecError",
@@ -252,8 +253,46 @@ def _convert(raw: Any, factor: float, infinite: bool, source: str, where: str) -
     return float(raw) * factor
 
 
+class OneOf:
+    """Annotation of a field that holds a Spec of one of several classes, told apart by ``kind``.
+
+    Unlike a union it is open: the classes are asked for when a value is read::
+
+        instruments: dict[str, Annotated[AidSpec, OneOf(instrument_specs)]]
+
+    Parameters
+    ----------
+    classes : callable
+        Returns the classes that are known by now.
+    """
+
+    def __init__(self, classes: Callable[[], Sequence[type[Spec]]]):
+        self.classes = classes
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """Validate by `validate`; serialise each value as its own class does."""
+        return core_schema.no_info_after_validator_function(self.validate, core_schema.any_schema())
+
+    def validate(self, value: Any) -> Spec:
+        """A Spec as it is; a mapping, with SI units, as one of the class that its ``kind`` names."""
+        by_kind = {_kind(cls): cls for cls in self.classes()}
+        if isinstance(value, Spec) and isinstance(value, tuple(by_kind.values())):
+            return value
+        kind = value.get("kind") if isinstance(value, Mapping) else None
+        if kind in by_kind:
+            return by_kind[kind].model_validate(value)
+        valid = [k for k in by_kind if k is not None]
+        if kind is None:
+            raise ValueError(f"should be a specification, or a mapping with a kind that is one of: {', '.join(valid)}")
+        raise ValueError(f"kind {kind!r} is unknown{closest(str(kind), valid)}")
+
+
 def spec_types(annotation: Any) -> list[type[Spec]]:
-    """The Spec classes inside an annotation (unions, lists, dicts and Annotated are looked through)."""
+    """The Spec classes inside an annotation (unions, lists, dicts, Annotated and `OneOf` are looked through)."""
+    if typing.get_origin(annotation) is Annotated:
+        for metadata in annotation.__metadata__:
+            if isinstance(metadata, OneOf):
+                return list(metadata.classes())
     if not typing.get_args(annotation):
         return [annotation] if isinstance(annotation, type) and issubclass(annotation, Spec) else []
     return [s for a in typing.get_args(annotation) for s in spec_types(a)]
@@ -291,8 +330,9 @@ def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
 
 
 def _kind(spec: type[Spec]) -> str | None:
+    """The ``kind`` of a class, which is a ``Literal`` with a default."""
     info = spec.model_fields.get("kind")
-    return None if info is None else str(typing.get_args(info.annotation)[0])
+    return None if info is None or not isinstance(info.default, str) else info.default
 
 
 def _one(raw: Any, specs: list[type[Spec]], source: str, where: str, default_kind: str | None = None) -> Spec:

@@ -11,14 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.compiled import Array
+from simnav.kinds import KINDS, Kind, Role
+
 __all__ = [
     "COMPONENTS",
     "KINDS",
+    "Array",
     "Datasheet",
     "Estimate",
     "ImuDatasheet",
@@ -33,8 +37,6 @@ __all__ = [
     "TriadDatasheet",
 ]
 
-Array = NDArray[np.float64]
-
 #: The nine error components of every covariance and every ``estimated`` mask, in order.
 COMPONENTS: tuple[str, ...] = (
     "north",
@@ -47,50 +49,6 @@ COMPONENTS: tuple[str, ...] = (
     "attitude_east",
     "attitude_down",
 )
-
-
-class Kind(NamedTuple):
-    """What one kind of aiding instrument measures.
-
-    Attributes
-    ----------
-    quantity : str
-        What the value is, in words.
-    values : tuple of str
-        Name of each component of a measurement's value, SI units and radians.
-    errors : tuple of str
-        Name of each component of its error (and of ``Datasheet.sigma``). They differ for
-        positions only, whose values are in radians and whose errors are in metres.
-    """
-
-    quantity: str
-    values: tuple[str, ...]
-    errors: tuple[str, ...]
-
-
-#: Every kind of aiding instrument. A scenario may carry several instruments of one kind.
-KINDS: Mapping[str, Kind] = {
-    "gnss_position": Kind(
-        "position of the antenna",
-        ("latitude", "longitude", "height"),
-        ("north", "east", "down"),
-    ),
-    "gnss_velocity": Kind(
-        "velocity of the antenna",
-        ("velocity_north", "velocity_east", "velocity_down"),
-        ("velocity_north", "velocity_east", "velocity_down"),
-    ),
-    "dvl": Kind(
-        "velocity over the ground of the transducer, in body axes",
-        ("forward", "starboard", "down"),
-        ("forward", "starboard", "down"),
-    ),
-    "magnetic_compass": Kind("true heading", ("heading",), ("heading",)),
-    "gyrocompass": Kind("true heading", ("heading",), ("heading",)),
-    "speed_log": Kind("forward speed through the water", ("speed",), ("speed",)),
-    "depth": Kind("depth below the mean sea surface, positive down", ("depth",), ("depth",)),
-    "terrain_fix": Kind("horizontal position", ("latitude", "longitude"), ("north", "east")),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +141,8 @@ class Datasheet:
         Mounting misalignment about the body axes [rad].
     lever_arm : (3,) array
         From the IMU (or the vessel's reference point) to the instrument, body axes [m].
+    details : mapping
+        What the datasheet of this kind holds beyond the above (``KINDS[kind].datasheet``), SI units and radians.
     """
 
     name: str
@@ -196,6 +156,7 @@ class Datasheet:
     scale: float = 0.0
     misalignment: Array = field(default_factory=_zeros3)
     lever_arm: Array = field(default_factory=_zeros3)
+    details: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -204,6 +165,17 @@ class Datasheet:
         for name in ("sigma", "bias", "bias_instability"):
             value = np.broadcast_to(np.asarray(getattr(self, name), dtype=np.float64), (d,)).copy()
             object.__setattr__(self, name, value)
+
+    @property
+    def role(self) -> Role:
+        """What an instrument of this kind is to a navigator (`simnav.kinds.Kind`)."""
+        return KINDS[self.kind].role
+
+    @property
+    def equation(self) -> str:
+        """The compiled measurement equation of this kind; empty where it has none, or one of its own."""
+        equation = KINDS[self.kind].equation
+        return equation if isinstance(equation, str) else ""
 
 
 class Instruments(Mapping[str, Datasheet]):
@@ -237,6 +209,14 @@ class Instruments(Mapping[str, Datasheet]):
     def of_kind(self, *kinds: str) -> list[Datasheet]:
         """The datasheets of the given kinds, in the scenario's order."""
         return [a for a in self._aids.values() if a.kind in kinds]
+
+    def of_role(self, *roles: Role) -> list[Datasheet]:
+        """The datasheets of the instruments in the given roles, in the scenario's order."""
+        return [a for a in self._aids.values() if a.role in roles]
+
+    def of_equation(self, *equations: str) -> list[Datasheet]:
+        """The datasheets whose readings one of the given compiled equations predicts, in the scenario's order."""
+        return [a for a in self._aids.values() if a.equation in equations]
 
 
 @dataclass(frozen=True, eq=False)

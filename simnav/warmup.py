@@ -69,8 +69,9 @@ def _import_all() -> None:
                 if b"simnav.compiled" in path.read_bytes():
                     parts = path.relative_to(folder).with_suffix("").parts
                     _try_import(".".join([package, *(p for p in parts if p != "__init__")]))
-    for point in entry_points(group="simnav.estimators"):
-        _try_import(point.module)
+    for group in ("simnav.estimators", "simnav.instruments", "simnav.faults"):
+        for point in entry_points(group=group):
+            _try_import(point.module)
 
 
 def _try_import(name: str) -> None:

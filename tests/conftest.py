@@ -10,6 +10,9 @@ import pytest
 
 from simnav import estimator as registry
 from simnav.estimator import names
+from simnav.kinds import INSTRUMENTS
+from simnav.plugins import is_file_module
+from simnav.sensors.faults import FAULTS
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
@@ -31,3 +34,15 @@ def clean_registry():
     for now, then in zip((registry._classes, registry._aliases), before, strict=True):
         now.clear()
         now.update(then)
+
+
+@pytest.fixture
+def plugins(monkeypatch):
+    """The folder of a third party's plug-in files; what a test loads from it is forgotten afterwards."""
+    classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS)]
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield Path(__file__).parent / "simnav" / "plugins"
+    for registry_, before in classes:
+        registry_._classes = before
+    for name in [name for name in sys.modules if is_file_module(name)]:
+        del sys.modules[name]

@@ -18,12 +18,10 @@ from simnav.estimators.adaptations.anfis_file import FEATURES, FeatureSet, Param
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.models.measurements import wrap
-from simnav.types import Array, Instruments
+from simnav.kinds import BODY_VELOCITY, HEADING, POSITION, WATER_SPEED
+from simnav.types import KINDS, Array, Instruments
 
 __all__ = ["Anfis", "Features", "Motion"]
-
-HEADING_KINDS = ("gyrocompass", "magnetic_compass")
-SPEED_KINDS = ("speed_log", "dvl")
 
 
 class Motion:
@@ -46,7 +44,7 @@ class Motion:
     SMOOTHING = 5.0  # s; of the low pass
 
     def __init__(self, instruments: Instruments):
-        headings, speeds = instruments.of_kind(*HEADING_KINDS), instruments.of_kind(*SPEED_KINDS)
+        headings, speeds = instruments.of_equation(HEADING), instruments.of_equation(WATER_SPEED, BODY_VELOCITY)
         self._heading = headings[0].name if headings else None
         self._speed = speeds[0].name if speeds else None
         self._last: dict[str, tuple[float, float]] = {}
@@ -105,7 +103,7 @@ class Features:
     def observe(self, innovation: Innovation) -> list[float] | None:
         """See an innovation; the n inputs where it is a fix of GNSS, else None."""
         m = innovation.measurement
-        if m.kind != "gnss_position":
+        if KINDS[m.kind].equation != POSITION:
             self._motion.observe(innovation)
             return None
         now = _whitened(innovation)

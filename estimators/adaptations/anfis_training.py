@@ -28,7 +28,8 @@ from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.hybrid_learning import Learned, learn, rmse
 from simnav.estimators.adaptations.sugeno import Sugeno
-from simnav.types import Array, Instruments
+from simnav.kinds import POSITION
+from simnav.types import KINDS, Array, Instruments
 
 if TYPE_CHECKING:
     from simnav.recording import AidStream, Recording
@@ -178,7 +179,7 @@ class _Teacher(Adaptation):
     def adapt(self, innovation: Innovation) -> Array:
         rows = {name: f.observe(innovation) for name, f in self._features.items()}
         m = innovation.measurement
-        if m.kind != "gnss_position":
+        if KINDS[m.kind].equation != POSITION:
             return innovation.noise
         factor = self._factors[m.time]
         if m.time > SETTLED:

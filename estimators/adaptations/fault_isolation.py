@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.prediction import FIXES, LOGS, chi_square_limits
+from simnav.estimators.adaptations.prediction import chi_square_limits, fixes_and_logs
 from simnav.estimators.adaptations.weighting import Factors
 from simnav.types import Instruments
 
@@ -52,7 +52,7 @@ class MotionTest:
     def __init__(self, instruments: Instruments, together: int = 3, recent: float = 5.0, probability: float = 0.999):
         self.together, self.recent, self.probability = together, recent, probability
         self._limits = np.array(chi_square_limits(probability))
-        self._is_fix = {n: s.kind in FIXES for n, s in instruments.items() if s.kind in (*FIXES, *LOGS)}
+        self._is_fix = fixes_and_logs(instruments)
         if len(set(self._is_fix.values())) < 2:
             self._is_fix = {}  # nobody to ask
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest

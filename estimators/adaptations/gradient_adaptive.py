@@ -37,6 +37,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.weighting import Factors, Weighting
+from simnav.kinds import POSITION, VELOCITY
 from simnav.types import Array, Instruments
 
 __all__ = ["GradientAdaptive", "Shape", "medians"]
@@ -129,7 +130,7 @@ class GradientAdaptive(Weighting):
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self._kinds = {name: sheet.kind for name, sheet in instruments.items()}
+        self._receivers = {sheet.name for sheet in instruments.of_equation(POSITION, VELOCITY)}
         self._names: tuple[str, ...] = ()
         self._scales = np.ones(1)
         paper = self.preset == "paper"
@@ -141,8 +142,7 @@ class GradientAdaptive(Weighting):
         """Set the weights of the measurements and of motion."""
         if factors.names != self._names:
             self._names = factors.names
-            gnss = ("gnss_position", "gnss_velocity")
-            shapes = [self._gnss if self._kinds[n] in gnss else self._other for n in factors.names]
+            shapes = [self._gnss if n in self._receivers else self._other for n in factors.names]
             self._shapes = np.array([*shapes, self._motion], dtype=np.float64)
             self._scales = np.ones(len(self._shapes))
         if self.preset == "paper":

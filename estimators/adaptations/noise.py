@@ -209,8 +209,6 @@ class EstimatedNoise(NoiseAdaptation):
         If the bounds are not 0 < lowest <= highest, or the scope is none.
     """
 
-    FIXES = ("gnss_position", "terrain_fix")
-
     def __init__(self, lowest: float, highest: float, full: bool = False, scope: Scope = "fixes"):
         if not 0.0 < lowest <= highest:
             raise ValueError(f"lowest = {lowest:g} and highest = {highest:g}: it must be 0 < lowest <= highest")
@@ -224,7 +222,7 @@ class EstimatedNoise(NoiseAdaptation):
 
     def choose(self, innovation: Innovation) -> Array:
         """The estimate; the nominal noise of an instrument out of scope; the last one after a poor prediction."""
-        if self.scope == "fixes" and innovation.measurement.kind not in self.FIXES:
+        if self.scope == "fixes" and KINDS[innovation.measurement.kind].role != "fix":
             return innovation.noise
         before = self._reported.get(innovation.measurement.instrument, innovation.noise)
         if innovation.predicted.trace() > before.trace():

@@ -8,12 +8,19 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
+from simnav.kinds import BODY_VELOCITY, VELOCITY, WATER_SPEED
 from simnav.types import Array, Instruments
 
-__all__ = ["PredictionTest", "chi_square_limits", "standardised"]
+__all__ = ["PredictionTest", "chi_square_limits", "fixes_and_logs", "standardised"]
 
-FIXES = ("gnss_position", "gnss_velocity", "terrain_fix")
-LOGS = ("dvl", "speed_log")
+#: Velocities that a satellite receiver gives beside its position, and those that a log measures.
+_OF_RECEIVERS, _OF_LOGS = (VELOCITY,), (BODY_VELOCITY, WATER_SPEED)
+
+
+def fixes_and_logs(instruments: Instruments) -> dict[str, bool]:
+    """Which instruments give fixes, or the velocity of a receiver (True), and which are logs (False)."""
+    fix = {name: sheet.role == "fix" or sheet.equation in _OF_RECEIVERS for name, sheet in instruments.items()}
+    return {name: fix[name] for name, sheet in instruments.items() if fix[name] or sheet.equation in _OF_LOGS}
 
 
 def chi_square_limits(probability: float) -> list[float]:
@@ -50,13 +57,13 @@ class PredictionTest:
         Of a good measurement to pass.
     """
 
-    RECENT = 5.0  # s; a failure older than this is no company
+    RECENT = 5.0  # s; an older failure of another instrument does not count
     LARGEST, TOTAL = 100.0, 1e8
 
     def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
         self.together = together
         self._limits = chi_square_limits(probability)
-        self._group = {n: s.kind in FIXES for n, s in instruments.items() if s.kind in (*FIXES, *LOGS)}
+        self._group = fixes_and_logs(instruments)
         if len(set(self._group.values())) < 2 or not together:
             self._group = {}
         self._failures: dict[str, tuple[int, float]] = {}

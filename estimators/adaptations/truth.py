@@ -8,7 +8,8 @@ A fault is known by its statistics, not by the value that it took. Of those that
 - a gross error is noise of the second moment of its distribution, and left out where that is more than `LIMIT` sigma;
 - a frozen or false value says nothing, and is left out.
 
-Where a recording does not say how large its faults are, what was really added stands for it.
+Where a recording does not say how large its faults are, or a fault of others does something else, what was really added
+stands for it.
 """
 
 from __future__ import annotations
@@ -23,9 +24,8 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.models.fault_states import FaultState
 from simnav.recording import AidStream, FaultLabel, Recording
-from simnav.sensors.faults import quantity_of
-from simnav.sensors.values import add_error
-from simnav.types import Array, Instruments, Measurement
+from simnav.sensors.faults import FAULTS, effect_of, size_by_component, size_range
+from simnav.types import KINDS, Array, Instruments, Measurement
 
 __all__ = ["FisherNoise", "MixtureNoise", "NominalNoise", "TrueNoise", "fisher_information", "imu_faults"]
 
@@ -35,8 +35,8 @@ LIMIT = 3.0
 CERTAIN = 0.95
 #: Points of the integral for the Fisher information, as a power of two.
 _POINTS = 14
-#: Size of each kind of fault that lasts: the stem of its parameter.
-LASTING = {"multipath": "sigma", "bias_step": "offset", "ramp": "slope"}
+#: What a fault of these does to a measurement is a state (`simnav.sensors.faults.Effect`).
+LASTING = ("lasting", "growing")
 
 
 class TrueNoise(Adaptation):
@@ -63,17 +63,16 @@ class TrueNoise(Adaptation):
         found: dict[tuple[Any, ...], tuple[FaultState, int]] = {}
         for j, fault in enumerate(self.faults):
             for name in fault.instruments:
-                if fault.kind not in LASTING or name not in self._streams:
+                if effect_of(fault.kind) not in LASTING or name not in self._streams:
                     continue
-                size = _size(fault, LASTING[fault.kind], self._streams[name][0])
-                if size is None or (fault.kind == "ramp" and "mean_active" in fault.parameters):
+                growing = effect_of(fault.kind) == "growing"
+                size = _size(fault, self._streams[name][0])
+                if size is None or (growing and "mean_active" in fault.parameters):
                     continue
                 # The intervals of one fault are one process; a ramp begins anew in each.
-                key = (name, fault.kind, repr(fault.parameters), fault.start if fault.kind == "ramp" else 0.0)
+                key = (name, fault.kind, repr(fault.parameters), fault.start if growing else 0.0)
                 mask = 1 << j | (found[key][1] if key in found else 0)
-                factor: Callable[[float], float] = partial(
-                    self._factor, name, mask, fault.start if fault.kind == "ramp" else None
-                )
+                factor: Callable[[float], float] = partial(self._factor, name, mask, fault.start if growing else None)
                 time = float(fault.parameters.get("correlation_time", np.inf))
                 found[key] = FaultState(name, np.abs(size), time, factor), mask
                 self._states[name] |= mask
@@ -97,7 +96,9 @@ class TrueNoise(Adaptation):
         d = len(innovation.residual)
         noise = innovation.noise + np.diag(stream.sigma[k, :d] ** 2 - self._sheets[m.instrument].sigma[:d] ** 2)
         bits = int(stream.faults[k]) & ~self._states.get(m.instrument, 0)
-        faults = [j for j, f in enumerate(self.faults) if bits >> j & 1 and f.kind != "noise_step"] if bits else []
+        faults = (
+            [j for j, f in enumerate(self.faults) if bits >> j & 1 and effect_of(f.kind) != "noise"] if bits else []
+        )
         return noise, faults, stream, k
 
     def _variance(self, j: int, stream: AidStream, k: int, d: int) -> Array | None:
@@ -105,10 +106,11 @@ class TrueNoise(Adaptation):
         fault, key = self.faults[j], (j, stream.name)
         if key not in self._variances:
             variance = None
-            if fault.kind == "gross_error" and fault.parameters:
+            if effect_of(fault.kind) == "gross" and fault.parameters:
                 variance = _second_moment(fault, stream)
             self._variances[key] = variance
-        if not fault.parameters and fault.kind not in ("frozen", "false_zero"):
+        effect = effect_of(fault.kind)
+        if effect == "other" or (not fault.parameters and effect != "replaced"):
             return np.asarray(stream.fault_error[k, :d] ** 2)
         variance = self._variances[key]
         return None if variance is None else variance[:d]
@@ -137,14 +139,14 @@ class NominalNoise(TrueNoise):
         stream, k = self._label(measurement.instrument, measurement.time)
         if not stream.faults[k]:
             return measurement
-        value = add_error(stream.kind, measurement.value[None], -stream.fault_error[k : k + 1])[0]
+        value = KINDS[stream.kind].add_error(measurement.value[None], -stream.fault_error[k : k + 1])[0]
         return measurement._replace(value=value)
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """The noise without faults."""
         m = innovation.measurement
         stream, k = self._label(m.instrument, m.time)
-        steps = sum(1 << j for j, f in enumerate(self.faults) if f.kind == "noise_step")
+        steps = sum(1 << j for j, f in enumerate(self.faults) if effect_of(f.kind) == "noise")
         return innovation.noise if int(stream.faults[k]) & steps else self._white(innovation)[0]
 
 
@@ -182,7 +184,7 @@ class MixtureNoise(TrueNoise):
         noise, faults, stream, k = self._white(innovation)
         d = len(noise)
         for j in faults:
-            if self.faults[j].kind != "gross_error" or not self.faults[j].parameters:
+            if effect_of(self.faults[j].kind) != "gross" or not self.faults[j].parameters:
                 variance = self._variance(j, stream, k, d)
                 if variance is None:
                     return None
@@ -191,7 +193,7 @@ class MixtureNoise(TrueNoise):
         about = [
             (float(f.parameters["probability"]), self._variance(j, stream, k, d))
             for j, f in enumerate(self.faults)
-            if f.kind == "gross_error" and f.parameters and stream.name in f.instruments
+            if effect_of(f.kind) == "gross" and "probability" in f.parameters and stream.name in f.instruments
             if f.start - 1e-6 <= t < f.end - 1e-6
         ]
         about = [(p, v) for p, v in about if p > 0.0 and v is not None]
@@ -267,18 +269,20 @@ def fisher_information(probability: Array, variance: Array) -> Array:
     return information
 
 
-def _size(fault: FaultLabel, stem: str, stream: AidStream) -> Array | None:
+def _size(fault: FaultLabel, stream: AidStream) -> Array | None:
     """A fault's size for an instrument, by component; None where the label does not say."""
-    size = fault.parameters.get(f"{stem}_{quantity_of(stream.kind)}")
-    return None if size is None else np.broadcast_to(np.asarray(size, dtype=np.float64), stream.sigma.shape[1:])
+    cls = FAULTS.get(fault.kind)
+    if cls is None or not cls.stems:
+        return None
+    return size_by_component(fault.parameters, cls.stems[0], stream.kind)
 
 
 def _second_moment(fault: FaultLabel, stream: AidStream) -> Array | None:
     """Variance of a gross error, by component."""
-    if fault.parameters["distribution"] == "uniform":
-        low, high = fault.parameters[f"size_{quantity_of(stream.kind)}"]
-        return np.full(stream.sigma.shape[1], (low * low + low * high + high * high) / 3.0)
-    size = _size(fault, "size", stream)
+    if fault.parameters.get("distribution") == "uniform":
+        low, high = size_range(fault.parameters, "size", stream.kind)
+        return (low * low + low * high + high * high) / 3.0
+    size = _size(fault, stream)
     return None if size is None else size**2
 
 

@@ -41,6 +41,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import DVL, observe
+from simnav.kinds import BODY_VELOCITY, POSITION, VELOCITY
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
@@ -48,7 +49,7 @@ __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
 #: Places of the DVL's errors in the state.
 MISALIGNMENT, LEVER_ARM, SCALE, DELAY = slice(15, 18), slice(18, 21), 21, 22
 #: Of each component, after the paper's simulation: "diag(0.1, 0.1, 0.1, 5, 5, 5)^2" [m/s], [m].
-_PRINTED = {"gnss_position": 5.0, "gnss_velocity": 0.1, "dvl": 0.1}
+_PRINTED = {POSITION: 5.0, VELOCITY: 0.1, BODY_VELOCITY: 0.1}
 _IDENTITY = np.eye(3)
 
 
@@ -82,16 +83,16 @@ class DvlCalibrationModel(InertialModel):
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU or a DVL."""
-        dvls = instruments.of_kind("dvl")
+        dvls = instruments.of_equation(BODY_VELOCITY)
         if not dvls:
             raise UnsuitableScenario("the 23-state model needs a DVL; there is none")
         self._dvl = dvls[0]
         self._gravity = np.array([0.0, 0.0, float(gravity(start.position[0], start.position[2]))])
         covariance = super().begin(start, instruments)
-        self._fused = set(self.noise) - self.uncalibrated - {self._dvl.name}
+        self._fused = set(self.noise) - self.uncalibrated - set(self.own) - {self._dvl.name}
         if self.preset == "paper":
-            for sheet in instruments.of_kind(*_PRINTED):
-                self.noise[sheet.name] = _PRINTED[sheet.kind] ** 2 * np.eye(3)
+            for sheet in instruments.of_equation(*_PRINTED):
+                self.noise[sheet.name] = _PRINTED[sheet.equation] ** 2 * np.eye(3)
         return covariance
 
     def _more_states(self) -> list[tuple[float, float, float]]:

@@ -32,10 +32,13 @@ import numpy as np
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
-from simnav.estimators.models.measurements import CODES, HEADING, observe, uncalibrated_noise, white_noise
+from simnav.estimators.models.measurements import CODES, HEADING, OWN, observe, uncalibrated_noise, white_noise
+from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
+from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.rotation import dcm_from_rpy
 from simnav.types import (
+    KINDS,
     Array,
     Datasheet,
     Estimate,
@@ -76,6 +79,8 @@ class InertialModel(ErrorModel):
     aid_parameters : dict of str to (int, (3,) array, int, int)
         What `simnav.estimators.models.measurements.observe_inertial` is told of an instrument: its code, its lever arm,
         and its places in ``bias_at`` and ``scale_at``, -1 for none.
+    own : dict of str to OwnObservation
+        The instruments whose kind has a measurement equation of its own; their code is `OWN`.
     noise : dict of str to (d, d) array
         White noise of an instrument.
     uncalibrated : set of str
@@ -143,6 +148,7 @@ class InertialModel(ErrorModel):
         self.noise: dict[str, Array] = {}
         self.uncalibrated: set[str] = set()
         self.aid_parameters: dict[str, tuple[int, Array, int, int]] = {}
+        self.own: dict[str, OwnObservation] = {}
         self._states: list[tuple[float, float, float]] = []  # initial variance, decay, noise density
         for sheet in self.instruments.values():
             if not self.observes(sheet):
@@ -151,7 +157,7 @@ class InertialModel(ErrorModel):
                 gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
                 for b, s in zip(sheet.bias, sheet.bias_instability)
             ]
-            if sheet.kind == "speed_log":
+            if sheet.equation == WATER_SPEED:
                 current = GaussMarkov(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME, 0.0)
                 states = [GaussMarkov(states[0].variance + current.variance, current.decay, current.noise, 0.0)]
             fast = sheet.correlation_time < 0.5 / sheet.rate
@@ -161,21 +167,23 @@ class InertialModel(ErrorModel):
             elif any(s.variance or s.noise for s in states):
                 self.bias_at[sheet.name] = _NAV + len(self._states)
                 self._states += [(s.variance, s.decay, s.noise) for s in states]
-            if sheet.kind in ("dvl", "speed_log") and (sheet.scale or np.any(sheet.misalignment)):
+            if sheet.equation in (BODY_VELOCITY, WATER_SPEED) and (sheet.scale or np.any(sheet.misalignment)):
                 if self.calibrate:
                     self.scale_at[sheet.name] = _NAV + len(self._states)
-                    extra = sheet.misalignment if sheet.kind == "dvl" else ()
+                    extra = sheet.misalignment if sheet.equation == BODY_VELOCITY else ()
                     self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
                 else:
                     self.uncalibrated.add(sheet.name)
             self.noise[sheet.name] = white_noise(sheet, white, self._rate_variance)
             self.aid_parameters[sheet.name] = (
-                CODES[sheet.kind], np.array(sheet.lever_arm, dtype=np.float64),
+                CODES.get(sheet.equation, OWN), np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
+            if KINDS[sheet.kind].observation is not None:
+                self.own[sheet.name] = OwnObservation(sheet)
         # A subclass that measures or corrects in a way of its own does so step by step.
         own = type(self).measure is InertialModel.measure and type(self).correct is InertialModel.correct
-        self._fused = set(self.noise) - self.uncalibrated if own else set()
+        self._fused = set(self.noise) - self.uncalibrated - set(self.own) if own else set()
         self._states += self._more_states()
         self.size = _NAV + len(self._states)
         self._jacobians = {name: np.empty((len(noise), self.size)) for name, noise in self.noise.items()}
@@ -188,8 +196,8 @@ class InertialModel(ErrorModel):
         return []
 
     def observes(self, instrument: Datasheet) -> bool:
-        """Every kind of instrument."""
-        return instrument.kind in CODES
+        """Every kind of instrument that has a measurement equation."""
+        return instrument.equation in CODES or KINDS[instrument.kind].observation is not None
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
@@ -232,6 +240,12 @@ class InertialModel(ErrorModel):
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         name = measurement.instrument
+        if name in self.own:
+            found = self.observe_own(
+                name, measurement.time, measurement.value, self.position, self.velocity, self.dcm, self.raw_rate,
+                self.bias, self.calibration,
+            )  # fmt: skip
+            return None if found is None else Linearised(*found, self.noise[name])
         code, arm, bias_at, scale_at = self.aid_parameters[name]
         jacobian, noise = self._jacobians[name], self.noise[name]
         innovation, value = np.empty(len(noise)), measurement.value.astype(np.float64)
@@ -243,6 +257,18 @@ class InertialModel(ErrorModel):
         if name in self.uncalibrated:
             noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
         return Linearised(innovation, jacobian, noise)
+
+    def observe_own(
+        self, name: str, time: float, value: Array, position: Array, velocity: Array, dcm: Array, rate: Array,
+        bias: Array, calibration: Array,
+    ) -> tuple[Array, Array] | None:  # fmt: skip
+        """Innovation and Jacobian of a measurement whose kind has an equation of its own, at any state.
+
+        See `simnav.estimators.models.own_observation.OwnObservation.linearise`; the state as of the attributes.
+        """
+        own, size = self.own[name], _NAV + len(calibration)
+        point = own.point(time, position, velocity, dcm, rate, bias)
+        return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
         """As of the datasheet, but for what depends on the state."""

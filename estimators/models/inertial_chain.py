@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimators.models.chain import Chain, Columns
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import observe_inertial
+from simnav.estimators.models.measurements import OWN, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
 from simnav.rotation import cross, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments
@@ -281,6 +281,9 @@ class InertialChain(Chain):
         front = self.front
         nothing = (0, np.zeros(3), -1, -1)
         known = [front.aid_parameters.get(name, nothing) for name in self.names]
+        for i, name in enumerate(self.names):
+            if name in front.own:  # the compiled loop has no use for its states
+                known[i] = (OWN, np.zeros(3), -1, -1)
         self._codes = np.array([code for code, *_ in known], dtype=np.int64)
         self._arms = np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3)
         self._bias_at = np.array([at for *_, at, _ in known], dtype=np.int64)
@@ -302,6 +305,8 @@ class InertialChain(Chain):
             position, velocity, dcm, states["raw_rate"], bias, calibration,
             aids["residual"], wide, aids["components"],
         )  # fmt: skip
+        if self.front.own:
+            self._observe_own(first, row, states, prefix, wide)
         if wide is not jacobian:
             here = np.flatnonzero(row[first:] >= 0) + first
             jacobian[here] = wide[here, :, : self.size]
@@ -315,6 +320,19 @@ class InertialChain(Chain):
         _move_folds(
             first, folds["transition"], folds["shift"], position, velocity, dcm, bias, calibration, folds["jacobian"]
         )
+
+    def _observe_own(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
+        """`observe` for the aids whose kind has a measurement equation of its own."""
+        aids, front = self.aids, self.front
+        position, velocity, dcm, bias, calibration = (states[prefix + name] for name in front.state)
+        columns = (position, velocity, dcm, states["raw_rate"], bias, calibration)
+        for i in first + np.flatnonzero((self._codes[aids["instrument"][first:]] == OWN) & (row[first:] >= 0)):
+            name = self.names[aids["instrument"][i]]
+            d = len(front.noise[name])
+            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
+            found = front.observe_own(name, aids["time"][i], aids["value"][i, :d], *(c[row[i]] for c in columns))
+            if found is not None:
+                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""

@@ -208,6 +208,12 @@ class InertialPoints(InertialModel, PointModel):
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
         """What the instrument should read at the points, minus what it should read at the state."""
         name = measurement.instrument
+        if name in self.own:
+            own = self.own[name]
+            point = own.point(measurement.time, self.position, self.velocity, self.dcm, self.raw_rate, self.bias)
+            found = own.differences(point, errors, self.bias_at.get(name, -1))
+            assert found is not None  # `measure` says something of it
+            return found
         differences = np.empty((len(errors), len(self.noise[name])))
         observe_points(
             *self.aid_parameters[name], self.position, self.velocity, self.dcm, self.raw_rate, self.bias,

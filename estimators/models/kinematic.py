@@ -13,6 +13,7 @@ import numpy as np
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.models.measurements import radii, wrap
+from simnav.kinds import POSITION, VELOCITY
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["KinematicModel"]
@@ -43,11 +44,11 @@ class KinematicModel(ErrorModel):
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether it is GNSS."""
-        return instrument.kind in ("gnss_position", "gnss_velocity")
+        return instrument.equation in (POSITION, VELOCITY)
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without GNSS positions."""
-        receivers = instruments.of_kind("gnss_position")
+        receivers = instruments.of_equation(POSITION)
         if not receivers:
             raise UnsuitableScenario("it needs an instrument of kind gnss_position; there is none")
         self.instruments = instruments
@@ -82,7 +83,7 @@ class KinematicModel(ErrorModel):
         """Linearise a fix or a velocity; a lever arm is turned by the course, or the last one, or the initial yaw."""
         sheet = self.instruments[measurement.instrument]
         H = np.zeros((3, 6))
-        if sheet.kind == "gnss_velocity":
+        if sheet.equation == VELOCITY:
             H[:, 3:] = np.eye(3)
             arm = sheet.lever_arm
             noise = sheet.sigma**2 + sheet.bias**2 + SEAWAY**2 + TILT_RATE**2 * float(arm @ arm)

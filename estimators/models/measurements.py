@@ -20,54 +20,41 @@ other states is of second order, and left out. The noise is the datasheet's, and
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import atan2, cos, isfinite, pi, sin, sqrt
+from math import atan2, cos, sin, sqrt
 
 import numpy as np
 
+from simnav import kinds
 from simnav.compiled import kernel
 from simnav.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, radii_scalar
 from simnav.rotation import cross
 from simnav.types import Array, Datasheet
 
-__all__ = ["CODES", "observe", "observe_inertial", "plausible", "radii", "uncalibrated_noise", "white_noise", "wrap"]
+__all__ = ["CODES", "OWN", "observe", "observe_inertial", "radii", "uncalibrated_noise", "white_noise", "wrap"]
 
-#: Largest speed [m/s], height and depth [m] that a measurement is believed to mean.
-LARGEST_SPEED, LARGEST_HEIGHT = 200.0, 20000.0
 #: A heading needs the forward axis this far from the vertical: the cosine of the pitch [-].
 LEAST_LEVEL = 0.1
 #: Of the inertial state, before the calibration.
 NAVIGATION_STATES = 15
 
 GNSS_POSITION, TERRAIN_FIX, GNSS_VELOCITY, DVL, SPEED_LOG, HEADING, DEPTH = range(7)
-#: What `observe_inertial` calls each kind of instrument.
+#: What `observe_inertial` calls each of the measurement equations (`simnav.kinds.EQUATIONS`).
 CODES: Mapping[str, int] = {
-    "gnss_position": GNSS_POSITION,
-    "terrain_fix": TERRAIN_FIX,
-    "gnss_velocity": GNSS_VELOCITY,
-    "dvl": DVL,
-    "speed_log": SPEED_LOG,
-    "magnetic_compass": HEADING,
-    "gyrocompass": HEADING,
-    "depth": DEPTH,
+    kinds.POSITION: GNSS_POSITION,
+    kinds.HORIZONTAL_POSITION: TERRAIN_FIX,
+    kinds.VELOCITY: GNSS_VELOCITY,
+    kinds.BODY_VELOCITY: DVL,
+    kinds.WATER_SPEED: SPEED_LOG,
+    kinds.HEADING: HEADING,
+    kinds.DEPTH: DEPTH,
 }
+#: In the place of a code: the kind of instrument has a function of its own (`simnav.kinds.Kind.observation`).
+OWN = -1
 
 
 def wrap(angle: float) -> float:
     """An angle brought into [-pi, pi]."""
     return atan2(sin(angle), cos(angle))
-
-
-def plausible(kind: str, value: Array) -> bool:
-    """Whether a value can be a measurement of its kind at all: finite, on Earth, and no faster than any vehicle."""
-    x: list[float] = value.tolist()
-    if not all(map(isfinite, x)):
-        return False
-    if kind in ("gnss_position", "terrain_fix"):
-        return abs(x[0]) < 0.5 * pi and abs(x[1]) <= 2.0 * pi and (kind == "terrain_fix" or abs(x[2]) < LARGEST_HEIGHT)
-    if kind in ("magnetic_compass", "gyrocompass"):
-        return abs(x[0]) <= 4.0 * pi
-    limit = LARGEST_HEIGHT if kind == "depth" else LARGEST_SPEED
-    return all(abs(component) < limit for component in x)
 
 
 def radii(latitude: float) -> tuple[float, float]:
@@ -219,11 +206,11 @@ def white_noise(sheet: Datasheet, faster: Array | float, rate_variance: float) -
     """(d, d) noise: the instrument's own, what is ``faster`` than a state can follow, and the rate's over the arm."""
     noise = np.diag(sheet.sigma**2 + faster)
     arm = sheet.lever_arm
-    if sheet.kind == "gnss_velocity":
+    if sheet.equation == kinds.VELOCITY:
         noise += rate_variance * (arm @ arm) * np.eye(3)
-    elif sheet.kind == "dvl":
+    elif sheet.equation == kinds.BODY_VELOCITY:
         noise += rate_variance * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    elif sheet.kind == "speed_log":
+    elif sheet.equation == kinds.WATER_SPEED:
         noise += rate_variance * (arm[1:] @ arm[1:])
     return noise
 
@@ -232,6 +219,6 @@ def uncalibrated_noise(sheet: Datasheet, predicted: Array) -> Array:
     """(d, d) noise that stands for a scale factor and a misalignment without states, at a ``predicted`` velocity."""
     u, m = predicted**2, sheet.misalignment**2
     variance = sheet.scale**2 * u
-    if sheet.kind == "dvl":
+    if sheet.equation == kinds.BODY_VELOCITY:
         variance += [m[1] * u[2] + m[2] * u[1], m[0] * u[2] + m[2] * u[0], m[0] * u[1] + m[1] * u[0]]
     return np.diag(variance)

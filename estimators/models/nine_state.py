@@ -17,6 +17,7 @@ import numpy as np
 
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
+from simnav.kinds import BODY_VELOCITY, POSITION
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 __all__ = ["NineStateModel"]
@@ -57,9 +58,9 @@ class NineStateModel(InertialModel):
         self._full = np.zeros(15)
         self._noise[:8] = 0.0
         for sheet in instruments.values():
-            if sheet.kind == "gnss_position" and np.all(self._gnss > 0.0):
+            if sheet.equation == POSITION and np.all(self._gnss > 0.0):
                 self.noise[sheet.name] = np.diag(self._gnss**2)
-            elif sheet.kind == "dvl" and self._dvl > 0.0:
+            elif sheet.equation == BODY_VELOCITY and self._dvl > 0.0:
                 self.noise[sheet.name] = self._dvl**2 * np.eye(3)
         return np.array(start.covariance, dtype=np.float64)
 

@@ -23,6 +23,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav import kinds
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov
 from simnav.estimators.models.measurements import wrap
@@ -43,19 +44,21 @@ from simnav.estimators.models.ship_kernels import (
 )
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
-__all__ = ["HEADING_KINDS", "POSITION_KINDS", "E", "N", "ShipModel", "require_ship_aids"]
+__all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel", "require_ship_aids"]
 
-POSITION_KINDS = ("gnss_position", "terrain_fix")
-HEADING_KINDS = ("magnetic_compass", "gyrocompass")
+#: Measurement equations (`simnav.kinds.EQUATIONS`) that the model knows.
+POSITIONS = (kinds.POSITION, kinds.HORIZONTAL_POSITION)
+VELOCITIES = (kinds.VELOCITY, kinds.BODY_VELOCITY, kinds.WATER_SPEED)
+OBSERVED = (*POSITIONS, *VELOCITIES, kinds.HEADING)
 #: Roll and pitch that a lever arm is not corrected for, one sigma [rad].
 HEEL = 0.03
 
 
 def require_ship_aids(instruments: Instruments, name: str) -> None:
     """UnsuitableScenario, in the name of an estimator, without a heading, or a position or speed."""
-    if not instruments.of_kind(*HEADING_KINDS):
+    if not instruments.of_equation(kinds.HEADING):
         raise UnsuitableScenario(f"{name} needs a compass (gyrocompass or magnetic_compass); there is none")
-    if not instruments.of_kind(*POSITION_KINDS, "gnss_velocity", "dvl", "speed_log"):
+    if not instruments.of_equation(*POSITIONS, *VELOCITIES):
         raise UnsuitableScenario(f"{name} needs GNSS, a terrain fix, a speed log or a DVL; there is none")
 
 
@@ -107,7 +110,7 @@ class ShipModel(ErrorModel):
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether it is a position, velocity, speed or heading."""
-        return instrument.kind in (*POSITION_KINDS, *HEADING_KINDS, "gnss_velocity", "dvl", "speed_log")
+        return instrument.equation in OBSERVED
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario if there is nothing that gives a speed and a heading."""
@@ -126,9 +129,9 @@ class ShipModel(ErrorModel):
         self.bias_at: dict[str, int] = {}
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
-            if sheet.kind not in (*HEADING_KINDS, *POSITION_KINDS, "speed_log"):
+            if sheet.equation not in (kinds.HEADING, *POSITIONS, kinds.WATER_SPEED):
                 continue
-            d = 2 if sheet.kind in POSITION_KINDS else 1
+            d = 2 if sheet.equation in POSITIONS else 1
             biases = [
                 gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
                 for b, s in zip(sheet.bias[:d], sheet.bias_instability[:d])
@@ -136,7 +139,7 @@ class ShipModel(ErrorModel):
             if any(b.variance or b.noise for b in biases):
                 self.bias_at[sheet.name] = 2 + len(states)
                 states += biases
-            if sheet.kind == "speed_log" and sheet.scale:
+            if sheet.equation == kinds.WATER_SPEED and sheet.scale:
                 self.scale_at[sheet.name] = 2 + len(states)
                 states.append(GaussMarkov(sheet.scale**2, 0.0, 0.0, 0.0))
         self.size = n = 2 + len(states)
@@ -215,15 +218,15 @@ def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
     lx, ly, lz = sheet.lever_arm.tolist()
     fast = sheet.correlation_time < 0.5 / sheet.rate
     white = sheet.sigma**2 + (sheet.bias_instability**2 if fast else 0.0)
-    if sheet.kind in HEADING_KINDS or sheet.kind == "speed_log":
-        kind = LOG if sheet.kind == "speed_log" else HEADING
+    if sheet.equation in (kinds.HEADING, kinds.WATER_SPEED):
+        kind = LOG if sheet.equation == kinds.WATER_SPEED else HEADING
         return kind, [lx, ly, float(white[0]), 0.0, 0.0, 0.0, 0.0]
     white = white[:2]
-    if sheet.kind in POSITION_KINDS:
+    if sheet.equation in POSITIONS:
         return POSITION, [lx, ly, *(white + (HEEL * lz) ** 2).tolist(), 0.0, 0.0, 0.0]
     # A velocity's bias has no state.
     white = white + sheet.bias[:2] ** 2 + (0.0 if fast else sheet.bias_instability[:2] ** 2)
-    if sheet.kind == "gnss_velocity":
+    if sheet.equation == kinds.VELOCITY:
         return VELOCITY, [lx, ly, *white.tolist(), sway**2, 0.0, 0.0]
     white = white + (HEEL * sway) ** 2
     return BODY_VELOCITY, [lx, ly, *white.tolist(), sway**2, sheet.scale**2, float(sheet.misalignment[2]) ** 2]

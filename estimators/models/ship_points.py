@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.estimators.models.points import PointModel
-from simnav.estimators.models.ship import HEADING_KINDS, ShipModel
+from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_kernels import move_ships, read_ships
+from simnav.kinds import HEADING
 from simnav.types import Array, Measurement
 
 __all__ = ["ShipPoints"]
@@ -49,6 +50,6 @@ class ShipPoints(ShipModel, PointModel):
         """What the instrument should read at the points, minus what it should read at the state."""
         reading = self.read(measurement, self.states(np.concatenate([np.zeros((1, self.size)), errors])))
         difference = reading[1:] - reading[0]
-        if self.instruments[measurement.instrument].kind in HEADING_KINDS:
+        if self.instruments[measurement.instrument].equation == HEADING:
             difference = np.arctan2(np.sin(difference), np.cos(difference))
         return np.asarray(difference)

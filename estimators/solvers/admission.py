@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
-from simnav.estimators.models.measurements import plausible
-from simnav.types import Instruments, Measurement, Measurements
+from simnav.types import KINDS, Instruments, Measurement, Measurements
 
 __all__ = ["LATE", "Admission"]
 
@@ -31,7 +30,7 @@ class Admission:
 
     def __init__(self, instruments: Instruments, observed: Iterable[str]):
         self._used = dict.fromkeys(observed, float("-inf"))
-        self._kinds = {name: instruments[name].kind for name in self._used}
+        self._kinds = {name: KINDS[instruments[name].kind] for name in self._used}
         self.skipped = 0
 
     def admit(self, measurements: Measurements, since: float) -> list[Measurement]:
@@ -45,7 +44,7 @@ class Admission:
             used = self._used.get(m.instrument)
             if used is None:
                 continue
-            if not since - LATE <= m.time <= end or m.time <= used or not plausible(self._kinds[m.instrument], m.value):
+            if not since - LATE <= m.time <= end or m.time <= used or not self._kinds[m.instrument].plausible(m.value):
                 self.skipped += 1
                 continue
             self._used[m.instrument] = m.time

@@ -24,7 +24,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import observe_inertial
+from simnav.estimators.models.measurements import DVL, GNSS_POSITION, GNSS_VELOCITY, SPEED_LOG, observe_inertial
 from simnav.estimators.solvers.gtsam_preintegration import Preintegration
 from simnav.estimators.solvers.tangent_frame import TangentFrame, tangent_state
 from simnav.rotation import rpy_from_dcm
@@ -217,13 +217,13 @@ class InertialGraph:
         measurement, noise, node, rate = observation
         name, value = measurement.instrument, np.array(measurement.value, dtype=np.float64)
         code, arm = self._aid[name]
-        if measurement.kind == "gnss_position":
+        if code == GNSS_POSITION:
             turn = self.frame.turn(value)
             gaussian = gtsam.noiseModel.Gaussian.Covariance(turn @ noise @ turn.T)
             return gtsam.GPSFactorArm(self.keys(node)[0], self.frame.local(value), arm, gaussian)
         x, v, b = self.keys(node)
         origin, axes, m = self.frame.origin, self.frame.axes, len(noise)
-        moving = measurement.kind in ("gnss_velocity", "dvl", "speed_log")
+        moving = code in (GNSS_VELOCITY, DVL, SPEED_LOG)
         levered = moving and bool(np.any(arm))
         still, unbiased = np.zeros(3), np.zeros(6)
 

@@ -80,7 +80,7 @@ class GtsamEstimator(Estimator):
         """Begin a run; needs an IMU and at least one aiding instrument."""
         require_inertial_aids(instruments, self.name)
         prior, values = self.graph.begin(start, instruments)
-        observed = [name for name, sheet in instruments.items() if self.graph.model.observes(sheet)]
+        observed = [name for name, sheet in instruments.items() if sheet.equation and self.graph.model.observes(sheet)]
         self._admission = Admission(instruments, observed)
         self._restarts = self._epoch = 0
         self._ends: list[tuple[float, int]] = []

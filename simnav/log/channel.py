@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.log.nmea import DEFAULT_COLUMNS, read_nmea, utc_seconds
+from simnav.kinds import Component, Kind, geodetic_components, speed_components
+from simnav.log.nmea import read_nmea, utc_seconds
 from simnav.log.spec import LOG_UNITS, ChannelSpec, FileSpec, LogImuSpec, OriginSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning, Table, check_ascending, read_csv
 from simnav.rotation import wrap_angle
@@ -21,13 +22,22 @@ from simnav.types import KINDS, Array
 
 __all__ = ["ImuSeries", "Series", "geodetic_from_local", "list_recordings", "locate", "read_channel", "read_imu"]
 
-#: Names of the components of the parts of the reference; those of the instruments are in `KINDS`.
+#: The parts of the reference; instruments are in `KINDS`.
 _REFERENCE = {
-    "position": ("latitude", "longitude", "height"),
-    "velocity": ("velocity_north", "velocity_east", "velocity_down"),
-    "attitude": ("roll", "pitch", "yaw"),
+    "position": Kind("position", "fix", geodetic_components(height=True), geodetic=True),
+    "velocity": Kind(
+        "velocity",
+        "velocity",
+        speed_components("velocity_north", "velocity_east", "velocity_down"),
+        log_columns=("velocity_north", "velocity_east", "=nan"),
+    ),
+    "attitude": Kind(
+        "attitude",
+        "other",
+        tuple(Component(angle, "deg", cyclic=True) for angle in ("roll", "pitch", "yaw")),
+        log_columns=("roll", "pitch", "heading"),
+    ),
 }
-_ANGLES = ("heading", "roll", "pitch", "yaw")
 _GTSAM = "gtsam:"
 
 
@@ -221,12 +231,13 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
         If a file, sentence or column is missing, a cell is not a number, times do not ascend, or a value is impossible
         (mostly a wrong unit).
     """
-    names = _REFERENCE.get(what) or KINDS[what].values
+    kind = _REFERENCE.get(what) or KINDS[what]
+    names = kind.values
     table, time, rows = _open(spec, channel.file, recording, channel.sentence, channel.talker)
     rows = rows[:: channel.every]
     if channel.hold_out is not None:
         rows = np.delete(rows, np.s_[:: channel.hold_out])
-    columns = channel.columns or DEFAULT_COLUMNS[what]
+    columns = channel.columns or kind.log_columns or names
     if len(columns) != len(names):
         raise LogError(
             f"{table.source}: {what} needs {len(names)} columns ({', '.join(names)}), but {len(columns)} are given"
@@ -250,23 +261,28 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
         raise LogError(f"{table.source}: there is no {what} in it")
     if channel.frame != "geodetic":
         assert spec.origin is not None
+        if not kind.geodetic:
+            raise LogError(f"{table.source}: frame = {channel.frame!r} is for positions, and {what} is none")
         value = geodetic_from_local(value, spec.origin, channel.frame)[:, : len(names)]
-    _check_range(value, names, columns, table, rows)
-    for i, name in enumerate(names):
-        if name in _ANGLES:
+    _check_range(value, kind, columns, table, rows)
+    for i, component in enumerate(kind.components):
+        if component.cyclic and not (kind.geodetic and i < 2):
             value[:, i] = wrap_angle(value[:, i])
     return Series(table.source, time[rows], value, table.line[rows])
 
 
 def _check_range(
-    value: Array, names: tuple[str, ...], columns: tuple[int | str, ...], table: Table, rows: NDArray[np.int64]
+    value: Array, kind: Kind, columns: tuple[int | str, ...], table: Table, rows: NDArray[np.int64]
 ) -> None:
-    limits = {"latitude": 0.5 * math.pi, "longitude": 2.0 * math.pi, **dict.fromkeys(_ANGLES, 2.0 * math.pi)}
-    for i, name in enumerate(names):
-        bad = np.flatnonzero(np.abs(value[:, i]) > limits.get(name, np.inf) + 1e-9)
+    """LogError where an angle is larger than it can be in radians."""
+    for i, component in enumerate(kind.components):
+        if component.unit != "deg":
+            continue
+        limit = 2.0 * math.pi if component.cyclic else component.limit
+        bad = np.flatnonzero(np.abs(value[:, i]) > limit + 1e-9)
         if bad.size:
             raise LogError(
-                f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {name} would be "
+                f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
                 f"{value[bad[0], i]:.6g} rad; is its unit 'deg'?"
             )
 

@@ -20,9 +20,8 @@ import numpy as np
 
 from simnav.log.table import LogError, LogWarning, Table
 from simnav.spec import closest
-from simnav.types import KINDS
 
-__all__ = ["DEFAULT_COLUMNS", "SENTENCES", "NmeaFile", "read_nmea", "utc_seconds"]
+__all__ = ["SENTENCES", "NmeaFile", "read_nmea", "utc_seconds"]
 
 _DEG = math.pi / 180.0
 _KNOT = 1852.0 / 3600.0
@@ -169,16 +168,6 @@ SENTENCES: Mapping[str, Callable[[Fields], Row]] = {
     "DPT": _dpt,
     "PSXN,23": _psxn23,
     "PUHAW,UVH": _uvh,
-}
-
-#: Columns that a kind of instrument (or part of the reference) takes where the scenario names none.
-DEFAULT_COLUMNS: Mapping[str, tuple[str, ...]] = {
-    **{name: kind.values for name, kind in KINDS.items()},
-    "gnss_velocity": ("velocity_north", "velocity_east", "=0"),
-    "dvl": ("ground_forward", "ground_starboard", "=0"),
-    "position": ("latitude", "longitude", "height"),
-    "velocity": ("velocity_north", "velocity_east", "=nan"),
-    "attitude": ("roll", "pitch", "heading"),
 }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from simnav.recording import FaultLabel, Recording
 from simnav.scoring.navigation_error import horizontal
+from simnav.sensors.faults import effect_of
 from simnav.types import Array
 
 __all__ = ["RECOVERY_THRESHOLD", "Outage", "outage_scores", "outages"]
@@ -85,7 +86,7 @@ def outages(error: Array, recording: Recording, *, threshold: float = RECOVERY_T
 
 def _gaps(fault: FaultLabel, recording: Recording) -> list[tuple[float, float]]:
     """The stretches without measurements that an outage made: from the first that was lost to the first that came."""
-    if fault.kind != "outage":
+    if effect_of(fault.kind) != "missing":
         return []
     found: list[tuple[float, float]] = []
     for name in fault.instruments:

@@ -1,28 +1,30 @@
 """The instruments of a vessel, their errors and their faults.
 
-`InstrumentSpec` and `FaultSpec` are the unions of all aiding instruments and of all faults, told apart by ``kind``;
-the IMU is an `ImuSpec`. ``spec.datasheet(...)`` is what an estimator is told, ``spec.build(...)`` the instrument of one
-run, and ``sense`` measures the truth block by block.
+Every aiding instrument has a specification (an `AidSpec`), every fault too (a `FaultSpec`); the IMU is an `ImuSpec`.
+``spec.datasheet(...)`` is what an estimator is told, ``spec.build(...)`` the instrument of one run, and ``sense``
+measures the truth block by block. Kinds of others are registered as ours are: `register_instrument`, `register_fault`.
 """
 
 from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
-
+from simnav.kinds import INSTRUMENTS
 from simnav.sensors.compass import Gyrocompass, MagneticCompass
 from simnav.sensors.depth import Depth
 from simnav.sensors.dvl import Dvl
-from simnav.sensors.faults import FaultLayer, FaultSpec, build_layers, check_faults, labels
+from simnav.sensors.faults import AnyFault, FaultLayer, FaultSpec, build_layers, fault_specs, labels, register_fault
 from simnav.sensors.gnss import GnssPosition, GnssVelocity
 from simnav.sensors.imu import Imu, ImuSpec
-from simnav.sensors.instrument import AidSpec, Instrument
+from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
+from simnav.spec import OneOf
 
 __all__ = [
     "AidSpec",
+    "AnyFault",
+    "AnyInstrument",
     "Depth",
     "Dvl",
     "FaultLayer",
@@ -33,17 +35,26 @@ __all__ = [
     "Imu",
     "ImuSpec",
     "Instrument",
-    "InstrumentSpec",
     "MagneticCompass",
     "SpeedLog",
     "TerrainFix",
     "build_layers",
-    "check_faults",
+    "fault_specs",
+    "instrument_specs",
     "labels",
+    "register_fault",
+    "register_instrument",
 ]
 
-#: Any aiding instrument; ``kind`` tells which.
-InstrumentSpec = Annotated[
-    GnssPosition | GnssVelocity | Dvl | MagneticCompass | Gyrocompass | SpeedLog | Depth | TerrainFix,
-    Field(discriminator="kind"),
-]
+
+def instrument_specs() -> list[type[AidSpec]]:
+    """The specifications of all kinds of aiding instruments that are known."""
+    return list(INSTRUMENTS.items().values())
+
+
+def _specs() -> list[type[AidSpec | ImuSpec]]:
+    return [*instrument_specs(), ImuSpec]
+
+
+#: Any instrument that is known, the IMU included; ``kind`` tells which.
+AnyInstrument = Annotated[AidSpec | ImuSpec, OneOf(_specs)]

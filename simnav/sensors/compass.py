@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from simnav.earth import ROTATION_RATE, principal_radii
-from simnav.sensors.instrument import AidSpec, Instrument
+from simnav.kinds import HEADING, Component, Kind
+from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.spec import NonNegative, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["Gyrocompass", "MagneticCompass"]
 
+HEADING_COMPONENT = (Component("heading", "deg", cyclic=True),)
 
+
+@register_instrument(Kind("true heading", "heading", HEADING_COMPONENT, HEADING), example={"sigma_deg": 1.0})
 class MagneticCompass(AidSpec):
     """Heading of a magnetic compass, corrected for variation.
 
@@ -21,6 +25,8 @@ class MagneticCompass(AidSpec):
     Practical Navigator*, 2019, chapter 8: the semicircular coefficients); B and C are drawn with ``deviation``, on top
     of ``fixed_deviation`` = (B, C). The constant coefficient A is the bias.
     """
+
+    errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "deviation")
 
     kind: Literal["magnetic_compass"] = "magnetic_compass"
     sigma: NonNegative = quantity("deg")
@@ -38,7 +44,7 @@ class MagneticCompass(AidSpec):
 class _MagneticCompass(Instrument):
     def __init__(self, spec: MagneticCompass, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self.deviation = self._drawn("deviation", np.full(2, spec.deviation)) + spec.fixed_deviation
+        self.deviation = self.drawn("deviation", np.full(2, spec.deviation)) + spec.fixed_deviation
         self._deviates = bool(self.deviation.any())
 
     def observe(self, tap: TapStates) -> Array:
@@ -50,6 +56,7 @@ class _MagneticCompass(Instrument):
         return value
 
 
+@register_instrument(Kind("true heading", "heading", HEADING_COMPONENT, HEADING), example={"sigma_deg": 0.5})
 class Gyrocompass(AidSpec):
     """Heading of a gyrocompass.
 

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument
+from simnav.kinds import DEPTH, LARGEST_HEIGHT, Component, Kind
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument
 from simnav.spec import NonNegative, Vector, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["Depth"]
 
 
+@register_instrument(
+    Kind(
+        "depth below the mean sea surface, positive down",
+        "depth",
+        (Component("depth", "m", limit=LARGEST_HEIGHT),),
+        DEPTH,
+    ),
+    example={"rate_hz": 0.5, "sigma_m": 0.2},
+)
 class Depth(AidSpec):
     """Depth of the sensor itself, positive down."""
 
@@ -31,6 +41,6 @@ class Depth(AidSpec):
 class _Depth(Instrument):
     def observe(self, tap: TapStates) -> Array:
         depth = -tap.position[:, 2:]
-        if self._levered:
+        if self.levered:
             depth = depth + self.lever_displacement(tap)[:, 2:]
         return (1.0 + self.scale) * depth

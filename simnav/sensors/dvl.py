@@ -3,19 +3,38 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.kinds import BODY_VELOCITY, Kind, speed_components
 from simnav.rotation import dcm_from_rotation_vector
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, turn_to_body
+from simnav.sensors.instrument import (
+    ZERO,
+    AidSpec,
+    Instrument,
+    SigmaTriple,
+    Triple,
+    register_instrument,
+    turn_to_body,
+)
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["Dvl"]
 
 
+@register_instrument(
+    Kind(
+        "velocity over the ground of the transducer, in body axes",
+        "velocity",
+        speed_components("forward", "starboard", "down"),
+        BODY_VELOCITY,
+        log_columns=("ground_forward", "ground_starboard", "=0"),
+    ),
+    example={"phase_s": 0.3, "sigma_m_s": 0.02},
+)
 class Dvl(AidSpec):
     """Velocity of the transducer over the ground, along axes that are the body axes up to the misalignment::
 
@@ -26,6 +45,8 @@ class Dvl(AidSpec):
     |u|)^2; the datasheet gives sigma. The bottom is in reach while the transducer's altitude is between
     ``minimum_altitude`` and ``maximum_altitude``; without a water depth it always is.
     """
+
+    errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "speed_noise")
 
     kind: Literal["dvl"] = "dvl"
     sigma: SigmaTriple = quantity("m_s")
@@ -49,7 +70,7 @@ class Dvl(AidSpec):
 class _Dvl(Instrument):
     def __init__(self, spec: Dvl, name: str, seed: int, water_depth: float | None):
         super().__init__(spec, name, seed)
-        turn = self._drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
+        turn = self.drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
         self.misalignment = turn
         self._matrix: Array = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
         self._speed_noise = spec.speed_noise
@@ -58,7 +79,7 @@ class _Dvl(Instrument):
 
     def observe(self, tap: TapStates) -> Array:
         velocity = turn_to_body(tap.attitude, tap.velocity)
-        if self._levered:
+        if self.levered:
             velocity += self.lever_velocity(tap)
         (x, y, z), m = velocity.T, self._matrix
         # Written out: a matrix product may round differently with the number of rows.
@@ -74,6 +95,6 @@ class _Dvl(Instrument):
         if self._water_depth is None:
             return None
         altitude = self._water_depth + tap.position[:, 2]
-        if self._levered:
+        if self.levered:
             altitude -= self.lever_displacement(tap)[:, 2]
         return (altitude >= self._altitudes[0]) & (altitude <= self._altitudes[1])

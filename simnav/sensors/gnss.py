@@ -5,13 +5,26 @@ from __future__ import annotations
 from typing import Literal
 
 from simnav import earth
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, Triple, turn_to_ned
+from simnav.kinds import POSITION, VELOCITY, Kind, geodetic_components, speed_components
+from simnav.sensors.instrument import (
+    ZERO,
+    AidSpec,
+    Instrument,
+    SigmaTriple,
+    Triple,
+    register_instrument,
+    turn_to_ned,
+)
 from simnav.spec import Vector, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["GnssPosition", "GnssVelocity"]
 
 
+@register_instrument(
+    Kind("position of the antenna", "fix", geodetic_components(height=True), POSITION, geodetic=True),
+    example={"sigma_m": [1.5, 1.5, 3.0], "lever_arm_m": [1.0, 0.0, -3.0]},
+)
 class GnssPosition(AidSpec):
     """Position of the antenna; errors by axis, north-east-down [m].
 
@@ -39,9 +52,19 @@ class GnssPosition(AidSpec):
 
 class _Position(Instrument):
     def observe(self, tap: TapStates) -> Array:
-        return earth.displace(tap.position, self.lever_displacement(tap)) if self._levered else tap.position
+        return earth.displace(tap.position, self.lever_displacement(tap)) if self.levered else tap.position
 
 
+@register_instrument(
+    Kind(
+        "velocity of the antenna",
+        "velocity",
+        speed_components("velocity_north", "velocity_east", "velocity_down"),
+        VELOCITY,
+        log_columns=("velocity_north", "velocity_east", "=0"),
+    ),
+    example={"rate_hz": 2.0, "sigma_m_s": [0.1, 0.1, 0.1]},
+)
 class GnssVelocity(AidSpec):
     """Velocity of the antenna over the ground, C (v + omega x l); errors by axis, north-east-down [m/s]."""
 
@@ -59,6 +82,6 @@ class GnssVelocity(AidSpec):
 
 class _Velocity(Instrument):
     def observe(self, tap: TapStates) -> Array:
-        if not self._levered:
+        if not self.levered:
             return tap.velocity
         return tap.velocity + turn_to_ned(tap.attitude, self.lever_velocity(tap))

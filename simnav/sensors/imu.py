@@ -29,6 +29,8 @@ from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
 __all__ = ["AccelerometerSpec", "GyroscopeSpec", "Imu", "ImuSpec", "TriadSpec"]
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
+#: What is wrong with a triad: fields of these names, and of these with ``fixed_`` before.
+_ERRORS = ("bias", "bias_instability", "random_walk", "rate_random_walk", "scale", "misalignment", "quantization")
 # Samples a chunk: the noise is used while it is in the cache.
 _CHUNK = 4096
 
@@ -71,6 +73,15 @@ class TriadSpec(Spec):
             self.quantization,
             self.range,
         )
+
+    def ideal(self) -> Self:
+        """The triad without its errors."""
+        changes: dict[str, object] = {"range": inf}
+        for name in type(self).model_fields:
+            if name.removeprefix("fixed_") in _ERRORS:
+                value = getattr(self, name)
+                changes[name] = (0.0,) * len(value) if isinstance(value, tuple) else 0.0
+        return self.model_copy(update=changes)
 
 
 class GyroscopeSpec(TriadSpec):
@@ -115,6 +126,11 @@ class ImuSpec(Spec):
     def datasheet(self) -> ImuDatasheet:
         """What an estimator is told."""
         return ImuDatasheet(self.rate, self.gyroscope.datasheet(), self.accelerometer.datasheet())
+
+    def ideal(self) -> ImuSpec:
+        """The instrument without its errors."""
+        triads = {"gyroscope": self.gyroscope.ideal(), "accelerometer": self.accelerometer.ideal()}
+        return self.model_copy(update=triads)
 
     def build(self, seed: int) -> Imu:
         """The instrument of one run.

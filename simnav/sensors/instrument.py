@@ -8,27 +8,44 @@ with ``observe`` the instrument's geometry and deterministic errors, b a turn-on
 first-order Gauss-Markov bias and w white noise; the errors of a position are in metres. Turn-on values are drawn at the
 start of a run from the datasheet's one-sigma figures; ``fixed_*`` are realised values that come on top and that no
 estimator is told. Every process has its own random stream and draws at every sample, delivered or not.
+
+`register_instrument` makes a kind of instrument known, ours and others' alike (``docs/instruments.md``).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from math import inf
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, model_validator
 
+from simnav.kinds import INSTRUMENTS, Kind
+from simnav.plugins import PluginError
 from simnav.recording import AidStream
 from simnav.sensors.processes import GaussMarkov
-from simnav.sensors.values import add_error
-from simnav.spec import NonNegative, Positive, Spec, Vector, quantity
+from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, Vector, quantity
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
 
-__all__ = ["ZERO", "AidSpec", "Instrument", "Pair", "SigmaPair", "SigmaTriple", "Triple", "turn_to_body", "turn_to_ned"]
+__all__ = [
+    "ZERO",
+    "AidSpec",
+    "Instrument",
+    "Pair",
+    "SigmaPair",
+    "SigmaTriple",
+    "Triple",
+    "register_instrument",
+    "turn_to_body",
+    "turn_to_ned",
+]
 
+#: Figures that a specification may have for each component by itself.
+_BY_COMPONENT = ("sigma", "bias", "bias_instability", "fixed_bias")
 #: Default of a vector.
 ZERO: Vector = (0.0, 0.0, 0.0)
 
@@ -84,8 +101,22 @@ class AidSpec(Spec):
     """Base of the specifications of aiding instruments.
 
     Subclasses declare ``sigma`` and, as far as they apply, ``bias``, ``bias_instability``, ``scale``,
-    ``misalignment``, ``lever_arm`` and their ``fixed_`` forms, each with its unit.
+    ``misalignment``, ``lever_arm`` and their ``fixed_`` forms, each with its unit. Where the components of a
+    measurement differ in their unit, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
+
+    Attributes
+    ----------
+    definition : Kind
+        What the instrument measures; set by `register_instrument`.
+    example : mapping
+        A table of a scenario file with an instrument of this kind; likewise.
+    errors : tuple of str
+        Fields that make a measurement wrong (with ``fixed_`` before them, too); zero for an ideal instrument.
     """
+
+    definition: ClassVar[Kind]
+    example: ClassVar[Mapping[str, Any]]
+    errors: ClassVar[tuple[str, ...]] = ("sigma", "bias", "bias_instability", "scale", "misalignment")
 
     kind: str
     rate: Positive = quantity("hz", 1.0)
@@ -99,8 +130,25 @@ class AidSpec(Spec):
         return self
 
     def figure(self, name: str) -> Any:
-        """A figure of this instrument, or 0 where its kind has no such error."""
-        return getattr(self, name, 0.0)
+        """A figure of this instrument, by component where each has its own; 0 where its kind has no such error."""
+        if name in type(self).model_fields:
+            return getattr(self, name)
+        if name not in _BY_COMPONENT:
+            return 0.0
+        by_component = tuple(getattr(self, f"{name}_{error}", 0.0) for error in self.definition.errors)
+        return by_component if any(by_component) else 0.0
+
+    def ideal(self) -> Self:
+        """The instrument without its errors."""
+        names = {
+            f"{name}{suffix}" for name in self.errors for suffix in ("", *(f"_{e}" for e in self.definition.errors))
+        }
+        changes = {}
+        for name in type(self).model_fields:
+            if name.removeprefix("fixed_") in names:
+                value = getattr(self, name)
+                changes[name] = (0.0,) * len(value) if isinstance(value, tuple) else 0.0
+        return self.model_copy(update=changes)
 
     def datasheet(self, name: str) -> Datasheet:
         """What an estimator is told.
@@ -122,6 +170,7 @@ class AidSpec(Spec):
             float(self.figure("scale")),
             np.broadcast_to(np.asarray(self.figure("misalignment"), dtype=np.float64), (3,)).copy(),
             np.broadcast_to(np.asarray(self.figure("lever_arm"), dtype=np.float64), (3,)).copy(),
+            {detail: getattr(self, detail) for detail in self.definition.datasheet},
         )
 
     def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
@@ -139,6 +188,63 @@ class AidSpec(Spec):
         raise NotImplementedError
 
 
+S = TypeVar("S", bound=AidSpec)
+
+
+def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[type[S]], type[S]]:
+    """Class decorator: make a kind of instrument known, by the default of the field ``kind`` of its specification.
+
+    Parameters
+    ----------
+    kind : Kind
+        What it measures.
+    example : mapping
+        A table of a scenario file, without ``kind``, with a typical instrument of this kind. The contract test of
+        estimators (`simnav.check`) puts it on a vessel that sails from 54.0 N, 7.9 E.
+
+    Raises
+    ------
+    PluginError
+        If the class is no `AidSpec`, does not fit its kind, its name is taken, or the example is not valid.
+
+    Examples
+    --------
+    See ``docs/instruments.md``.
+    """
+
+    def wrap(cls: type[S]) -> type[S]:
+        if not (isinstance(cls, type) and issubclass(cls, AidSpec)):
+            raise PluginError(f"@register_instrument: {cls!r} is not a subclass of simnav.sensors.AidSpec")
+        name = cls.model_fields["kind"].default
+        if not isinstance(name, str):
+            raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_kind'] = 'my_kind'")
+        if name in ("imu", "interval"):
+            raise PluginError(f"kind {name!r} of instrument {cls.__qualname__}: the name means something else")
+        for component in kind.components:
+            for unit in (component.unit, component.error_unit):
+                if unit not in UNITS:
+                    raise PluginError(f"kind {name!r}: the unit {unit!r} is unknown; there are: {', '.join(UNITS)}")
+        for detail in kind.datasheet:
+            if detail not in cls.model_fields:
+                raise PluginError(
+                    f"kind {name!r}: the datasheet names {detail!r}, but {cls.__qualname__} has no such field"
+                )
+        cls.definition, cls.example = kind, dict(example)
+        with INSTRUMENTS.adding(name, cls):
+            source = f"the example of kind {name!r}"
+            try:
+                cls.from_toml(example, source=source).datasheet("example")
+            except SpecError as error:
+                raise PluginError(str(error)) from None
+            except ValueError as error:
+                raise PluginError(
+                    f"{source}: its figures do not fit its components ({', '.join(kind.errors)}): {error}"
+                ) from None
+        return cls
+
+    return wrap
+
+
 class Instrument(ABC):
     """An aiding instrument in one run: its errors are drawn, and go on from block to block.
 
@@ -147,24 +253,37 @@ class Instrument(ABC):
     spec : AidSpec
     name : str
     seed : int
+
+    Attributes
+    ----------
+    definition : Kind
+    sigma, bias : (d,) array
+        White noise, and the bias of this run.
+    scale : float
+        Scale-factor error of this run [-].
+    lever_arm : (3,) array
+        [m]
+    levered : bool
+        Whether the lever arm is not zero.
     """
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
-        self.name, self.kind = name, spec.kind
+        self.name, self.kind, self.definition = name, spec.kind, spec.definition
         self._seed = seed
         sheet = spec.datasheet(name)
         self.sigma = sheet.sigma
         self.lever_arm = sheet.lever_arm
-        self.bias = self._drawn("bias", sheet.bias) + spec.figure("fixed_bias")
-        self.scale = float(self._drawn("scale", np.array([sheet.scale]))[0] + spec.figure("fixed_scale"))
+        self.bias = self.drawn("bias", sheet.bias) + spec.figure("fixed_bias")
+        self.scale = float(self.drawn("scale", np.array([sheet.scale]))[0] + spec.figure("fixed_scale"))
         self._noise = stream(seed, "instrument", name, "noise") if self.sigma.any() else None
         self._instability = None
         if sheet.bias_instability.any():
             rng = stream(seed, "instrument", name, "bias_instability")
             self._instability = GaussMarkov(sheet.bias_instability, sheet.correlation_time, rng)
-        self._levered = bool(self.lever_arm.any())
+        self.levered = bool(self.lever_arm.any())
 
-    def _drawn(self, process: str, sigma: Array) -> Array:
+    def drawn(self, process: str, sigma: Array) -> Array:
+        """Values of this run, drawn with one-sigma figures from a random stream that is named after the process."""
         if not sigma.any():
             return np.zeros(len(sigma))
         return sigma * stream(self._seed, "instrument", self.name, process).standard_normal(len(sigma))
@@ -214,7 +333,7 @@ class Instrument(ABC):
             error += self._instability.sample(tap.time)
         if self._noise is not None:
             error += sigma * self._noise.standard_normal(value.shape)
-        value = add_error(self.kind, value, error)
+        value = self.definition.add_error(value, error)
         time, dropped = tap.time, np.empty(0)
         there = self.available(tap)
         if there is not None and not there.all():

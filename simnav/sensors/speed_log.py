@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, turn_to_body
+from simnav.kinds import WATER_SPEED, Kind, speed_components
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument, turn_to_body
 from simnav.spec import NonNegative, Vector, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["SpeedLog"]
 
 
+@register_instrument(
+    Kind("forward speed through the water", "velocity", speed_components("speed"), WATER_SPEED),
+    example={"sigma_m_s": 0.1},
+)
 class SpeedLog(AidSpec):
     """Forward component of the sensor's velocity through the water, (1 + k) (C' (v - current) + omega x l)_forward."""
 
@@ -31,6 +36,6 @@ class SpeedLog(AidSpec):
 class _SpeedLog(Instrument):
     def observe(self, tap: TapStates) -> Array:
         velocity = turn_to_body(tap.attitude, tap.velocity - tap.water_velocity)
-        if self._levered:
+        if self.levered:
             velocity += self.lever_velocity(tap)
         return (1.0 + self.scale) * velocity[:, :1]

@@ -5,13 +5,18 @@ from __future__ import annotations
 from typing import Literal
 
 from simnav import earth
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, Pair, SigmaPair
+from simnav.kinds import HORIZONTAL_POSITION, Kind, geodetic_components
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, Pair, SigmaPair, register_instrument
 from simnav.spec import Vector, quantity
 from simnav.types import Array, TapStates
 
 __all__ = ["TerrainFix"]
 
 
+@register_instrument(
+    Kind("horizontal position", "fix", geodetic_components(height=False), HORIZONTAL_POSITION, geodetic=True),
+    example={"rate_hz": 0.3, "sigma_m": [5.0, 5.0]},
+)
 class TerrainFix(AidSpec):
     """Latitude and longitude of the instrument; errors north and east [m].
 
@@ -32,5 +37,5 @@ class TerrainFix(AidSpec):
 
 class _TerrainFix(Instrument):
     def observe(self, tap: TapStates) -> Array:
-        position = earth.displace(tap.position, self.lever_displacement(tap)) if self._levered else tap.position
+        position = earth.displace(tap.position, self.lever_displacement(tap)) if self.levered else tap.position
         return position[:, :2]

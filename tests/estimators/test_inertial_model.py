@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from simnav import earth, rotation
-from simnav.estimators.models import measurements
 from simnav.estimators.models.base import gauss_markov
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.propagation import HELD_VELOCITY, propagate_covariance
@@ -266,24 +265,6 @@ def test_two_biases_in_one_state():
     assert gauss_markov(b, 0.0, tau) == (b * b, 0.0, 0.0, 0.0)
     assert gauss_markov(b, s, np.inf) == (b * b, 0.0, s * s, 0.0)
     assert gauss_markov(b, s, 0.5) == (b * b, 0.0, 0.0, s * s)
-
-
-@pytest.mark.parametrize(
-    ("kind", "value", "good"),
-    [
-        ("gnss_position", [0.9, 0.1, 5.0], True),
-        ("gnss_position", [50.0, 5.0, 5.0], False),
-        ("gnss_position", [0.9, 0.1, 1e9], False),
-        ("dvl", [1.0, np.nan, 0.0], False),
-        ("dvl", [1.0, 0.0, 0.0], True),
-        ("depth", [np.inf], False),
-        ("gyrocompass", [6.2], True),
-        ("gyrocompass", [300.0], False),
-        ("terrain_fix", [0.9, 0.1], True),
-    ],
-)
-def test_plausible(kind: str, value: list[float], good: bool):
-    assert measurements.plausible(kind, np.array(value)) is good
 
 
 def test_body_rate_is_that_of_the_present_not_of_half_a_sample_ago(recording_of):

@@ -9,19 +9,32 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Annotated
 
-from pydantic import Field
-
 from simnav.recording import FaultLabel
-from simnav.sensors.faults.additive import BiasStep, GrossError, Multipath, NoiseStep, Ramp
-from simnav.sensors.faults.fault import FaultLayer, quantity_of
-from simnav.sensors.faults.fault import FaultSpec as AnyFault
+from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, Multipath, NoiseStep, Ramp
+from simnav.sensors.faults.fault import (
+    FAULTS,
+    Activity,
+    Effect,
+    FaultLayer,
+    FaultSpec,
+    Names,
+    Size,
+    effect_of,
+    register_fault,
+    size_by_component,
+    size_range,
+)
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
-from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage
-from simnav.spec import SpecError
+from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
+from simnav.spec import OneOf
 
 __all__ = [
+    "FAULTS",
+    "Activity",
+    "AdditiveLayer",
     "AnyFault",
     "BiasStep",
+    "Effect",
     "FalseZero",
     "FaultLayer",
     "FaultSpec",
@@ -29,48 +42,32 @@ __all__ = [
     "GrossError",
     "ImuDisturbance",
     "Multipath",
+    "Names",
     "NoiseStep",
     "Outage",
     "Ramp",
+    "ReplacingLayer",
+    "Size",
     "build_layers",
-    "check_faults",
+    "effect_of",
+    "fault_specs",
     "labels",
-    "quantity_of",
+    "register_fault",
+    "size_by_component",
+    "size_range",
 ]
 
-#: Any fault; ``kind`` tells which.
-FaultSpec = Annotated[
-    NoiseStep | Outage | GrossError | Multipath | Ramp | Frozen | BiasStep | FalseZero | ImuDisturbance,
-    Field(discriminator="kind"),
-]
 
-_BITS = 32
+def fault_specs() -> list[type[FaultSpec]]:
+    """The specifications of all kinds of faults that are known."""
+    return list(FAULTS.items().values())
 
 
-def check_faults(faults: Sequence[AnyFault], instruments: Mapping[str, str], *, imu: bool = True) -> None:
-    """Check that faults fit a scenario.
-
-    Parameters
-    ----------
-    faults : sequence of FaultSpec
-    instruments : mapping
-        Name of each aiding instrument to its kind.
-    imu : bool
-        Whether there is an IMU.
-
-    Raises
-    ------
-    SpecError
-        On the first that does not, or if together they have more than 32 intervals.
-    """
-    for fault in faults:
-        fault.check(instruments, imu=imu)
-    total = sum(fault.bits for fault in faults)
-    if total > _BITS:
-        raise SpecError(f"the faults have {total} intervals in all; a recording can label {_BITS}")
+#: Any fault that is known; ``kind`` tells which.
+AnyFault = Annotated[FaultSpec, OneOf(fault_specs)]
 
 
-def build_layers(faults: Sequence[AnyFault], seed: int) -> tuple[FaultLayer, ...]:
+def build_layers(faults: Sequence[FaultSpec], seed: int) -> tuple[FaultLayer, ...]:
     """The layers of a run, to be applied in this order.
 
     Parameters
@@ -94,7 +91,7 @@ def build_layers(faults: Sequence[AnyFault], seed: int) -> tuple[FaultLayer, ...
     return tuple(layers)
 
 
-def labels(faults: Sequence[AnyFault], duration: float, instruments: Mapping[str, str]) -> tuple[FaultLabel, ...]:
+def labels(faults: Sequence[FaultSpec], duration: float, instruments: Mapping[str, str]) -> tuple[FaultLabel, ...]:
     """The truth about the faults of a run: label j belongs to bit j.
 
     Parameters

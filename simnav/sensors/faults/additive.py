@@ -11,25 +11,19 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simnav.recording import AidStream
-from simnav.sensors.faults.fault import FaultLayer, FaultSpec, Size
+from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, Size, register_fault, size_range
 from simnav.sensors.processes import GaussMarkov
-from simnav.sensors.values import add_error
 from simnav.spec import Positive, quantity
 from simnav.types import KINDS, Array
 
-__all__ = ["BiasStep", "GrossError", "Multipath", "NoiseStep", "Ramp"]
-
-
-def _by_axis(size: float | tuple[float, ...], kind: str) -> Array:
-    return np.broadcast_to(np.asarray(size, dtype=np.float64), (len(KINDS[kind].errors),))
+__all__ = ["AdditiveLayer", "BiasStep", "GrossError", "Multipath", "NoiseStep", "Ramp"]
 
 
 def _not_negative(spec: FaultSpec) -> None:
     for stem in spec.stems:
-        for q in ("position", "velocity", "heading"):
-            size = getattr(spec, f"{stem}_{q}")
+        for name, size in spec.sizes(stem).items():
             if size is not None and not np.all(np.asarray(size) >= 0.0):
-                raise ValueError(f"{spec._key(stem, q)} is not negative")
+                raise ValueError(f"{spec.key_of(name)} is not negative")
 
 
 def _all_times(stream: AidStream) -> tuple[Array, NDArray[np.intp] | None]:
@@ -40,14 +34,24 @@ def _all_times(stream: AidStream) -> tuple[Array, NDArray[np.intp] | None]:
     return times, np.searchsorted(times, stream.time)
 
 
-class _Additive(FaultLayer):
-    """Lays ``error`` over the measurements within the intervals."""
+class AdditiveLayer(FaultLayer):
+    """Lays an error over the measurements within the intervals; a subclass gives `error`."""
 
     @abstractmethod
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
-        """The (m, d) errors at the times within intervals; ``since`` is the time since the interval's start.
+        """The errors of the measurements within the intervals, delivered or not.
 
-        A row of zeros does not touch its measurement.
+        Parameters
+        ----------
+        stream : AidStream
+            The block of the instrument.
+        time, since : (m,) array
+            Of the measurements, since the start of the run and of their interval [s].
+
+        Returns
+        -------
+        (m, d) array
+            Components as in ``KINDS[stream.kind].errors``, SI units; a row of zeros does not touch its measurement.
         """
 
     def apply(self, stream: AidStream) -> AidStream:
@@ -68,16 +72,18 @@ class _Additive(FaultLayer):
         touched = (rows >= 0) & error.any(axis=1)
         if not touched.any():
             return stream
-        return self._lay(stream, rows[touched], error[touched], interval[touched])
+        return self.lay(stream, rows[touched], error[touched], interval[touched])
 
-    def _lay(self, stream: AidStream, rows: NDArray[np.intp], error: Array, interval: NDArray[np.intp]) -> AidStream:
+    def lay(self, stream: AidStream, rows: NDArray[np.intp], error: Array, interval: NDArray[np.intp]) -> AidStream:
+        """Add errors to the rows of a stream, and label them with the numbers of their intervals."""
         value, faults, fault_error = stream.value.copy(), stream.faults.copy(), stream.fault_error.copy()
-        value[rows] = add_error(stream.kind, value[rows], error)
-        faults[rows] |= self._bits(interval)
+        value[rows] = KINDS[stream.kind].add_error(value[rows], error)
+        faults[rows] |= self.bits(interval)
         fault_error[rows] += error
         return replace(stream, value=value, faults=faults, fault_error=fault_error)
 
 
+@register_fault
 class NoiseStep(FaultSpec):
     """The white noise grows, by a factor or to a new sigma.
 
@@ -86,7 +92,7 @@ class NoiseStep(FaultSpec):
     """
 
     stems: ClassVar[tuple[str, ...]] = ("sigma",)
-    optional: ClassVar[bool] = True
+    effect: ClassVar[Effect] = "noise"
     kind: Literal["noise_step"] = "noise_step"
     factor: float | None = Field(None, ge=1.0)
     sigma_position: Size = quantity("m", None)
@@ -108,32 +114,27 @@ class NoiseStep(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _NoiseStep(self, index, seed, self._key_of_streams(index, occurrence))
+        return _NoiseStep(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _NoiseStep(_Additive):
-    _spec: NoiseStep
-
-    def __init__(self, spec: NoiseStep, index: int, seed: int, key: str):
-        super().__init__(spec, index, seed, key)
-        self._noise: dict[str, np.random.Generator] = {}
+class _NoiseStep(AdditiveLayer):
+    spec: NoiseStep
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
-        if stream.name not in self._noise:
-            self._noise[stream.name] = self._rng(stream.name, "noise")
-        return self._noise[stream.name].standard_normal((len(time), stream.value.shape[1]))
+        return self.rng(stream.name, "noise").standard_normal((len(time), stream.value.shape[1]))
 
-    def _lay(self, stream: AidStream, rows: NDArray[np.intp], error: Array, interval: NDArray[np.intp]) -> AidStream:
+    def lay(self, stream: AidStream, rows: NDArray[np.intp], error: Array, interval: NDArray[np.intp]) -> AidStream:
         old = stream.sigma[rows]
-        if self._spec.factor is not None:
-            new = self._spec.factor * old
+        if self.spec.factor is not None:
+            new = self.spec.factor * old
         else:
-            new = np.maximum(old, _by_axis(self._spec.size("sigma", stream.kind), stream.kind))
+            new = np.maximum(old, self.spec.size("sigma", stream.kind))
         sigma = stream.sigma.copy()
         sigma[rows] = new
-        return super()._lay(replace(stream, sigma=sigma), rows, np.sqrt(new**2 - old**2) * error, interval)
+        return super().lay(replace(stream, sigma=sigma), rows, np.sqrt(new**2 - old**2) * error, interval)
 
 
+@register_fault
 class GrossError(FaultSpec):
     """Single measurements go wrong, each with a ``probability``.
 
@@ -142,6 +143,7 @@ class GrossError(FaultSpec):
     """
 
     stems: ClassVar[tuple[str, ...]] = ("size",)
+    effect: ClassVar[Effect] = "gross"
     kind: Literal["gross_error"] = "gross_error"
     probability: float = Field(ge=0.0, le=1.0)
     distribution: Literal["uniform", "normal", "fixed"] = "uniform"
@@ -152,8 +154,8 @@ class GrossError(FaultSpec):
 
     @model_validator(mode="after")
     def _sizes(self) -> Self:
-        for q in ("position", "velocity", "heading"):
-            size, key = getattr(self, f"size_{q}"), self._key("size", q)
+        for name, size in self.sizes("size").items():
+            key = self.key_of(name)
             if size is None:
                 continue
             if self.distribution == "uniform" and not (
@@ -170,43 +172,38 @@ class GrossError(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _GrossError(self, index, seed, self._key_of_streams(index, occurrence))
+        return _GrossError(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _GrossError(_Additive):
-    _spec: GrossError
-
-    def __init__(self, spec: GrossError, index: int, seed: int, key: str):
-        super().__init__(spec, index, seed, key)
-        self._streams: dict[str, tuple[np.random.Generator, np.random.Generator]] = {}
+class _GrossError(AdditiveLayer):
+    spec: GrossError
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
-        if stream.name not in self._streams:
-            self._streams[stream.name] = self._rng(stream.name, "occurrence"), self._rng(stream.name, "size")
-        occurrence, sizes = self._streams[stream.name]
+        occurrence, sizes = self.rng(stream.name, "occurrence"), self.rng(stream.name, "size")
         n, d = len(time), stream.value.shape[1]
-        hit = occurrence.random(n) < self._spec.probability
-        size = self._spec.size("size", stream.kind)
-        if self._spec.distribution == "uniform":
+        hit = occurrence.random(n) < self.spec.probability
+        if self.spec.distribution == "uniform":
             draws = sizes.random((n, d, 2))
-            if self._spec.common:
+            if self.spec.common:
                 draws[:] = draws[:, :1]
-            low, high = size
+            low, high = size_range(self.spec.sizes("size"), "size", stream.kind)
             error = np.where(draws[..., 1] < 0.5, -1.0, 1.0) * (low + (high - low) * draws[..., 0])
-        elif self._spec.distribution == "normal":
+        elif self.spec.distribution == "normal":
             draws = sizes.standard_normal((n, d))
-            if self._spec.common:
+            if self.spec.common:
                 draws[:] = draws[:, :1]
-            error = draws * _by_axis(size, stream.kind)
+            error = draws * self.spec.size("size", stream.kind)
         else:
-            error = _by_axis(size, stream.kind)[None].repeat(n, axis=0)
+            error = self.spec.size("size", stream.kind)[None].repeat(n, axis=0)
         return cast(Array, np.where(hit[:, None], error, 0.0))
 
 
+@register_fault
 class Multipath(FaultSpec):
     """Time-correlated error: a first-order Gauss-Markov process, stationary from the start."""
 
     stems: ClassVar[tuple[str, ...]] = ("sigma",)
+    effect: ClassVar[Effect] = "lasting"
     kind: Literal["multipath"] = "multipath"
     correlation_time: Positive = quantity("s")
     sigma_position: Size = quantity("m", None)
@@ -220,11 +217,11 @@ class Multipath(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _Multipath(self, index, seed, self._key_of_streams(index, occurrence))
+        return _Multipath(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _Multipath(_Additive):
-    _spec: Multipath
+class _Multipath(AdditiveLayer):
+    spec: Multipath
 
     def __init__(self, spec: Multipath, index: int, seed: int, key: str):
         super().__init__(spec, index, seed, key)
@@ -232,16 +229,18 @@ class _Multipath(_Additive):
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
         if stream.name not in self._processes:
-            sigma = _by_axis(self._spec.size("sigma", stream.kind), stream.kind)
-            rng = self._rng(stream.name, "process")
-            self._processes[stream.name] = GaussMarkov(sigma, self._spec.correlation_time, rng)
+            sigma = self.spec.size("sigma", stream.kind)
+            rng = self.rng(stream.name, "process")
+            self._processes[stream.name] = GaussMarkov(sigma, self.spec.correlation_time, rng)
         return self._processes[stream.name].sample(time)
 
 
+@register_fault
 class Ramp(FaultSpec):
     """An error that grows from zero at the start of each interval, by ``slope`` a second."""
 
     stems: ClassVar[tuple[str, ...]] = ("slope",)
+    effect: ClassVar[Effect] = "growing"
     kind: Literal["ramp"] = "ramp"
     slope_position: Size = quantity("m_s", None)
     slope_velocity: Size = quantity("m_s2", None)
@@ -249,20 +248,22 @@ class Ramp(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _Ramp(self, index, seed, self._key_of_streams(index, occurrence))
+        return _Ramp(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _Ramp(_Additive):
-    _spec: Ramp
+class _Ramp(AdditiveLayer):
+    spec: Ramp
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
-        return np.maximum(since, 0.0)[:, None] * _by_axis(self._spec.size("slope", stream.kind), stream.kind)
+        return np.maximum(since, 0.0)[:, None] * self.spec.size("slope", stream.kind)
 
 
+@register_fault
 class BiasStep(FaultSpec):
     """A constant error, ``offset``, by axis: north-east-down for positions and GNSS velocity, body axes for a DVL."""
 
     stems: ClassVar[tuple[str, ...]] = ("offset",)
+    effect: ClassVar[Effect] = "lasting"
     kind: Literal["bias_step"] = "bias_step"
     offset_position: Size = quantity("m", None)
     offset_velocity: Size = quantity("m_s", None)
@@ -270,12 +271,12 @@ class BiasStep(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _BiasStep(self, index, seed, self._key_of_streams(index, occurrence))
+        return _BiasStep(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _BiasStep(_Additive):
-    _spec: BiasStep
+class _BiasStep(AdditiveLayer):
+    spec: BiasStep
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
-        offset = _by_axis(self._spec.size("offset", stream.kind), stream.kind)
+        offset = self.spec.size("offset", stream.kind)
         return np.broadcast_to(offset, (len(time), len(offset)))

@@ -6,25 +6,41 @@ of variates per measurement, those counted that something else has dropped, so t
 
 Bits: a fault takes one bit of the labels, and one `FaultLabel`, per interval in ``intervals``, consecutive; a fault
 with a start and an end, or with random intervals, takes one.
+
+`register_fault` makes a kind of fault known, ours and others' alike (``docs/instruments.md``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, model_validator
 from pydantic.fields import FieldInfo
 
+from simnav.plugins import PluginError, Registry
 from simnav.recording import AidStream, FaultLabel, ImuLabels
 from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, quantity, unit_of
 from simnav.streams import stream as random_stream
 from simnav.types import KINDS, Array, ImuSamples
 
-__all__ = ["TOLERANCE", "Activity", "FaultLayer", "FaultSpec", "Names", "Size", "quantity_of"]
+__all__ = [
+    "FAULTS",
+    "TOLERANCE",
+    "Activity",
+    "Effect",
+    "FaultLayer",
+    "FaultSpec",
+    "Names",
+    "Size",
+    "effect_of",
+    "register_fault",
+    "size_by_component",
+    "size_range",
+]
 
 #: Times are multiples of the sample interval up to rounding: half a microsecond decides [s].
 TOLERANCE = 0.5e-6
@@ -50,21 +66,55 @@ def _intervals(value: Any) -> Any:
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 _Intervals = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_intervals)]
 
-_QUANTITIES = {
-    "gnss_position": "position",
-    "terrain_fix": "position",
-    "depth": "position",
-    "gnss_velocity": "velocity",
-    "dvl": "velocity",
-    "speed_log": "velocity",
-    "magnetic_compass": "heading",
-    "gyrocompass": "heading",
-}
+#: What a fault does to a measurement: it takes it away; adds white noise; adds an error that lasts, or one that grows
+#: from the start of each interval; adds gross errors to single measurements; puts another value in its place; disturbs
+#: the IMU; or something else.
+Effect = Literal["missing", "noise", "lasting", "growing", "gross", "replaced", "imu", "other"]
+
+#: Sizes are given for errors of these: the unit of a component's error -> the end of the field's name.
+_QUANTITIES = {"m": "position", "m_s": "velocity", "deg": "heading"}
 
 
-def quantity_of(kind: str) -> str:
-    """What the errors of a kind of instrument are: "position" [m], "velocity" [m/s] or "heading" [rad]."""
-    return _QUANTITIES[kind]
+def _axes(kind: str) -> dict[str, list[int]]:
+    """The components of a kind of instrument whose errors are of each quantity; "" for those of none."""
+    axes: dict[str, list[int]] = {}
+    for i, component in enumerate(KINDS[kind].components):
+        axes.setdefault(_QUANTITIES.get(component.error_unit, ""), []).append(i)
+    return axes
+
+
+def size_by_component(sizes: Mapping[str, Any], stem: str, kind: str) -> Array | None:
+    """The size of a fault for each of the d components of a kind of instrument.
+
+    Parameters
+    ----------
+    sizes : mapping
+        Fields of the fault's specification, or of its label, SI units.
+    stem : str
+        As in ``FaultSpec.stems``.
+    kind : str
+        Of the instrument.
+
+    Returns
+    -------
+    (d,) array or None
+        None where a size is not given.
+    """
+    result = np.empty(len(KINDS[kind].components))
+    for name, axes in _axes(kind).items():
+        size = sizes.get(f"{stem}_{name}")
+        if size is None:
+            return None
+        result[axes] = size
+    return result
+
+
+def size_range(sizes: Mapping[str, Any], stem: str, kind: str) -> tuple[Array, Array]:
+    """Likewise the (d,) smallest and largest size, where a size is [minimum, maximum]."""
+    low, high = np.empty((2, len(KINDS[kind].components)))
+    for name, axes in _axes(kind).items():
+        low[axes], high[axes] = sizes[f"{stem}_{name}"]
+    return low, high
 
 
 class FaultSpec(Spec):
@@ -87,10 +137,14 @@ class FaultSpec(Spec):
         between them [s].
     name : str
         Of the fault's random streams; by default its kind and instruments.
+    stems : tuple of str
+        Stems of the fields that exist per quantity.
+    effect : Effect
+        What it does to a measurement; estimators that are told of the faults (oracles) go by it.
     """
 
-    #: Stems of the fields that exist per quantity.
     stems: ClassVar[tuple[str, ...]] = ()
+    effect: ClassVar[Effect] = "other"
 
     kind: str
     instruments: Names
@@ -108,7 +162,7 @@ class FaultSpec(Spec):
         for name, info in cls.model_fields.items():
             stem, _, last = name.rpartition("_")
             unit = unit_of(info)
-            base = stem if last in ("position", "velocity", "heading") and stem in cls.stems else name
+            base = stem if last in _QUANTITIES.values() and stem in cls.stems else name
             keys[base if unit is None else f"{base}_{unit}"] = (name, info)
         return keys
 
@@ -141,12 +195,18 @@ class FaultSpec(Spec):
         """Whether every instrument needs its size."""
         return True
 
-    def size(self, stem: str, kind: str) -> Any:
-        """The field of a stem for a kind of instrument."""
-        return getattr(self, f"{stem}_{quantity_of(kind)}")
+    def sizes(self, stem: str) -> dict[str, Any]:
+        """The fields of a stem, by name."""
+        return {f"{stem}_{q}": getattr(self, f"{stem}_{q}") for q in _QUANTITIES.values()}
 
-    def _key(self, stem: str, quantity_name: str) -> str:
-        field = f"{stem}_{quantity_name}"
+    def size(self, stem: str, kind: str) -> Array:
+        """The (d,) sizes of a stem for the components of a kind of instrument (after `check`)."""
+        size = size_by_component(self.sizes(stem), stem, kind)
+        assert size is not None
+        return size
+
+    def key_of(self, field: str) -> str:
+        """The TOML key of a field."""
         return next(key for key, (name, _) in self.toml_keys().items() if name == field)
 
     def touched(self, instruments: Mapping[str, str]) -> tuple[str, ...]:
@@ -181,26 +241,34 @@ class FaultSpec(Spec):
                 self._check_axes(stem, n, instruments[n])
 
     def _check_units(self, stem: str, touched: Mapping[str, str]) -> None:
-        needed = {quantity_of(kind): name for name, kind in touched.items()}
-        given = {q for q in ("position", "velocity", "heading") if getattr(self, f"{stem}_{q}") is not None}
+        needed = {q: name for name, kind in touched.items() for q in _axes(kind)}
+        if "" in needed and self.sizes_required:
+            name = needed[""]
+            unit = next(c.error_unit for c in KINDS[touched[name]].components if c.error_unit not in _QUANTITIES)
+            raise SpecError(f"fault {self.kind!r} on {name!r} ({touched[name]}): there is no {stem} in {unit}")
+        needed.pop("", None)
+        given = {q for q in _QUANTITIES.values() if getattr(self, f"{stem}_{q}") is not None}
         for q in sorted(given.difference(needed)):
-            right = " and ".join(repr(self._key(stem, r)) for r in sorted(needed))
+            right = " and ".join(repr(self.key_of(f"{stem}_{r}")) for r in sorted(needed))
             kinds = ", ".join(f"{name} ({kind})" for name, kind in touched.items())
-            raise SpecError(f"fault {self.kind!r}: {self._key(stem, q)!r} is of no use to {kinds}; that takes {right}")
+            raise SpecError(
+                f"fault {self.kind!r}: {self.key_of(f'{stem}_{q}')!r} is of no use to {kinds}; that takes {right}"
+            )
         for q in sorted(set(needed).difference(given)):
             if self.sizes_required:
                 name = needed[q]
                 where = f"fault {self.kind!r} on {name!r} ({touched[name]})"
-                raise SpecError(f"{where}: required key {self._key(stem, q)!r} is missing")
+                raise SpecError(f"{where}: required key {self.key_of(f'{stem}_{q}')!r} is missing")
 
     def _check_axes(self, stem: str, name: str, kind: str) -> None:
-        size, d = self.size(stem, kind), len(KINDS[kind].errors)
-        if not isinstance(size, tuple) or len(size) == d:
-            return
-        key = self._key(stem, quantity_of(kind))
-        raise SpecError(
-            f"fault {self.kind!r} on {name!r} ({kind}): {key!r} has {len(size)} numbers; it takes {d}, or one"
-        )
+        for q, axes in _axes(kind).items():
+            size, d = getattr(self, f"{stem}_{q}", None), len(axes)
+            if isinstance(size, tuple) and len(size) != d:
+                key = self.key_of(f"{stem}_{q}")
+                takes = f"{d}, or one" if d > 1 else "one"
+                raise SpecError(
+                    f"fault {self.kind!r} on {name!r} ({kind}): {key!r} has {len(size)} numbers; it takes {takes}"
+                )
 
     def label(self, duration: float, instruments: Mapping[str, str]) -> list[FaultLabel]:
         """The truth about the fault: one label per bit.
@@ -237,8 +305,41 @@ class FaultSpec(Spec):
         """What the fault's random streams are named after, besides its occurrence."""
         return self.name or f"{self.kind}:{','.join(self.instruments)}"
 
-    def _key_of_streams(self, index: int, occurrence: int | None) -> str:
+    def key_of_streams(self, index: int, occurrence: int | None) -> str:
+        """The key of the random streams of one run's layer, from what `build` is given."""
         return f"{self.stream_name}#{index if occurrence is None else occurrence}"
+
+
+FAULTS: Registry[FaultSpec] = Registry("fault", "simnav.faults", "simnav.sensors")
+
+F = TypeVar("F", bound=FaultSpec)
+
+
+def register_fault(cls: type[F]) -> type[F]:
+    """Class decorator: make a kind of fault known, by the default of the field ``kind`` of its specification.
+
+    Raises
+    ------
+    PluginError
+        If the class is no `FaultSpec`, or its name is taken.
+    """
+    if not (isinstance(cls, type) and issubclass(cls, FaultSpec)):
+        raise PluginError(f"@register_fault: {cls!r} is not a subclass of simnav.sensors.faults.FaultSpec")
+    name = cls.model_fields["kind"].default
+    if not isinstance(name, str):
+        raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_fault'] = 'my_fault'")
+    for stem in cls.stems:
+        for q in _QUANTITIES.values():
+            if f"{stem}_{q}" not in cls.model_fields:
+                raise PluginError(f"fault {name!r}: a stem needs a field for every quantity; there is no {stem}_{q}")
+    FAULTS.add(name, cls)
+    return cls
+
+
+def effect_of(kind: str) -> Effect:
+    """What a kind of fault does to a measurement; "other" where nobody knows it."""
+    cls = FAULTS.get(kind)
+    return "other" if cls is None else cls.effect
 
 
 class Activity:
@@ -252,14 +353,14 @@ class Activity:
     """
 
     def __init__(self, spec: FaultSpec, rng: np.random.Generator):
-        self._spec, self._rng = spec, rng
+        self.spec, self._rng = spec, rng
         self._random = spec.mean_active is not None
         intervals = spec.intervals or (() if self._random else ((spec.start, spec.end),))
         self.starts = np.array([a for a, _ in intervals])
         self.ends = np.array([b for _, b in intervals])
 
     def _extend(self, until: float) -> None:
-        spec = self._spec
+        spec = self.spec
         assert spec.mean_active is not None
         assert spec.mean_gap is not None
         end = float(self.ends[-1]) if len(self.ends) else spec.start
@@ -308,21 +409,32 @@ class FaultLayer:
     seed : int
     key : str
         Of its random streams.
+
+    Attributes
+    ----------
+    spec : FaultSpec
+    activity : Activity
+        When it acts.
     """
 
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
-        self._spec, self._index, self._seed, self._key = spec, index, seed, key
-        self.activity = Activity(spec, self._rng("intervals"))
+        self.spec, self._index, self._seed, self._key = spec, index, seed, key
+        self._generators: dict[tuple[str, ...], np.random.Generator] = {}
+        self.activity = Activity(spec, self.rng("intervals"))
 
-    def _rng(self, *names: str) -> np.random.Generator:
-        return random_stream(self._seed, "fault", self._key, *names)
+    def rng(self, *names: str) -> np.random.Generator:
+        """A random stream of this fault's own, the same generator for the same names: "gnss", "noise"."""
+        if names not in self._generators:
+            self._generators[names] = random_stream(self._seed, "fault", self._key, *names)
+        return self._generators[names]
 
     def touches(self, stream: AidStream) -> bool:
         """Whether the fault is one of this instrument's."""
-        return stream.name in self._spec.instruments or stream.kind in self._spec.instruments
+        return stream.name in self.spec.instruments or stream.kind in self.spec.instruments
 
-    def _bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
-        number = interval if self._spec.intervals else np.zeros_like(interval)
+    def bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
+        """The label of measurements in intervals of the given numbers."""
+        number = interval if self.spec.intervals else np.zeros_like(interval)
         return np.left_shift(np.uint32(1), (self._index + number).astype(np.uint32))
 
     def apply(self, stream: AidStream) -> AidStream:

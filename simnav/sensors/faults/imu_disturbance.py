@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from simnav.recording import ImuLabels
-from simnav.sensors.faults.fault import FaultLayer, FaultSpec, Names
+from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, Names, register_fault
 from simnav.sensors.instrument import ZERO, SigmaTriple, Triple
 from simnav.spec import SpecError, quantity
 from simnav.types import ImuSamples
@@ -17,12 +17,14 @@ from simnav.types import ImuSamples
 __all__ = ["ImuDisturbance"]
 
 
+@register_fault
 class ImuDisturbance(FaultSpec):
     """A constant and white noise on the IMU's output, by body axis; one number is for all three.
 
     ``specific_force_noise`` and ``angular_rate_noise`` are the sigma of a sample.
     """
 
+    effect: ClassVar[Effect] = "imu"
     kind: Literal["imu_disturbance"] = "imu_disturbance"
     instruments: Names = ("imu",)
     specific_force: Triple = quantity("m_s2", ZERO)
@@ -52,7 +54,7 @@ class ImuDisturbance(FaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _ImuDisturbance(self, index, seed, self._key_of_streams(index, occurrence))
+        return _ImuDisturbance(self, index, seed, self.key_of_streams(index, occurrence))
 
 
 class _ImuDisturbance(FaultLayer):
@@ -60,7 +62,7 @@ class _ImuDisturbance(FaultLayer):
         super().__init__(spec, index, seed, key)
         self._constant = np.array(spec.angular_rate + spec.specific_force)
         self._sigma = np.array(spec.angular_rate_noise + spec.specific_force_noise)
-        self._noise = self._rng("noise")
+        self._noise = self.rng("noise")
 
     def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
         n = len(samples)
@@ -77,7 +79,7 @@ class _ImuDisturbance(FaultLayer):
         angular_rate[rows] += error[:, :3]
         specific_force[rows] += error[:, 3:]
         faults, fault_error = labels.faults.copy(), labels.fault_error.copy()
-        faults[rows] |= self._bits(interval)
+        faults[rows] |= self.bits(interval)
         fault_error[rows] += error
         return (
             ImuSamples(samples.time, samples.interval, angular_rate, specific_force),

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import AidStream
-from simnav.sensors.faults.fault import FaultLayer, FaultSpec
-from simnav.sensors.values import error_between
-from simnav.types import Array
+from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, register_fault
+from simnav.types import KINDS, Array
 
-__all__ = ["FalseZero", "Frozen", "Outage"]
+__all__ = ["FalseZero", "Frozen", "Outage", "ReplacingLayer"]
 
 
+@register_fault
 class Outage(FaultSpec):
     """Nothing is delivered; the times of what is missing go to ``AidStream.dropped``."""
 
+    effect: ClassVar[Effect] = "missing"
     kind: Literal["outage"] = "outage"
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _Outage(self, index, seed, self._key_of_streams(index, occurrence))
+        return _Outage(self, index, seed, self.key_of_streams(index, occurrence))
 
 
 class _Outage(FaultLayer):
@@ -38,30 +39,33 @@ class _Outage(FaultLayer):
         return AidStream(stream.name, stream.kind, **kept, dropped=dropped)
 
 
-class _Replacing(FaultLayer):
+class ReplacingLayer(FaultLayer):
     """Puts other values in the place of the measurements within the intervals."""
 
-    def _replace(
+    def replace_values(
         self, stream: AidStream, rows: NDArray[np.intp], values: Array, interval: NDArray[np.intp]
     ) -> AidStream:
+        """Replace the rows of a stream, and label them with the numbers of their intervals."""
         value, faults, fault_error = stream.value.copy(), stream.faults.copy(), stream.fault_error.copy()
-        fault_error[rows] += error_between(stream.kind, values, value[rows])
+        fault_error[rows] += KINDS[stream.kind].difference(values, value[rows])
         value[rows] = values
-        faults[rows] |= self._bits(interval)
+        faults[rows] |= self.bits(interval)
         return replace(stream, value=value, faults=faults, fault_error=fault_error)
 
 
+@register_fault
 class Frozen(FaultSpec):
     """The instrument repeats the last value that it delivered before the interval (or else its first one within)."""
 
+    effect: ClassVar[Effect] = "replaced"
     kind: Literal["frozen"] = "frozen"
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _Frozen(self, index, seed, self._key_of_streams(index, occurrence))
+        return _Frozen(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _Frozen(_Replacing):
+class _Frozen(ReplacingLayer):
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
         super().__init__(spec, index, seed, key)
         self._last: dict[str, Array] = {}
@@ -84,23 +88,25 @@ class _Frozen(_Replacing):
                 before = stream.value[first - 1] if first > 0 else last
                 self._held[name] = int(number), (stream.value[first] if before is None else before).copy()
             values[here] = self._held[name][1]
-        return self._replace(stream, rows, values, interval)
+        return self.replace_values(stream, rows, values, interval)
 
 
+@register_fault
 class FalseZero(FaultSpec):
     """The instrument says zero on all axes: a DVL that lost lock, or a receiver in the Gulf of Guinea."""
 
+    effect: ClassVar[Effect] = "replaced"
     kind: Literal["false_zero"] = "false_zero"
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        return _FalseZero(self, index, seed, self._key_of_streams(index, occurrence))
+        return _FalseZero(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _FalseZero(_Replacing):
+class _FalseZero(ReplacingLayer):
     def apply(self, stream: AidStream) -> AidStream:
         found = self.activity.locate(stream.time) if self.touches(stream) else None
         if found is None:
             return stream
         rows, interval = found
-        return self._replace(stream, rows, np.zeros((len(rows), stream.value.shape[1])), interval)
+        return self.replace_values(stream, rows, np.zeros((len(rows), stream.value.shape[1])), interval)

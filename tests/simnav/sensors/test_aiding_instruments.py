@@ -23,7 +23,6 @@ from simnav.sensors import (
     TerrainFix,
 )
 from simnav.sensors.instrument import turn_to_body, turn_to_ned
-from simnav.sensors.values import add_error, error_between
 from simnav.spec import SpecError
 from simnav.types import KINDS, Array, TapStates
 
@@ -222,7 +221,7 @@ def test_white_noise_is_that_of_the_datasheet(name):
     spec = FULL[name].model_copy(update={"bias_instability": 0.0})
     tap = states(np.zeros(20_000))
     stream = spec.build(name, 4).sense(tap)
-    error = error_between(spec.kind, stream.value, np.broadcast_to(stream.value[0], stream.value.shape))
+    error = spec.definition.difference(stream.value, np.broadcast_to(stream.value[0], stream.value.shape))
     assert np.std(error, axis=0) == pytest.approx(stream.sigma[0], rel=0.03)
     assert np.array_equal(stream.sigma, np.broadcast_to(stream.sigma[0], stream.sigma.shape))
     if name != "dvl":  # whose noise also grows with speed
@@ -244,7 +243,7 @@ def test_slow_bias_is_stationary_from_the_first_measurement_and_correlated(name)
     lag = spec.correlation_time
     tap = states(np.array([0.5, 0.5 + lag]))
     ideal = spec.model_copy(update={"bias_instability": 0.0}).build(name, 0).sense(tap).value
-    errors = np.array([error_between(spec.kind, spec.build(name, s).sense(tap).value, ideal) for s in range(500)])
+    errors = np.array([spec.definition.difference(spec.build(name, s).sense(tap).value, ideal) for s in range(500)])
     sigma = spec.datasheet(name).bias_instability
     assert np.std(errors, axis=0) == pytest.approx(np.stack([sigma, sigma]), rel=0.12)
     first, second = errors[:, 0].ravel(), errors[:, 1].ravel()
@@ -291,22 +290,6 @@ def test_streams_have_the_shapes_of_their_kind(name):
     assert not stream.faults.any()
     assert len(spec.build(name, 1).sense(cut(TAP, 0, 0))) == 0
     assert spec.datasheet(name).rate == 1.0
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_errors_are_added_and_found_again(kind):
-    d = len(KINDS[kind].errors)
-    rng = np.random.default_rng(1)
-    value = rng.uniform(-1, 1, (50, d))
-    error = rng.normal(size=(50, d))
-    assert error_between(kind, add_error(kind, value, error), value) == pytest.approx(error, abs=1e-8)
-
-
-def test_a_metre_of_error_is_a_metre_on_the_ground():
-    value = np.array([[np.radians(60.0), 0.0, 0.0]])
-    moved = add_error("gnss_position", value, np.array([[0.0, 1000.0, 0.0]]))
-    parallel = earth.principal_radii(value[0, 0])[1] * np.cos(value[0, 0])
-    assert moved[0, 1] * parallel == pytest.approx(1000.0)
 
 
 def test_mistakes_are_named():

@@ -1,0 +1,137 @@
+"""Readings of instruments whose kind has a measurement equation of its own, in plain NumPy.
+
+A kind may name one of the compiled equations (`simnav.kinds.EQUATIONS`), or be declared with a function that predicts a
+reading and gives its Jacobian (`simnav.kinds.Observation`; see ``docs/instruments.md``). The latter are used here, for
+every model over the inertial state, filter and graph alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.earth import earth_rate, principal_radii
+from simnav.kinds import NavigationPoint
+from simnav.rotation import dcm_from_rotation_vector
+from simnav.types import KINDS, Array, Datasheet
+
+__all__ = ["OwnObservation"]
+
+#: Components of the error that an observation's Jacobian is about: position, velocity, attitude.
+_COMPONENTS = 9
+
+
+class OwnObservation:
+    """The measurement equation of one instrument.
+
+    Parameters
+    ----------
+    sheet : Datasheet
+        Of a kind with an observation.
+
+    Raises
+    ------
+    ValueError
+        While running: if the kind's function returns anything but arrays of the shapes that it should.
+    """
+
+    def __init__(self, sheet: Datasheet):
+        self.sheet, self.kind = sheet, KINDS[sheet.kind]
+        observation = self.kind.observation
+        assert observation is not None
+        self._observation = observation
+
+    def point(
+        self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array
+    ) -> NavigationPoint:
+        """The state, for the function; ``rate`` is the gyroscopes' output and ``bias`` theirs."""
+        turning = rate - bias[:3] - dcm.T @ earth_rate(position[0])
+        return NavigationPoint(time, position, velocity, dcm, turning)
+
+    def predict(self, point: NavigationPoint) -> tuple[Array, Array] | None:
+        """The (d,) reading at a state and its (d, 9) Jacobian; None where the state has none."""
+        result = self._observation(point, self.sheet)
+        if result is None:
+            return None
+        d = len(self.kind.components)
+        try:
+            reading, jacobian = (np.asarray(part, dtype=np.float64) for part in result)
+            fits = reading.shape == (d,) and jacobian.shape == (d, _COMPONENTS)
+            given = f"shapes {reading.shape} and {jacobian.shape}"
+        except (TypeError, ValueError):
+            fits, given = False, repr(result)
+        if not fits:
+            raise ValueError(
+                f"the observation of kind {self.sheet.kind!r} should return a reading of shape {(d,)} and its Jacobian "
+                f"of shape {(d, _COMPONENTS)}, or None, not {given}"
+            )
+        return reading, jacobian
+
+    def linearise(
+        self, point: NavigationPoint, value: Array, calibration: Array, size: int, bias_at: int
+    ) -> tuple[Array, Array] | None:
+        """Innovation and Jacobian of a measurement.
+
+        Parameters
+        ----------
+        point : NavigationPoint
+        value : (d,) array
+            As measured.
+        calibration : (size - 15,) array
+        size : int
+            n, of the error state.
+        bias_at : int
+            Place in the error state of the instrument's first bias; -1 for none.
+
+        Returns
+        -------
+        innovation : (d,) array
+        jacobian : (d, n) array
+            Of the prediction.
+        """
+        predicted = self.predict(point)
+        if predicted is None:
+            return None
+        reading, own = predicted
+        d = len(reading)
+        jacobian = np.zeros((d, size))
+        jacobian[:, :_COMPONENTS] = own
+        if bias_at >= 0:
+            jacobian[range(d), range(bias_at, bias_at + d)] = 1.0
+            first = bias_at + len(calibration) - size
+            reading = self.kind.add_error(reading, calibration[first : first + d])
+        return self.kind.difference(value, reading), jacobian
+
+    def differences(self, point: NavigationPoint, errors: Array, bias_at: int) -> Array | None:
+        """What the instrument should read at k states, minus what it should read at one.
+
+        Parameters
+        ----------
+        point : NavigationPoint
+        errors : (k, n) array
+            Of the states with respect to the point, by the rule of `simnav.estimators.models.base.ErrorModel.correct`.
+        bias_at : int
+
+        Returns
+        -------
+        (k, d) array or None
+            None where the point has no reading; a state near it that has none takes the point's Jacobian.
+        """
+        predicted = self.predict(point)
+        if predicted is None:
+            return None
+        reading, jacobian = predicted
+        differences = errors[:, :_COMPONENTS] @ jacobian.T
+        meridian, prime = principal_radii(point.position[0])
+        height = point.position[2]
+        metres = np.array([meridian + height, (prime + height) * np.cos(point.position[0]), -1.0])
+        positions = point.position + errors[:, :3] / metres
+        velocities = point.velocity + errors[:, 3:6]
+        attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
+        rates = point.angular_rate - errors[:, 9:12]
+        for k, state in enumerate(zip(positions, velocities, attitudes, rates, strict=True)):
+            there = self.predict(NavigationPoint(point.time, *state))
+            if there is not None:
+                differences[k] = self.kind.difference(there[0], reading)
+        if bias_at >= 0:
+            differences += errors[:, bias_at : bias_at + len(reading)]
+        return differences

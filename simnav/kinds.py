@@ -1,0 +1,319 @@
+"""Kinds of aiding instruments: what each of them measures, and what follows from that for everybody else.
+
+A kind is declared once, beside the instrument of its name (``simnav/sensors/gnss.py`` and others, or a file of a third
+party; see ``docs/instruments.md``). Whatever depends on the kind of an instrument asks `KINDS`: how an error is added
+to a value, what is plausible, which role the instrument has, and how a navigation filter predicts its reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import inf, nextafter, pi
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+
+import numpy as np
+
+from simnav.compiled import Array
+from simnav.earth import displace, relative_position
+from simnav.plugins import PluginError, Registry
+from simnav.rotation import wrap_angle
+
+if TYPE_CHECKING:
+    from simnav.types import Datasheet
+
+__all__ = [
+    "BODY_VELOCITY",
+    "DEPTH",
+    "EQUATIONS",
+    "HEADING",
+    "HORIZONTAL_POSITION",
+    "INSTRUMENTS",
+    "KINDS",
+    "POSITION",
+    "VELOCITY",
+    "WATER_SPEED",
+    "Component",
+    "Kind",
+    "NavigationPoint",
+    "Observation",
+    "Role",
+    "geodetic_components",
+    "speed_components",
+]
+
+#: What an instrument is to a navigator. "other": none of these.
+Role = Literal["fix", "velocity", "heading", "range", "depth", "other"]
+
+#: Measurement equations that come compiled; `Kind.equation` names one of them, or is a function.
+POSITION, HORIZONTAL_POSITION, VELOCITY = "position", "horizontal_position", "velocity"
+BODY_VELOCITY, WATER_SPEED, HEADING, DEPTH = "body_velocity", "water_speed", "heading", "depth"
+#: What each of them predicts, for an instrument with a lever arm ``l`` in body axes.
+EQUATIONS: Mapping[str, str] = {
+    POSITION: "latitude, longitude and height of the instrument",
+    HORIZONTAL_POSITION: "latitude and longitude of the instrument",
+    VELOCITY: "velocity of the instrument over the ground, north-east-down",
+    BODY_VELOCITY: "velocity of the instrument over the ground, body axes (forward, starboard, down)",
+    WATER_SPEED: "forward component of the instrument's velocity through the water",
+    HEADING: "true heading",
+    DEPTH: "depth of the instrument below the ellipsoid, positive down",
+}
+_COMPONENTS_OF = {
+    POSITION: 3, HORIZONTAL_POSITION: 2, VELOCITY: 3, BODY_VELOCITY: 3, WATER_SPEED: 1, HEADING: 1, DEPTH: 1,
+}  # fmt: skip
+
+#: Bounds of what a measurement is believed to mean: speed [m/s], height and depth [m].
+LARGEST_SPEED, LARGEST_HEIGHT = 200.0, 20000.0
+#: Filters and graphs keep a measurement in arrays of this many components.
+MOST_COMPONENTS = 3
+
+
+class NavigationPoint(NamedTuple):
+    """The state at which a reading is predicted.
+
+    Attributes
+    ----------
+    time : float
+        Of the measurement [s].
+    position : (3,) array
+        Latitude, longitude [rad], height [m].
+    velocity : (3,) array
+        North-east-down [m/s].
+    dcm : (3, 3) array
+        Turns body vectors into north-east-down.
+    angular_rate : (3,) array
+        Of the body relative to the Earth, body axes [rad/s].
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    dcm: Array
+    angular_rate: Array
+
+
+#: An observation model: the (d,) reading that a datasheet's instrument should give at a state, in SI units, and its
+#: (d, 9) Jacobian with respect to an error of the state: position north-east-down [m], velocity [m/s] and attitude, the
+#: rotation vector about north-east-down [rad] (`simnav.types.COMPONENTS`). None where the state has no reading.
+Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array] | None"]
+
+
+@dataclass(frozen=True)
+class Component:
+    """One component of a measurement.
+
+    Attributes
+    ----------
+    name : str
+        Of the value, as in ``latitude``.
+    unit : str
+        In which people read the value, a key of `simnav.spec.UNITS`; arrays hold SI units and radians.
+    error, error_unit : str
+        Name and unit of the error, where they are not those of the value: a latitude errs to the north, in metres.
+    limit : float
+        Values of this size (SI) or larger are not plausible.
+    cyclic : bool
+        True for an angle in which a full turn changes nothing: differences are brought into [-pi, pi), and values up to
+        ``limit`` are plausible.
+    """
+
+    name: str
+    unit: str
+    error: str = ""
+    error_unit: str = ""
+    limit: float = inf
+    cyclic: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "error", self.error or self.name)
+        object.__setattr__(self, "error_unit", self.error_unit or self.unit)
+        if self.cyclic and self.limit == inf:
+            object.__setattr__(self, "limit", 4.0 * pi)
+
+
+def geodetic_components(*, height: bool) -> tuple[Component, ...]:
+    """Latitude, longitude and, with ``height``, the height of a position; its errors are north-east-down in metres."""
+    horizontal = (
+        Component("latitude", "deg", "north", "m", limit=0.5 * pi),
+        Component("longitude", "deg", "east", "m", limit=2.0 * pi, cyclic=True),
+    )
+    return (*horizontal, Component("height", "m", "down", "m", limit=LARGEST_HEIGHT)) if height else horizontal
+
+
+def speed_components(*names: str) -> tuple[Component, ...]:
+    """Components of a velocity [m/s]."""
+    return tuple(Component(name, "m_s", limit=LARGEST_SPEED) for name in names)
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """What one kind of aiding instrument measures.
+
+    Attributes
+    ----------
+    quantity : str
+        What the value is, in words.
+    role : Role
+        What it is to a navigator: "fix" (a position), "velocity", "heading", "range" (to something known), "depth" or
+        "other".
+    components : tuple of Component
+        Of a measurement's value, one to three.
+    equation : str, callable or None
+        How a navigation filter predicts a reading: a key of `EQUATIONS`, whose equations come compiled, or an
+        `Observation`. None: filters leave the kind out.
+    geodetic : bool
+        Whether the first components are latitude and longitude (and the third, if it is called so, the height):
+        values in radians, errors in metres.
+    datasheet : tuple of str
+        Fields of the instrument's specification that an estimator is told beyond the common ones (`Datasheet.details`).
+    log_columns : tuple of str
+        Columns that are read from a log of NMEA sentences where its scenario names none; by default those of the names
+        of the components.
+
+    Raises
+    ------
+    PluginError
+        If the role or the equation is unknown, or the components do not fit the equation.
+    """
+
+    quantity: str
+    role: Role
+    components: tuple[Component, ...]
+    equation: str | Observation | None = None
+    geodetic: bool = False
+    datasheet: tuple[str, ...] = ()
+    log_columns: tuple[str, ...] = ()
+    _limits: tuple[float, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.role not in get_args(Role):
+            raise PluginError(f"role = {self.role!r} of a kind should be one of: {', '.join(get_args(Role))}")
+        if not 1 <= len(self.components) <= MOST_COMPONENTS:
+            raise PluginError(f"a kind has one to {MOST_COMPONENTS} components, not {len(self.components)}")
+        if isinstance(self.equation, str):
+            if self.equation not in EQUATIONS:
+                raise PluginError(
+                    f"equation = {self.equation!r} of a kind should be a function, or one of: {', '.join(EQUATIONS)}"
+                )
+            wanted = _COMPONENTS_OF[self.equation]
+            if len(self.components) != wanted:
+                raise PluginError(
+                    f"the equation {self.equation!r} gives {EQUATIONS[self.equation]}: {wanted} components, "
+                    f"not {len(self.components)}"
+                )
+        if self.geodetic and self.values[:2] != ("latitude", "longitude"):
+            raise PluginError("the first components of a geodetic kind are latitude and longitude")
+        # A limit of an angle is still plausible, one of anything else is not.
+        limits = tuple(nextafter(c.limit, inf) if c.cyclic else c.limit for c in self.components)
+        object.__setattr__(self, "_limits", limits)
+
+    @cached_property
+    def values(self) -> tuple[str, ...]:
+        """Name of each component of a measurement's value."""
+        return tuple(c.name for c in self.components)
+
+    @cached_property
+    def errors(self) -> tuple[str, ...]:
+        """Name of each component of its error (and of ``Datasheet.sigma``); the value's, but for positions."""
+        return tuple(c.error for c in self.components)
+
+    @cached_property
+    def observation(self) -> Observation | None:
+        """The function of the kind's own that predicts a reading; None where there is none, or a compiled equation."""
+        return self.equation if callable(self.equation) else None
+
+    @cached_property
+    def _positions(self) -> int:
+        """How many of the first components are a geodetic position."""
+        return 0 if not self.geodetic else 3 if self.values[2:] == ("height",) else 2
+
+    def plausible(self, value: Array) -> bool:
+        """Whether a (d,) value can be a measurement at all: finite, and within the limits of the components."""
+        x: list[float] = value.tolist()
+        for component, limit in zip(x, self._limits, strict=True):  # noqa: SIM110 (a generator costs as much again)
+            if not -limit < component < limit:
+                return False
+        return True
+
+    def add_error(self, value: Array, error: Array) -> Array:
+        """Values with an error added.
+
+        Parameters
+        ----------
+        value, error : (..., d) array
+            Components as in `values` and `errors`, SI units and radians.
+
+        Returns
+        -------
+        (..., d) array
+            Angles that are cyclic in [-pi, pi).
+        """
+        n = self._positions
+        if n == len(self.components) == 3:
+            return displace(value, error)
+        total: Array = value + error
+        if n:
+            total[..., :n] = displace(_three(value, n), _three(error, n))[..., :n]
+        return self._wrapped(total)
+
+    def difference(self, value: Array, reference: Array) -> Array:
+        """The error that turns ``reference`` into ``value``: the inverse of `add_error`.
+
+        Parameters
+        ----------
+        value, reference : (..., d) array
+
+        Returns
+        -------
+        (..., d) array
+            Components as in `errors`.
+        """
+        n = self._positions
+        if n == len(self.components) == 3:
+            return relative_position(value, reference)
+        rest: Array = value - reference
+        if n:
+            rest[..., :n] = relative_position(_three(value, n), _three(reference, n))[..., :n]
+        return self._wrapped(rest)
+
+    def _wrapped(self, array: Array) -> Array:
+        for i, component in enumerate(self.components):
+            if component.cyclic and i >= self._positions:
+                array[..., i] = wrap_angle(array[..., i])
+        return array
+
+
+def _three(array: Array, given: int) -> Array:
+    """The first ``given`` components of positions, or of their errors, with a zero where the height is missing.
+
+    The radii are then those at the sea surface: at 100 m depth the error of the error is 2e-5 of it.
+    """
+    if given == 3:
+        return array[..., :3]
+    return np.concatenate([array[..., :2], np.zeros((*array.shape[:-1], 1))], axis=-1)
+
+
+#: The specifications of all aiding instruments, by kind; `simnav.sensors.register_instrument` adds one.
+INSTRUMENTS: Registry[Any] = Registry("instrument", "simnav.instruments", "simnav.sensors")
+
+
+class _Kinds(Mapping[str, Kind]):
+    """The kinds of the registered instruments, by name."""
+
+    def __getitem__(self, name: str) -> Kind:
+        cls = INSTRUMENTS.get(name)
+        if cls is None:
+            raise KeyError(name)
+        kind: Kind = cls.definition
+        return kind
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(INSTRUMENTS.items())
+
+    def __len__(self) -> int:
+        return len(INSTRUMENTS.items())
+
+
+#: Every kind of aiding instrument that is known. A scenario may carry several instruments of one kind.
+KINDS: Mapping[str, Kind] = _Kinds()

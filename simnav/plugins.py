@@ -1,0 +1,230 @@
+"""How classes of others become known: by a decorator, from the entry points of packages, from single files.
+
+A `Registry` holds the classes of one sort, by name. Entry points are loaded when they are first needed; one that fails
+is named in a warning and harms nobody else. simnav's own classes are registered by the same decorators, and first, so
+that a plug-in cannot take their names.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.util
+import inspect
+import re
+import sys
+import traceback
+import types
+import warnings
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Generic, TypeVar
+
+__all__ = ["PluginError", "Registry", "import_file", "is_file_module", "load_plugin", "place_of", "source_digest"]
+
+C = TypeVar("C")
+
+#: Of the names of modules that were imported from single files.
+_PREFIX = "simnav_file_"
+
+
+class PluginError(ValueError):
+    """A class or file that cannot be registered, found or loaded; the message is one sentence."""
+
+
+def import_file(
+    path: Path, *, error: type[PluginError] = PluginError, before: Callable[[Path], None] | None = None
+) -> types.ModuleType:
+    """Import a Python file by its path, once for each content.
+
+    Modules beside it can be imported, but hide nothing.
+
+    Parameters
+    ----------
+    path : Path
+        Absolute.
+    error : type
+        What is raised.
+    before : callable, optional
+        Called with the path before the code of the file runs.
+
+    Raises
+    ------
+    PluginError
+        If the file cannot be imported: one sentence with its name and the line.
+    """
+    source = path.read_bytes()
+    digest = hashlib.blake2b(f"{path}\0".encode() + source, digest_size=6).hexdigest()
+    name = f"{_PREFIX}{re.sub(r'[^0-9a-zA-Z]', '_', path.stem)}_{digest}"
+    if name in sys.modules:
+        return sys.modules[name]
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise error(f"{path.name} cannot be imported as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    _sources[name] = _digest(source)
+    if before is not None:
+        before(path)
+    try:
+        spec.loader.exec_module(module)
+    except PluginError:
+        del sys.modules[name]
+        raise
+    except (Exception, SystemExit) as cause:
+        del sys.modules[name]
+        if isinstance(cause, SyntaxError) and cause.lineno is not None:
+            line, text = cause.lineno, cause.msg
+        else:
+            frames = [f for f in traceback.extract_tb(cause.__traceback__) if f.filename == str(path)]
+            line, text = (frames[-1].lineno or 0) if frames else 0, str(cause)
+        place = f"{path.name}, line {line}" if line else path.name
+        raise error(f"{place}: it cannot be imported: {type(cause).__name__}: {text}") from cause
+    return module
+
+
+def is_file_module(name: str) -> bool:
+    """Whether a module of this name was imported from a single file by `import_file`."""
+    return name.startswith(_PREFIX)
+
+
+def load_plugin(path: str | Path) -> None:
+    """Load a Python file that registers instruments, faults or estimators; a file that is loaded already is left alone.
+
+    A scenario names such files itself (``plugins = ["beacon.py"]``); packages have entry points instead.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    PluginError
+        If there is no such file, or it cannot be imported: one sentence with its name and the line.
+    """
+    file = Path(path).expanduser().resolve()
+    if not file.is_file():
+        raise PluginError(f"there is no plug-in file {str(path)!r}")
+    import_file(file)
+
+
+def source_digest(module: str) -> str:
+    """Hexadecimal digest of the source of a module, as it was when it was imported from a single file."""
+    if module in _sources:
+        return _sources[module]
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return _digest(Path(file).read_bytes()) if file is not None and Path(file).is_file() else ""
+
+
+_sources: dict[str, str] = {}  # by the name of the module
+
+
+def _digest(source: bytes) -> str:
+    return hashlib.blake2b(source, digest_size=16).hexdigest()
+
+
+def place_of(cls: type) -> tuple[str, int]:
+    """File and line of the definition of a class; ``"?"`` and 0 where they are not known."""
+    try:
+        file = inspect.getsourcefile(cls) or "?"
+    except TypeError:  # typed in at a prompt
+        return "?", 0
+    try:
+        return file, inspect.getsourcelines(cls)[1]
+    except (OSError, TypeError):
+        return file, 0
+
+
+class Registry(Generic[C]):
+    """The classes of one sort, by name.
+
+    Parameters
+    ----------
+    what : str
+        The sort, for messages: "instrument".
+    group : str
+        Entry-point group of other packages.
+    home : str
+        Module whose import registers the classes of simnav itself.
+    """
+
+    def __init__(self, what: str, group: str, home: str):
+        self.what, self.group, self.home = what, group, home
+        self._classes: dict[str, type[C]] = {}
+        self._discovered = False
+
+    def add(self, name: str, cls: type[C]) -> None:
+        """Register a class; a class that is defined again (in a notebook, or in an edited file) replaces itself.
+
+        Raises
+        ------
+        PluginError
+            If the name is not in snake_case, or taken by another class: the message says by which, and where it is.
+        """
+        if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
+            raise PluginError(
+                f"kind {name!r} of {self.what} {cls.__qualname__}: a kind is in snake_case, like 'my_kind'"
+            )
+        other = self._classes.get(name)
+        if other is not None and not _same(other, cls):
+            file, line = place_of(other)
+            raise PluginError(
+                f"kind {name!r} of {self.what} {cls.__qualname__}: the name is taken by {other.__qualname__} "
+                f"({file}, line {line})"
+            )
+        self._classes[name] = cls
+
+    @contextlib.contextmanager
+    def adding(self, name: str, cls: type[C]) -> Iterator[None]:
+        """`add` a class, and take it back if the block raises."""
+        before = dict(self._classes)
+        self.add(name, cls)
+        try:
+            yield
+        except BaseException:
+            self._classes = before
+            raise
+
+    def get(self, name: str) -> type[C] | None:
+        """The class of a name, or None."""
+        if name not in self._classes:
+            self.discover()
+        return self._classes.get(name)
+
+    def items(self) -> dict[str, type[C]]:
+        """All classes by name: those of simnav, then others, each in the order of registration."""
+        self.discover()
+        return dict(self._classes)
+
+    def discover(self) -> None:
+        """Load our own module and all entry points, once."""
+        if self._discovered:
+            return
+        self._discovered = True
+        import_module(self.home)
+        for point in sorted(entry_points(group=self.group), key=lambda p: p.name):
+            before = dict(self._classes)
+            try:
+                point.load()
+            except (Exception, SystemExit) as error:
+                self._classes = before
+                owner = f" of package {point.dist.name!r}" if point.dist is not None else ""
+                warnings.warn(
+                    f"{self.what} plug-in {point.name!r} ({point.value}){owner} is left out: "
+                    f"{type(error).__name__}: {error}",
+                    stacklevel=4,
+                )
+
+
+def _same(old: type, new: type) -> bool:
+    """Whether a class is another version of an old one: of the same name, in the same module or file, or in a copy."""
+    if old.__qualname__ != new.__qualname__:
+        return False
+    if old.__module__ == new.__module__:
+        return True
+    before, after = (Path(place_of(cls)[0]) for cls in (old, new))
+    return after.is_file() and (before == after or (before.is_file() and before.read_bytes() == after.read_bytes()))

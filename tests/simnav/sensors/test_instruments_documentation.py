@@ -1,0 +1,37 @@
+"""docs/instruments.md stays true: its files are those that the tests load, its tables hold what the code knows."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from simnav.kinds import EQUATIONS, Kind, Role
+from simnav.sensors.faults import Effect
+
+TEXT = (Path(__file__).parents[3] / "docs" / "instruments.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["beacon.py", "echo.py", "lagoon.toml"])
+def test_the_files_on_the_page_are_those_that_are_tested(plugins, name):
+    block = re.search(rf"^`{name}`:\n\n```\w+\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
+    assert block is not None
+    assert block[1] == (plugins / name).read_text()
+
+
+def test_the_entry_points_are_toml():
+    block = re.search(r'^```\n(\[project\.entry-points\."simnav.*?)^```$', TEXT, re.MULTILINE | re.DOTALL)
+    assert set(tomllib.loads(block[1])["project"]["entry-points"]) == {"simnav.instruments", "simnav.faults"}
+
+
+def test_the_tables_hold_what_there_is():
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*?) \|$", TEXT, re.MULTILINE))
+    assert {name: rows[name] for name in EQUATIONS} == dict(EQUATIONS)
+    fields = {name for name in Kind.__dataclass_fields__ if not name.startswith("_")}
+    assert set(rows) == fields | set(EQUATIONS)
+    assert re.findall(r'`"(\w+)"`', rows["role"]) == list(get_args(Role))
+    told = next(line for line in TEXT.splitlines() if line.startswith("`effect` tells oracles"))
+    assert set(re.findall(r'`"(\w+)"`', told)) == set(get_args(Effect)) - {"imu"}
