@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import sqrt
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,9 +76,23 @@ def _attach(noise, value, full, whitener, values):  # type: ignore[no-untyped-de
     whitening(full, whitener)
 
 
-@kernel("void(i8, i8[::1], f8[:, :, ::1], f8[:, :, ::1])")
-def through_motion(first, row, transition, jacobian):  # type: ignore[no-untyped-def]
-    """Take Jacobians at folds back to their nodes, in place."""
+@kernel("void(i8, i8[::1], i8, f8[:, :, ::1], f8[:, :, ::1])")
+def through_motion(first, row, coupled, transition, jacobian):  # type: ignore[no-untyped-def]
+    """Take Jacobians at folds back to their nodes, in place.
+
+    Parameters
+    ----------
+    first : int
+        Aid to begin with.
+    row : (M,) int array
+        Of each aid among the folds; -1 for those that are not folded.
+    coupled : int
+        States from this one on only decay, each on its own.
+    transition : (K, n, n) array
+        Of the folds.
+    jacobian : (M, 3, n) array
+        Overwritten.
+    """
     n = transition.shape[1]
     at_node = np.empty(n)
     for i in range(first, row.size):
@@ -89,8 +103,11 @@ def through_motion(first, row, transition, jacobian):  # type: ignore[no-untyped
             for j in range(n):
                 x = jacobian[i, r, j]
                 if x != 0.0:
-                    for c in range(n):
-                        at_node[c] += x * transition[row[i], j, c]
+                    if j < coupled:
+                        for c in range(coupled):
+                            at_node[c] += x * transition[row[i], j, c]
+                    else:
+                        at_node[j] += x * transition[row[i], j, j]
             for c in range(n):
                 jacobian[i, r, c] = at_node[c]
 
@@ -216,6 +233,8 @@ class Chain(ABC):
 
     #: Arrays of the model that a node keeps beside those of its ``state``.
     node_arrays: tuple[str, ...] = ()
+    #: Components of the model's error from this one on have no part in the motion of others, and only decay.
+    coupled: ClassVar[int] = 10**9
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """One node, at the start; its (n, n) covariance. Raises UnsuitableScenario."""
@@ -284,8 +303,8 @@ class Chain(ABC):
     def extend(self) -> None:
         """Make the front a node, with the motion since the newest one as its factor."""
         self.motions.append(
-            transition=self._transition, noise=self._noise, begin_shift=0.0, end_shift=0.0, time=self.front.time,
-            weight=1.0,
+            transition=self._transition, jacobian=self._transition, noise=self._noise, begin_shift=0.0, end_shift=0.0,
+            time=self.front.time, weight=1.0,
         )  # fmt: skip
         whitening(self._noise, self.motions.newest("whitener"))
         self._append_node()
@@ -331,7 +350,7 @@ class Chain(ABC):
         newest = self.base + len(self.nodes) - 1
         if not len(folds) or folds["node"][-1] != newest or folds["time"][-1] != front.time:
             folds.append(
-                node=newest, time=front.time, transition=self._transition, shift=0.0,
+                node=newest, time=front.time, transition=self._transition, jacobian=self._transition, shift=0.0,
                 **{name: getattr(front, name) for name in self._kept},
             )  # fmt: skip
         return self.fold_base + len(folds) - 1
@@ -398,7 +417,7 @@ class Chain(ABC):
         self.move_folds(int(np.searchsorted(folds["node"], aids["node"][first])))
         row = np.where(at_node, -1, aids["fold"] - self.fold_base)
         self.observe(first, row, folds, "now_", jacobian)
-        through_motion(first, row, folds["jacobian"], jacobian)
+        through_motion(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
 
     @abstractmethod
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:

@@ -76,15 +76,21 @@ def _compose(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
 def _move(F, s, moved, J):  # type: ignore[no-untyped-def]
     """Where the motion takes a node that is shifted by s: the shift ``moved`` at its end, and its derivative J.
 
-    The equations are those of the module.
+    The equations are those of the module. J must hold F, or what this function left there at another shift: only the
+    rows of position, velocity and attitude and the columns of attitude and biases depend on the shift. Biases and
+    calibration states only decay, each on its own.
     """
     n = s.size
-    for i in range(n):
+    m = min(n, 15)
+    for i in range(9):
         x = 0.0
-        for j in range(n):
-            J[i, j] = F[i, j]
+        for j in range(m):
             x += F[i, j] * s[j]
         moved[i] = x
+        for j in range(6, m):
+            J[i, j] = F[i, j]
+    for i in range(9, n):
+        moved[i] = F[i, i] * s[i]
     p0, p1, p2 = s[6], s[7], s[8]
     size = p0 * p0 + p1 * p1 + p2 * p2
     if n >= 15:
@@ -185,7 +191,7 @@ def _linearise_motion(first, transition, begin_shift, end_shift, residual, jacob
 @kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
 def _along_motion(transition, jacobian, residual, begin_shift, end_shift, step, along):  # type: ignore[no-untyped-def]
     count, n = begin_shift.shape
-    shift, moved, error, J = np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
+    shift, moved, error, J = np.empty(n), np.empty(n), np.empty(n), np.zeros((n, n))
     along[0] = step[0]
     for k in range(count):
         for r in range(n):  # the motion error that the linear solution leaves
@@ -270,6 +276,7 @@ class InertialChain(Chain):
     """
 
     node_arrays = ("raw_rate",)
+    coupled = 15
     front: InertialModel
 
     def __init__(self, front: InertialModel):

@@ -30,6 +30,7 @@ WEIGHTED = (
     "ga-fgo", "huber-fgo", "tukey-fgo", "cauchy-fgo", "gm-fgo", "dcs-fgo", "switchable-fgo", "gnc-fgo",
     "max-mixture-fgo",
 )  # fmt: skip
+ROV = Path(__file__).parents[1] / "cases" / "rov.toml"
 OURS, THEIRS = ("sw-fgo", {"calibrate": False}), ("gtsam-fixed-lag", {})
 
 
@@ -155,6 +156,31 @@ def test_weightings_cost_at_most_half_more(benchmark, recording: Recording, plac
     benchmark.extra_info.update({f"{name}_ratio": ratio for name, ratio in ratios(costs).items()})
     benchmark.pedantic(lambda: None, rounds=1)
     assert max(ratios(costs).values()) < 1.5, ratios(costs)
+
+
+def test_cost_at_high_rates(benchmark):
+    """A DVL at 23 Hz and a depth sensor at 10 Hz (`tests/cases/rov.toml`): an epoch beside the EKF's, by spacing.
+
+    All rows take turns, epoch by epoch; medians of the least of several runs.
+    """
+    rov = record(load(ROV), 3)
+    rows = {"ekf": ("ekf", {})} | {f"sw-fgo, {s:g} s": ("sw-fgo", {"spacing": s}) for s in (0.0, 0.2, 1.0)}
+    costs = {key: np.full(EPOCHS, np.inf) for key in rows}
+    for _ in range(ROUNDS):
+        estimators = {key: make(name, **parameters) for key, (name, parameters) in rows.items()}
+        for estimator in estimators.values():
+            estimator.reset(rov.start, rov.instruments)
+        for k, packet in zip(range(21 + EPOCHS), rov.steps(), strict=False):
+            for key, estimator in estimators.items():
+                begun = process_time()
+                estimator.update(packet)
+                if k >= 21:
+                    costs[key][k - 21] = min(costs[key][k - 21], 1e3 * (process_time() - begun))
+    medians = {key: float(np.median(cost)) for key, cost in costs.items()}
+    print("\n" + ", ".join(f"{key}: {median:.2f} ms" for key, median in medians.items()))
+    benchmark.extra_info.update({f"{key}_ms": median for key, median in medians.items()})
+    benchmark.pedantic(lambda: None, rounds=1)
+    assert medians["sw-fgo, 1 s"] < medians["sw-fgo, 0.2 s"] < 0.75 * medians["sw-fgo, 0 s"], medians
 
 
 def test_cost_against_the_length_of_the_window(benchmark, recording: Recording):
