@@ -230,6 +230,7 @@ THING = Kind("a thing", "other", (Component("thing", "m"),))
     [
         (lambda: int, THING, "is not a subclass of simnav.sensors.AidSpec"),
         (lambda: instrument("imu"), THING, "kind 'imu' .* means something else"),
+        (lambda: instrument("velocity"), THING, "kind 'velocity' .* means something else"),
         (lambda: instrument("dvl"), THING, r"kind 'dvl' of instrument Thing: the name is taken by Dvl \(.*dvl.py"),
         (
             lambda: instrument(),
