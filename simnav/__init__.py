@@ -16,8 +16,7 @@ from gymnasium.envs.registration import registry as _registry
 from simnav.catalogue import headers as _headers
 
 if TYPE_CHECKING:
-    from simnav.agent import EstimatorAgent
-    from simnav.environment import NavigationEnv
+    from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv
     from simnav.estimator import Estimator, UnsuitableScenario, register
     from simnav.kinds import Component, Kind
     from simnav.plugins import load_plugin
@@ -41,7 +40,6 @@ if TYPE_CHECKING:
         NavigationStates,
         TriadDatasheet,
     )
-    from simnav.vector import NavigationVectorEnv
 
 __all__ = [
     "COMPONENTS",
@@ -77,8 +75,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "agent": ("EstimatorAgent",),
-    "environment": ("NavigationEnv",),
+    "environment": ("EstimatorAgent", "NavigationEnv", "NavigationVectorEnv"),
     "estimator": ("Estimator", "UnsuitableScenario", "register"),
     "kinds": ("Component", "Kind"),
     "plugins": ("load_plugin",),
@@ -102,7 +99,6 @@ _HOMES = {
         "NavigationStates",
         "TriadDatasheet",
     ),
-    "vector": ("NavigationVectorEnv",),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -129,7 +125,7 @@ def _register_scenarios() -> None:
             _register_env(
                 id=header.gym_id,
                 entry_point="simnav.environment:NavigationEnv",
-                vector_entry_point="simnav.vector:NavigationVectorEnv",
+                vector_entry_point="simnav.environment:NavigationVectorEnv",
                 kwargs={"scenario": header.id},
             )
 

@@ -40,6 +40,7 @@ __all__ = [
     "Observation",
     "Role",
     "geodetic_components",
+    "kinds_with",
     "speed_components",
 ]
 
@@ -317,3 +318,8 @@ class _Kinds(Mapping[str, Kind]):
 
 #: Every kind of aiding instrument that is known. A scenario may carry several instruments of one kind.
 KINDS: Mapping[str, Kind] = _Kinds()
+
+
+def kinds_with(*equations: str) -> list[str]:
+    """The names of the kinds that one of the given compiled equations predicts, sorted."""
+    return sorted(name for name, kind in KINDS.items() if kind.equation in equations)

@@ -16,7 +16,6 @@ from simnav.compiled import Array, kernel
 
 __all__ = [
     "cross",
-    "dcm_from_quaternion",
     "dcm_from_rotation_vector",
     "dcm_from_rpy",
     "left_jacobian",
@@ -200,22 +199,6 @@ def quaternion_from_dcm(dcm: Array) -> Array:
     q = np.take_along_axis(candidates, largest, axis=-2)[..., 0, :]
     unit: Array = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
-
-
-def dcm_from_quaternion(quaternion: Array) -> Array:
-    """DCM of a unit quaternion, scalar first (Groves eq. 2.34, transposed).
-
-    Parameters
-    ----------
-    quaternion : (..., 4) array
-
-    Returns
-    -------
-    (..., 3, 3) array
-    """
-    q = np.asarray(quaternion, dtype=np.float64)
-    w, s = q[..., 0, None, None], skew(q[..., 1:])
-    return np.eye(3) + 2.0 * (w * s + s @ s)
 
 
 @kernel()

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav import estimator as registry
-from simnav.estimator import names
+from simnav.estimator import names, registry
 from simnav.kinds import INSTRUMENTS
 from simnav.plugins import is_file_module
 from simnav.sensors.faults import FAULTS

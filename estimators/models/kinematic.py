@@ -13,7 +13,7 @@ import numpy as np
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.models.measurements import radii, wrap
-from simnav.kinds import POSITION, VELOCITY
+from simnav.kinds import POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["KinematicModel"]
@@ -50,7 +50,9 @@ class KinematicModel(ErrorModel):
         """Set the state; UnsuitableScenario without GNSS positions."""
         receivers = instruments.of_equation(POSITION)
         if not receivers:
-            raise UnsuitableScenario("it needs an instrument of kind gnss_position; there is none")
+            raise UnsuitableScenario(
+                f"it needs an instrument of kind {' or '.join(kinds_with(POSITION))}; there is none"
+            )
         self.instruments = instruments
         self.time = start.time
         self.position = np.array(start.position, dtype=np.float64)

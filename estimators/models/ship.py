@@ -57,7 +57,8 @@ HEEL = 0.03
 def require_ship_aids(instruments: Instruments, name: str) -> None:
     """UnsuitableScenario, in the name of an estimator, without a heading, or a position or speed."""
     if not instruments.of_equation(kinds.HEADING):
-        raise UnsuitableScenario(f"{name} needs a compass (gyrocompass or magnetic_compass); there is none")
+        compasses = " or ".join(kinds.kinds_with(kinds.HEADING))
+        raise UnsuitableScenario(f"{name} needs a compass ({compasses}); there is none")
     if not instruments.of_equation(*POSITIONS, *VELOCITIES):
         raise UnsuitableScenario(f"{name} needs GNSS, a terrain fix, a speed log or a DVL; there is none")
 

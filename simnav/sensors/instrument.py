@@ -44,6 +44,8 @@ __all__ = [
     "turn_to_ned",
 ]
 
+#: What the names of an environment's observation, and of the parts of a log's reference, stand for.
+_RESERVED = ("imu", "interval", "position", "velocity", "attitude")
 #: Figures that a specification may have for each component by itself.
 _BY_COMPONENT = ("sigma", "bias", "bias_instability", "fixed_bias")
 #: Default of a vector.
@@ -218,7 +220,7 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
         name = cls.model_fields["kind"].default
         if not isinstance(name, str):
             raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_kind'] = 'my_kind'")
-        if name in ("imu", "interval"):
+        if name in _RESERVED:
             raise PluginError(f"kind {name!r} of instrument {cls.__qualname__}: the name means something else")
         for component in kind.components:
             for unit in (component.unit, component.error_unit):

@@ -1,4 +1,4 @@
-"""The error processes that instruments share: white noise, Gauss-Markov, random walk, quantization.
+"""The error processes that instruments share: Gauss-Markov, random walk, quantization.
 
 Every process is a state machine: it is handed the times of successive blocks and gives the same numbers, bit for bit,
 wherever the blocks are cut. Times may be irregular. Each owns its generator (`simnav.streams.stream`) and draws a fixed
@@ -17,7 +17,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.types import Array
 
-__all__ = ["GaussMarkov", "HeldGaussMarkov", "Quantizer", "RandomWalk", "WhiteNoise"]
+__all__ = ["GaussMarkov", "HeldGaussMarkov", "quantize_scalar", "ready"]
 
 
 @kernel()
@@ -56,13 +56,6 @@ def _gauss_markov(variates, state, sigma, time, previous, correlation_time):  # 
     return True
 
 
-@kernel("void(f8[:, ::1], f8[::1], f8)")
-def _quantize(increments, residual, step):  # type: ignore[no-untyped-def]
-    for i in range(increments.shape[0]):
-        for j in range(increments.shape[1]):
-            increments[i, j], residual[j] = quantize_scalar(increments[i, j], step, residual[j])
-
-
 def ready(array: Array) -> Array:
     """The array itself, or a copy, such that kernels take it: float64, C-contiguous and writable."""
     flags = array.flags
@@ -74,29 +67,6 @@ def ready(array: Array) -> Array:
 def _vector(value: Array | float, size: int | None = None) -> Array:
     vector = np.array(value, dtype=np.float64, ndmin=1)
     return vector if size is None else np.broadcast_to(vector, (size,)).copy()
-
-
-class WhiteNoise:
-    """Independent normal variates.
-
-    Parameters
-    ----------
-    sigma : (d,) array
-    rng : numpy.random.Generator
-    """
-
-    def __init__(self, sigma: Array | float, rng: np.random.Generator):
-        self.sigma = _vector(sigma)
-        self._rng = rng
-
-    def sample(self, n: int) -> Array:
-        """The next n samples.
-
-        Returns
-        -------
-        (n, d) array
-        """
-        return self._rng.standard_normal((n, len(self.sigma))) * self.sigma
 
 
 class GaussMarkov:
@@ -155,20 +125,6 @@ class GaussMarkov:
         return x
 
 
-class RandomWalk(GaussMarkov):
-    """Random walk that starts at zero at time 0.
-
-    Parameters
-    ----------
-    density : (d,) array
-        [x per sqrt(s)].
-    rng : numpy.random.Generator
-    """
-
-    def __init__(self, density: Array | float, rng: np.random.Generator):
-        super().__init__(density, np.inf, rng)
-
-
 class HeldGaussMarkov:
     """Gauss-Markov process that steps on the grid 0, h, 2h, ... and holds its value between.
 
@@ -216,37 +172,3 @@ class HeldGaussMarkov:
         values = np.concatenate([self._last, self._process.sample(grid)])
         self._next, self._last = end, values[-1:].copy()
         return values, first
-
-
-class Quantizer:
-    """Increment quantizer whose residual is carried over, as in an IMU that counts pulses.
-
-    The sum of its outputs never differs from the sum of its inputs by more than half a step.
-
-    Parameters
-    ----------
-    step : float
-        [x]; 0 for none.
-    size : int
-        Number of components d.
-    """
-
-    def __init__(self, step: float, size: int):
-        self.step = float(step)
-        self.residual = np.zeros(size)
-
-    def quantize(self, increments: Array) -> Array:
-        """Quantize the increments of the next block.
-
-        Parameters
-        ----------
-        increments : (n, d) array
-
-        Returns
-        -------
-        (n, d) array
-        """
-        output = np.array(increments, dtype=np.float64, order="C")
-        if self.step > 0.0:
-            _quantize(output, self.residual, self.step)
-        return output

@@ -8,10 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.environment import NavigationEnv
+from simnav.environment import NavigationEnv, NavigationVectorEnv
 from simnav.scenario import Scenario, parse
 from simnav.types import KINDS
-from simnav.vector import NavigationVectorEnv
 
 TOML = """
 name = "everything"

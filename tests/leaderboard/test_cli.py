@@ -72,8 +72,10 @@ def here(tmp_path, monkeypatch) -> Path:
     (tmp_path / "pond.toml").write_text(SCENARIO)
     (tmp_path / "mine.py").write_text(MINE)
     estimator.names()
-    monkeypatch.setattr(estimator, "_classes", dict(estimator._classes))  # "mine" is registered for one test
-    monkeypatch.setattr(estimator, "_aliases", dict(estimator._aliases))
+    monkeypatch.setattr(
+        estimator.registry, "_classes", dict(estimator.registry._classes)
+    )  # "mine" is registered for one test
+    monkeypatch.setattr(estimator.registry, "_aliases", dict(estimator.registry._aliases))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -35,8 +35,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A place for estimator files; what they import from it is forgotten afterwards."""
     monkeypatch.setattr(sys, "path", [*sys.path])
     estimator.names()  # the installed ones are known before
-    monkeypatch.setattr(estimator, "_classes", dict(estimator._classes))
-    monkeypatch.setattr(estimator, "_aliases", dict(estimator._aliases))
+    monkeypatch.setattr(estimator.registry, "_classes", dict(estimator.registry._classes))
+    monkeypatch.setattr(estimator.registry, "_aliases", dict(estimator.registry._aliases))
     before = set(sys.modules)
     yield tmp_path
     for name in set(sys.modules) - before:

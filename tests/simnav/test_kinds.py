@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simnav import earth
-from simnav.kinds import EQUATIONS, KINDS, Component, Kind, geodetic_components
+from simnav.kinds import EQUATIONS, KINDS, Component, Kind, geodetic_components, kinds_with
 from simnav.plugins import PluginError
 from simnav.sensors import instrument_specs
 from simnav.spec import UNITS
@@ -106,6 +106,7 @@ def test_datasheets_are_chosen_by_role_and_by_equation():
     assert [s.name for s in instruments.of_role("velocity", "heading")] == ["log", "north"]
     assert [s.name for s in instruments.of_equation("position")] == ["gps"]
     assert instruments["log"].equation == "water_speed"
+    assert kinds_with("heading", "depth") == ["depth", "gyrocompass", "magnetic_compass"]
     assert geodetic_components(height=False) == KINDS["terrain_fix"].components
 
 

@@ -41,7 +41,7 @@ def test_quaternion_returns_for_all_branches():
     dcm = np.concatenate([rotations.as_matrix(), [np.diag(d) for d in ([1, -1, -1], [-1, 1, -1], [-1, -1, 1])]])
     q = rotation.quaternion_from_dcm(dcm)
     np.testing.assert_allclose(np.linalg.norm(q, axis=-1), 1.0, atol=1e-15)
-    np.testing.assert_allclose(rotation.dcm_from_quaternion(q), dcm, atol=1e-14)
+    np.testing.assert_allclose(Rotation.from_quat(q, scalar_first=True).as_matrix(), dcm, atol=1e-14)
 
 
 @given(vectors, vectors)

@@ -71,15 +71,20 @@ _Intervals = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_interva
 #: the IMU; or something else.
 Effect = Literal["missing", "noise", "lasting", "growing", "gross", "replaced", "imu", "other"]
 
-#: Sizes are given for errors of these: the unit of a component's error -> the end of the field's name.
-_QUANTITIES = {"m": "position", "m_s": "velocity", "deg": "heading"}
+#: Sizes are given for errors of these: the end of a field's name, and the units of the components that it is for.
+_QUANTITIES = {
+    "position": ("m", "mm", "cm", "km"),
+    "velocity": ("m_s", "mm_s", "cm_s", "kn"),
+    "heading": ("deg", "arcsec"),
+}
+_QUANTITY_OF = {unit: name for name, units in _QUANTITIES.items() for unit in units}
 
 
 def _axes(kind: str) -> dict[str, list[int]]:
     """The components of a kind of instrument whose errors are of each quantity; "" for those of none."""
     axes: dict[str, list[int]] = {}
     for i, component in enumerate(KINDS[kind].components):
-        axes.setdefault(_QUANTITIES.get(component.error_unit, ""), []).append(i)
+        axes.setdefault(_QUANTITY_OF.get(component.error_unit, ""), []).append(i)
     return axes
 
 
@@ -162,7 +167,7 @@ class FaultSpec(Spec):
         for name, info in cls.model_fields.items():
             stem, _, last = name.rpartition("_")
             unit = unit_of(info)
-            base = stem if last in _QUANTITIES.values() and stem in cls.stems else name
+            base = stem if last in _QUANTITIES and stem in cls.stems else name
             keys[base if unit is None else f"{base}_{unit}"] = (name, info)
         return keys
 
@@ -197,7 +202,7 @@ class FaultSpec(Spec):
 
     def sizes(self, stem: str) -> dict[str, Any]:
         """The fields of a stem, by name."""
-        return {f"{stem}_{q}": getattr(self, f"{stem}_{q}") for q in _QUANTITIES.values()}
+        return {f"{stem}_{q}": getattr(self, f"{stem}_{q}") for q in _QUANTITIES}
 
     def size(self, stem: str, kind: str) -> Array:
         """The (d,) sizes of a stem for the components of a kind of instrument (after `check`)."""
@@ -244,10 +249,10 @@ class FaultSpec(Spec):
         needed = {q: name for name, kind in touched.items() for q in _axes(kind)}
         if "" in needed and self.sizes_required:
             name = needed[""]
-            unit = next(c.error_unit for c in KINDS[touched[name]].components if c.error_unit not in _QUANTITIES)
+            unit = next(c.error_unit for c in KINDS[touched[name]].components if c.error_unit not in _QUANTITY_OF)
             raise SpecError(f"fault {self.kind!r} on {name!r} ({touched[name]}): there is no {stem} in {unit}")
         needed.pop("", None)
-        given = {q for q in _QUANTITIES.values() if getattr(self, f"{stem}_{q}") is not None}
+        given = {q for q in _QUANTITIES if getattr(self, f"{stem}_{q}") is not None}
         for q in sorted(given.difference(needed)):
             right = " and ".join(repr(self.key_of(f"{stem}_{r}")) for r in sorted(needed))
             kinds = ", ".join(f"{name} ({kind})" for name, kind in touched.items())
@@ -329,7 +334,7 @@ def register_fault(cls: type[F]) -> type[F]:
     if not isinstance(name, str):
         raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_fault'] = 'my_fault'")
     for stem in cls.stems:
-        for q in _QUANTITIES.values():
+        for q in _QUANTITIES:
             if f"{stem}_{q}" not in cls.model_fields:
                 raise PluginError(f"fault {name!r}: a stem needs a field for every quantity; there is no {stem}_{q}")
     FAULTS.add(name, cls)

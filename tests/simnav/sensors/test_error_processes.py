@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simnav.sensors.processes import GaussMarkov, HeldGaussMarkov, Quantizer, RandomWalk, WhiteNoise
+from simnav.sensors.processes import GaussMarkov, HeldGaussMarkov
 from simnav.streams import stream
 
 # Components double as an ensemble of independent realisations.
@@ -23,23 +23,16 @@ def allan_deviation(rate: np.ndarray, m: int) -> float:
     return float(np.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2)))
 
 
-def test_white_noise_has_its_sigma_by_component_and_the_slope_of_minus_a_half():
-    x = WhiteNoise([1.0, 3.0], stream(1, "w")).sample(100_000)
-    assert np.std(x, axis=0) == pytest.approx([1.0, 3.0], rel=0.01)
-    for m in (1, 10, 100):
-        assert allan_deviation(x[:, :1], m) == pytest.approx(m**-0.5, rel=0.05)
-
-
 def test_random_walk_starts_at_zero_and_has_the_allan_slope_of_plus_a_half():
     density, dt = 0.2, 0.5
-    x = RandomWalk(np.full(200, density), stream(2, "r")).sample(dt * np.arange(20_000))
+    x = GaussMarkov(np.full(200, density), np.inf, stream(2, "r")).sample(dt * np.arange(20_000))
     assert np.all(x[0] == 0.0)
     for m in (10, 100, 1000):
         assert allan_deviation(x, m) == pytest.approx(density * np.sqrt(m * dt / 3.0), rel=0.05)
 
 
 def test_random_walk_counts_the_time_before_its_first_sample():
-    x = RandomWalk(np.full(ENSEMBLE, 2.0), stream(3, "r")).sample(np.array([9.0, 25.0]))
+    x = GaussMarkov(np.full(ENSEMBLE, 2.0), np.inf, stream(3, "r")).sample(np.array([9.0, 25.0]))
     assert np.std(x, axis=1) == pytest.approx([6.0, 10.0], rel=0.04)
 
 
@@ -90,10 +83,6 @@ def test_blocks_of_any_length_give_the_same_bits(cuts, infinite):
     whole, parts = process(), process()
     blocks = [parts.sample(time[a:b]) for a, b in itertools.pairwise(edges)]
     assert np.array_equal(np.concatenate(blocks), whole.sample(time))
-    one, many = Quantizer(0.3, 2), Quantizer(0.3, 2)
-    x = np.column_stack([np.sin(time), time])
-    blocks = [many.quantize(x[a:b]) for a, b in itertools.pairwise(edges)]
-    assert np.array_equal(np.concatenate(blocks), one.quantize(x))
 
 
 def test_held_process_steps_on_its_grid_with_the_autocovariance_of_the_continuous_one():
@@ -108,16 +97,3 @@ def test_held_process_steps_on_its_grid_with_the_autocovariance_of_the_continuou
     on, first = held.table(14.0)
     assert (len(on), first) == (3, 5)
     assert np.array_equal(on[0], values[-1])
-
-
-@pytest.mark.parametrize("step", [0.01, 0.3])
-def test_quantizer_gives_multiples_and_never_strays_by_more_than_half_a_step(step):
-    x = stream(9, "x").standard_normal((5000, 3))
-    y = Quantizer(step, 3).quantize(x)
-    assert np.abs(y / step - np.round(y / step)).max() < 1e-9
-    assert np.abs(np.cumsum(y - x, axis=0)).max() <= 0.5 * step + 1e-9
-
-
-def test_quantizer_without_a_step_changes_nothing():
-    x = stream(9, "x").standard_normal((50, 3))
-    assert np.array_equal(Quantizer(0.0, 3).quantize(x), x)

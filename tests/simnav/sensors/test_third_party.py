@@ -18,7 +18,7 @@ from simnav.plugins import PluginError, load_plugin
 from simnav.recording import Recording
 from simnav.scenario import load, parse
 from simnav.sensors import AidSpec, register_fault, register_instrument
-from simnav.sensors.faults import effect_of
+from simnav.sensors.faults import BiasStep, NoiseStep, effect_of
 from simnav.simulator import ideal
 from simnav.source import record
 from simnav.spec import SpecError, quantity
@@ -230,6 +230,7 @@ THING = Kind("a thing", "other", (Component("thing", "m"),))
     [
         (lambda: int, THING, "is not a subclass of simnav.sensors.AidSpec"),
         (lambda: instrument("imu"), THING, "kind 'imu' .* means something else"),
+        (lambda: instrument("velocity"), THING, "kind 'velocity' .* means something else"),
         (lambda: instrument("dvl"), THING, r"kind 'dvl' of instrument Thing: the name is taken by Dvl \(.*dvl.py"),
         (
             lambda: instrument(),
@@ -262,3 +263,10 @@ def test_an_instrument_that_cannot_be_registered(plugins, make, kind, message):
 def test_a_fault_that_cannot_be_registered():
     with pytest.raises(PluginError, match=r"is not a subclass of simnav.sensors.faults.FaultSpec"):
         register_fault(int)
+
+
+def test_errors_in_another_unit_take_the_faults_that_need_no_size(plugins):
+    register_instrument(Kind("a delay", "other", (Component("delay", "s"),)), example={})(instrument())
+    with pytest.raises(SpecError, match=r"fault 'bias_step' on 'clock' \(thing\): there is no offset in s"):
+        BiasStep(instruments=("clock",), offset_position=1.0).check({"clock": "thing"})
+    NoiseStep(instruments=("clock",), factor=2.0).check({"clock": "thing"})

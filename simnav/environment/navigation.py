@@ -33,8 +33,8 @@ from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
 
 if TYPE_CHECKING:
+    from simnav.environment.rendering import Chart
     from simnav.recording import AidStream, Block
-    from simnav.rendering import Chart
     from simnav.scenario import Scenario
 
 __all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action"]
@@ -188,7 +188,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
         if self.render_mode is not None:
             if self._chart is None:
-                from simnav.rendering import Chart
+                from simnav.environment.rendering import Chart
 
                 self._chart = Chart(self.scenario.id, self._source.duration, human=self.render_mode == "human")
             self._chart.clear()

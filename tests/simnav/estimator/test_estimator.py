@@ -13,8 +13,7 @@ from typing import Any, Literal
 
 import pytest
 
-from simnav import estimator as registry
-from simnav.estimator import Estimator, EstimatorError, describe, find, make, names, register
+from simnav.estimator import Estimator, EstimatorError, describe, find, make, names, register, registry
 from simnav.types import Estimate
 
 BODY = """

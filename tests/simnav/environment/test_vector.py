@@ -8,8 +8,8 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from simnav.environment import NavigationEnv
+from simnav.environment.vector import NavigationVectorEnv, spawn_seeds
 from simnav.scenario import parse
-from simnav.vector import NavigationVectorEnv, spawn_seeds
 
 TOML = """
 name = "short"

@@ -15,11 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simnav
-from simnav import environment
-from simnav.agent import EstimatorAgent, unpack
 from simnav.catalogue import headers
 from simnav.earth import displace
-from simnav.environment import NavigationEnv
+from simnav.environment import EstimatorAgent, NavigationEnv, unpack
+from simnav.environment import navigation as environment
 from simnav.estimator import Estimator, make, names
 from simnav.log import LogError
 from simnav.recording import AidStream, Block, packets

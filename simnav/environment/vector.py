@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from simnav.environment import NavigationEnv, Observation, checked_action
+from simnav.environment.navigation import NavigationEnv, Observation, checked_action
 from simnav.types import Array
 
 if TYPE_CHECKING:

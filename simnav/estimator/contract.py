@@ -1,0 +1,73 @@
+"""What an estimator is: a class with two methods, `Estimator.reset` and `Estimator.update`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar
+
+from simnav.plugins import PluginError
+from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
+
+if TYPE_CHECKING:
+    from simnav.recording import Recording
+
+__all__ = ["Estimator", "EstimatorError", "UnsuitableScenario"]
+
+
+class Estimator(ABC):
+    """Base class of all estimators.
+
+    The constructor takes the parameters, all with defaults, as keyword arguments; ``--set name=value``
+    on the command line sets them. One instance serves many runs, each begun by `reset`.
+
+    Attributes
+    ----------
+    name : str
+        Set by `register`.
+    reference : bool
+        True for rows that are told the truth (an oracle); they are marked and not ranked, and
+        `reveal` is called before `reset`.
+    slow : bool
+        True for rows that take several milliseconds an epoch or more; a quick campaign leaves them out unless it is
+        asked for them.
+    """
+
+    name: ClassVar[str] = ""
+    reference: ClassVar[bool] = False
+    slow: ClassVar[bool] = False
+
+    @abstractmethod
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run.
+
+        Parameters
+        ----------
+        start : InitialState
+            A state with errors drawn from its covariance.
+        instruments : Instruments
+            The datasheets, never the realised errors.
+
+        Raises
+        ------
+        UnsuitableScenario
+            If the estimator cannot work with these instruments; say what it needs.
+        """
+
+    @abstractmethod
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take what the instruments delivered in one step; return the estimate at its end."""
+
+    def smooth(self) -> NavigationStates | None:
+        """After the last update: the whole trajectory, smoothed, at the ends of all steps; or None."""
+        return None
+
+    def reveal(self, recording: Recording) -> None:  # noqa: B027 (a hook: most estimators are told nothing)
+        """Only for ``reference`` estimators: the recording with truth and labels, before `reset`."""
+
+
+class UnsuitableScenario(Exception):  # noqa: N818 (not an error of the estimator's)
+    """Raised by `Estimator.reset`: the instruments that this estimator needs are not there."""
+
+
+class EstimatorError(PluginError):
+    """An estimator that cannot be registered, found or made; the message is one sentence."""

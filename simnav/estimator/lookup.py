@@ -1,0 +1,127 @@
+"""Find, describe and make an estimator, by its name or by its file."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import re
+import typing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from simnav.estimator.contract import Estimator, EstimatorError
+from simnav.estimator.files import class_in_file
+from simnav.estimator.parameters import Parameter, constructors_of, converted, open_ended, parameters_of
+from simnav.estimator.registry import aliases_of, registered
+from simnav.plugins import place_of
+from simnav.spec import closest
+
+__all__ = ["Description", "describe", "find", "make"]
+
+
+@dataclass(frozen=True)
+class Description:
+    """What `describe` tells of an estimator.
+
+    Attributes
+    ----------
+    name : str
+    aliases : tuple of str
+    summary : str
+        First line of the docstring.
+    file : str
+    line : int
+        Where the class is defined.
+    reference, slow : bool
+    parameters : tuple of Parameter
+    """
+
+    name: str
+    aliases: tuple[str, ...]
+    summary: str
+    file: str
+    line: int
+    reference: bool
+    slow: bool
+    parameters: tuple[Parameter, ...]
+
+
+def find(name_or_path: str) -> type[Estimator]:
+    """The class of an estimator.
+
+    Parameters
+    ----------
+    name_or_path : str
+        A registered name or alias, ``my.py``, or ``my.py:MyFilter``. A class of a file that is
+        not decorated is registered under its own name (``MyFilter``: ``my-filter``).
+
+    Raises
+    ------
+    EstimatorError
+        If there is none; the message names the nearest.
+    """
+    path = re.fullmatch(r"(.*\.py)(?::(\w+))?", name_or_path, flags=re.DOTALL)
+    if path:
+        return class_in_file(Path(path[1]), path[2])
+    return registered(name_or_path)
+
+
+def describe(name_or_path: str) -> Description:
+    """What an estimator is, where it is defined, and what parameters it takes."""
+    cls = find(name_or_path)
+    file, line = place_of(cls)
+    lines = (inspect.getdoc(cls) or "").strip().splitlines() if cls.__doc__ else []
+    return Description(
+        name=cls.name,
+        aliases=aliases_of(cls.name),
+        summary=lines[0] if lines else "",
+        file=file,
+        line=line,
+        reference=cls.reference,
+        slow=cls.slow,
+        parameters=tuple(
+            Parameter(p.name, p.default, "" if p.annotation is p.empty else inspect.formatannotation(p.annotation))
+            for p in parameters_of(cls)
+        ),
+    )
+
+
+def make(name_or_path: str, **parameters: Any) -> Estimator:
+    """Make an estimator.
+
+    Parameters
+    ----------
+    name_or_path : str
+        As for `find`.
+    **parameters
+        Of its constructor. A string is converted to what the annotation, or else the default, asks
+        for: numbers, ``true``/``false``, ``none``, a choice, or several values parted by commas.
+
+    Raises
+    ------
+    EstimatorError
+        On an unknown estimator or parameter, or a value that does not fit: one sentence.
+    """
+    cls = find(name_or_path)
+    known = {p.name: p for p in parameters_of(cls)}
+    hints: dict[str, Any] = {}
+    constructors = constructors_of(cls)
+    for constructor in reversed(constructors):
+        with contextlib.suppress(Exception):  # an annotation that cannot be resolved: the defaults decide
+            hints |= typing.get_type_hints(constructor)
+    takes_any = bool(constructors) and open_ended(constructors[-1])
+    values: dict[str, Any] = {}
+    for key, value in parameters.items():
+        if key not in known and not takes_any:
+            hint = closest(key, list(known)) if known else "; it takes none"
+            raise EstimatorError(f"estimator {cls.name!r} has no parameter {key!r}{hint}")
+        default = known[key].default if key in known else None
+        values[key] = converted(value, hints.get(key), default, f"parameter {key!r} of estimator {cls.name!r}")
+    missing = [p.name for p in known.values() if p.default is p.empty and p.name not in values]
+    if missing:
+        raise EstimatorError(f"estimator {cls.name!r} needs the parameter {missing[0]!r}, which has no default")
+    try:
+        return cls(**values)
+    except (TypeError, ValueError) as error:
+        raise EstimatorError(f"estimator {cls.name!r}: {error}") from error

@@ -1,0 +1,114 @@
+"""The parameters of an estimator's constructor, and how the text of a command line becomes one of their values."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import types
+import typing
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from simnav.estimator.contract import Estimator, EstimatorError
+
+__all__ = ["Parameter", "constructors_of", "converted", "open_ended", "parameters_of"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an estimator's constructor.
+
+    Attributes
+    ----------
+    name : str
+    default : object
+        `inspect.Parameter.empty` where it has none.
+    annotation : str
+        As written; empty where there is none.
+    """
+
+    name: str
+    default: Any
+    annotation: str
+
+    @property
+    def required(self) -> bool:
+        """True if it has no default."""
+        return self.default is inspect.Parameter.empty
+
+
+def parameters_of(cls: type[Estimator]) -> list[inspect.Parameter]:
+    """Of its constructor; where that takes ``**``, also those of its bases' that can be given by name only."""
+    found: dict[str, inspect.Parameter] = {}
+    kinds = [inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD]
+    for constructor in constructors_of(cls):
+        own = list(inspect.signature(constructor).parameters.values())[1:]
+        found |= {p.name: p for p in own if p.kind in kinds and p.name not in found}
+        kinds = kinds[:1]
+    return list(found.values())
+
+
+def constructors_of(cls: type[Estimator]) -> list[Callable[..., Any]]:
+    """Its constructor, and that of the next base that has one for as long as it takes ``**``."""
+    found = []
+    for base in cls.__mro__[:-1]:
+        if "__init__" in vars(base):
+            found.append(vars(base)["__init__"])
+            if not open_ended(found[-1]):
+                break
+    return found
+
+
+def open_ended(constructor: Callable[..., Any]) -> bool:
+    return any(p.kind is p.VAR_KEYWORD for p in inspect.signature(constructor).parameters.values())
+
+
+_TRUE, _FALSE, _NONE = ("true", "yes", "on", "1"), ("false", "no", "off", "0"), ("none", "null", "")
+
+
+def converted(value: Any, hint: Any, default: Any, what: str) -> Any:
+    """A parameter's value as its annotation, or else its default, asks for."""
+    if not isinstance(value, str):
+        return value
+    if hint is None or hint is Any:
+        if default is None or default is inspect.Parameter.empty:
+            try:
+                return ast.literal_eval(value)
+            except (ValueError, SyntaxError):
+                return value
+        hint = type(default)
+    return _as(value, hint, default, what)
+
+
+def _as(text: str, hint: Any, default: Any, what: str) -> Any:
+    origin, inside = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        if type(None) in inside and text.lower() in _NONE:
+            return None
+        for i, option in enumerate(options := [a for a in inside if a is not type(None)]):
+            try:
+                return _as(text, option, default, what)
+            except EstimatorError:
+                if i == len(options) - 1:
+                    raise
+    if origin is typing.Literal:
+        for choice in inside:
+            if text == str(choice):
+                return choice
+        raise EstimatorError(f"{what} is one of {', '.join(map(str, inside))}, not {text!r}")
+    if hint in (tuple, list) or origin in (tuple, list, Sequence):
+        element = inside[0] if inside else (type(default[0]) if default else float)
+        items = [_as(part.strip(), element, None, what) for part in text.strip("()[] ").split(",") if part.strip()]
+        return items if hint is list or origin is list else tuple(items)
+    if hint is bool:
+        if text.lower() in _TRUE + _FALSE:
+            return text.lower() in _TRUE
+        raise EstimatorError(f"{what} is true or false, not {text!r}")
+    if hint in (int, float):
+        try:
+            return hint(text)
+        except ValueError:
+            kind = "a whole number" if hint is int else "a number"
+            raise EstimatorError(f"{what} is {kind}, not {text!r}") from None
+    return text

@@ -1,0 +1,139 @@
+"""The registered estimators by name: the decorator `register`, and the entry points ``simnav.estimators``.
+
+Entry points are loaded when a name is first asked for; one that fails is named in a warning.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable, Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, TypeVar
+
+from simnav.estimator.contract import Estimator, EstimatorError
+from simnav.plugins import place_of
+from simnav.spec import closest
+
+__all__ = ["GROUP", "aliases_of", "discover", "forget", "kebab", "names", "register", "registered"]
+
+GROUP = "simnav.estimators"
+
+E = TypeVar("E", bound=type[Estimator])
+
+_classes: dict[str, type[Estimator]] = {}  # by name
+_aliases: dict[str, str] = {}  # alias -> name
+_discovered = False
+
+
+def register(name: str, aliases: Sequence[str] = ()) -> Callable[[E], E]:
+    """Class decorator: make an estimator known under a name.
+
+    Parameters
+    ----------
+    name : str
+        Kebab-case: lower-case words joined by hyphens.
+    aliases : sequence of str, optional
+        Other names that find it.
+
+    Raises
+    ------
+    EstimatorError
+        If the class is not an `Estimator`, a name is not kebab-case, or a name is taken (the
+        message says by whom and where). Defining the same class again replaces it, as in a notebook.
+    """
+    for n in (name, *aliases):
+        if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", n):
+            raise EstimatorError(f"estimator name {n!r} is not kebab-case; {kebab(n)!r} would be")
+
+    def wrap(cls: E) -> E:
+        if not (isinstance(cls, type) and issubclass(cls, Estimator)):
+            raise EstimatorError(f"@register({name!r}): {_label(cls)} is not a subclass of simnav.Estimator")
+        for n in (name, *aliases):
+            other = _classes.get(_aliases.get(n, n))
+            if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
+                raise EstimatorError(
+                    f"@register({n!r}) on {_label(cls)} ({_place(cls)}): the name is taken by "
+                    f"{_label(other)} ({_place(other)})"
+                )
+        cls.name = name
+        _classes[name] = cls
+        _aliases.update(dict.fromkeys(aliases, name))
+        return cls
+
+    return wrap
+
+
+def names() -> list[str]:
+    """The names of all registered estimators, sorted."""
+    discover()
+    return sorted(_classes)
+
+
+def registered(name: str) -> type[Estimator]:
+    """The class of a registered name or alias.
+
+    Raises
+    ------
+    EstimatorError
+        If there is none; the message names the nearest.
+    """
+    discover()
+    known = _aliases.get(name, name)
+    if known not in _classes:
+        raise EstimatorError(f"unknown estimator {name!r}{closest(name, [*_classes, *_aliases])}")
+    return _classes[known]
+
+
+def aliases_of(name: str) -> tuple[str, ...]:
+    """The other names of a registered estimator."""
+    return tuple(a for a, n in _aliases.items() if n == name)
+
+
+def discover() -> None:
+    """Load the entry points, once; our own first, so that a plug-in cannot take its names."""
+    global _discovered
+    if _discovered:
+        return
+    _discovered = True
+    found = entry_points(group=GROUP)
+    for point in sorted(found, key=lambda p: (p.dist is None or p.dist.name != "simnav", p.name)):
+        before = dict(_classes), dict(_aliases)
+        try:
+            loaded = point.load()
+            if isinstance(loaded, type) and "name" not in vars(loaded):
+                register(point.name)(loaded)
+        except (Exception, SystemExit) as error:
+            _classes.clear()
+            _aliases.clear()
+            _classes.update(before[0]), _aliases.update(before[1])
+            owner = f" of package {point.dist.name!r}" if point.dist is not None else ""
+            warnings.warn(
+                f"estimator plug-in {point.name!r} ({point.value}){owner} is left out: {type(error).__name__}: {error}",
+                stacklevel=3,
+            )
+
+
+def forget(path: Path) -> None:
+    """An edited file takes the place of its older self: its old names must not stand in its way."""
+    for n, c in list(_classes.items()):
+        if place_of(c)[0] == str(path):
+            del _classes[n]
+            for alias in [a for a, m in _aliases.items() if m == n]:
+                del _aliases[alias]
+
+
+def kebab(name: str) -> str:
+    """``MyUKFilter2`` -> ``my-uk-filter2``."""
+    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "-", name)
+    return re.sub(r"[^a-z0-9]+", "-", spaced.lower()).strip("-") or "unnamed"
+
+
+def _label(cls: Any) -> str:
+    return getattr(cls, "__qualname__", repr(cls))
+
+
+def _place(cls: type) -> str:
+    file, line = place_of(cls)
+    return f"{file}, line {line}"
