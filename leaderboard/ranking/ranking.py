@@ -1,0 +1,486 @@
+"""The ranking: who is how much worse than the oracle, and how sure we are.
+
+The figure of a run is the logarithm of the ratio of its horizontal RMSE to that of the oracle on the same run (a
+reference that knows the true noise and the fault labels). That of an estimator on a scenario is the interquartile mean
+over the runs, shown as a ratio: 2 is twice the oracle's error. Rules:
+
+**Baseline.** Where no oracle completed a run of a scenario, the baseline is the median RMSE of the best ranked
+estimator there; on a run that the oracle failed, the oracle's median. `ScenarioRanking.baseline` says which it was.
+
+**Failures count.** A failed run (error, timeout, out of memory, diverged, invalid output, or no position at more than
+5 % of the epochs) has the ratio `WORST`, a million; no completed run counts for more than that. Nothing is dropped.
+
+**Unsuitable.** An estimator that needs other instruments than a scenario has, or gives no position at all, is listed as
+such there: no failure, but no score either.
+
+**Tiers.** `simnav.leaderboard.ranking.statistics.tiers`: paired by run, against the best of a tier, Holm-corrected at
+5 %; overall, each scenario counts the same in the test as it does in the score.
+
+**Overall.** Each scenario counts the same. An estimator that covers all of them has the mean of its log ratios. One
+that covers fewer is not rewarded for leaving out the hard ones: an additive model, log ratio = estimator + scenario, is
+fitted to all there is by least squares, and its score is the estimator's effect plus the mean scenario effect (the
+adjusted or least-squares mean of an unbalanced table). Tests use the runs that two estimators have in common. Who
+covers less than half of the scenarios is listed with a score but not ranked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.leaderboard.ranking.statistics import (
+    RESAMPLES,
+    Array,
+    Place,
+    bootstrap_means,
+    interquartile_mean,
+    interval,
+    tiers,
+)
+from simnav.scoring import badge
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["MIN_AVAILABILITY", "WORST", "OverallRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
+
+#: Ratio to the oracle's error that stands for a failed run, and that no completed run exceeds.
+WORST = 1e6
+#: Least share of the epochs with a position in a run that does not count as failed.
+MIN_AVAILABILITY = 0.95
+#: Least share of the scenarios that an estimator covers to be ranked overall.
+MIN_COVERAGE = 0.5
+
+#: Statuses that say nothing about the estimator.
+_NO_TRIAL = ("unsuitable", "no-recording")
+_CAP = math.log(WORST)
+
+Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
+
+
+@dataclass(frozen=True)
+class ScenarioRow:
+    """One estimator on one scenario.
+
+    Attributes
+    ----------
+    estimator : str
+    reference : bool
+        Told the truth, not ranked.
+    rank, tier : int or None
+        None for references.
+    score, low, high : float
+        Ratio to the baseline's error with its 95 % bootstrap interval (NaN with fewer than two runs).
+    p_value : float or None
+        Holm-adjusted, against the first; None for the first and for references.
+    median : float
+        Of the ranked score over the completed runs, in its unit; NaN without any.
+    runs, failed : int
+    statuses : dict of str to int
+        How many runs ended how; ``incomplete`` are those with too few positions.
+    badge : str
+        Consistency of the horizontal position (`simnav.scoring.badge`).
+    nees : float
+        Mean over the runs, by degree of freedom; NaN without a covariance.
+    update_median : float
+        Median time per epoch [s].
+    peak_memory : int
+        Largest [bytes].
+    """
+
+    estimator: str
+    reference: bool
+    rank: int | None
+    tier: int | None
+    score: float
+    low: float
+    high: float
+    p_value: float | None
+    median: float
+    runs: int
+    failed: int
+    statuses: dict[str, int]
+    badge: str
+    nees: float
+    update_median: float
+    peak_memory: int
+
+
+@dataclass(frozen=True)
+class ScenarioRanking:
+    """The ranking on one scenario.
+
+    Attributes
+    ----------
+    scenario : str
+    baseline : str
+        What the ratios are to, in words.
+    rows : tuple of ScenarioRow
+        In order of rank; then the references.
+    unsuitable : dict of str to str
+        Estimators that have no score here, and why.
+    """
+
+    scenario: str
+    baseline: str
+    rows: tuple[ScenarioRow, ...]
+    unsuitable: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class OverallRow:
+    """One estimator over all scenarios.
+
+    Attributes
+    ----------
+    estimator : str
+    reference : bool
+    rank, tier : int or None
+        None for references and for those that cover too few scenarios.
+    score, low, high : float
+        As in `ScenarioRow`, over all scenarios (see the module), the interval stratified by scenario.
+    p_value : float or None
+    covered, scenarios : int
+        How many scenarios it covers, of how many.
+    runs, failed : int
+    badge : str
+        Over all runs.
+    update_median : float
+        Median over the scenarios of the time per epoch [s].
+    peak_memory : int
+    ratios : dict of str to float
+        Score by scenario.
+    """
+
+    estimator: str
+    reference: bool
+    rank: int | None
+    tier: int | None
+    score: float
+    low: float
+    high: float
+    p_value: float | None
+    covered: int
+    scenarios: int
+    runs: int
+    failed: int
+    badge: str
+    update_median: float
+    peak_memory: int
+    ratios: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """The whole ranking.
+
+    Attributes
+    ----------
+    score : str
+        Key of `simnav.scoring.SCORES` that is ranked.
+    rows : tuple of OverallRow
+        In order of rank; then those not ranked, then the references.
+    scenarios : tuple of ScenarioRanking
+        In order of their ids.
+    """
+
+    score: str
+    rows: tuple[OverallRow, ...]
+    scenarios: tuple[ScenarioRanking, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain dicts and lists for JSON; numbers that are not finite become None."""
+        plain = _plain(asdict(self))
+        assert isinstance(plain, dict)
+        return plain
+
+
+def rank(
+    results: Iterable[Result],
+    *,
+    score: str = "horizontal_rmse",
+    oracle: str = "oracle",
+    resamples: int = RESAMPLES,
+) -> Ranking:
+    """Rank estimators by their results.
+
+    Parameters
+    ----------
+    results : iterable of Result
+        In any order; the ranking does not depend on it.
+    score : str
+        Key of `simnav.scoring.SCORES` to rank by, one whose ``better`` is ``lower``: ``smoothed_horizontal_rmse`` for
+        the post-processing track.
+    oracle : str
+        Label of the reference that is the baseline; if it did not run, the best reference with this in its label.
+    resamples : int
+        Of the bootstrap.
+
+    Returns
+    -------
+    Ranking
+
+    Raises
+    ------
+    ValueError
+        If an estimator has two results for one run.
+    """
+    cells: dict[str, dict[str, _Cell]] = {}
+    for r in results:
+        cells.setdefault(r.scenario, {}).setdefault(r.estimator, _Cell(r.estimator, score)).add(r)
+    scenarios = [_Scenario(name, cells[name], oracle, resamples, k) for k, name in enumerate(sorted(cells))]
+    return Ranking(score, tuple(_overall(scenarios)), tuple(s.ranking() for s in scenarios))
+
+
+class _Cell:
+    """All results of one estimator on one scenario."""
+
+    def __init__(self, estimator: str, score: str):
+        self.estimator, self.score = estimator, score
+        self.results: dict[Run, Result] = {}
+        self.logs: dict[Run, float] = {}  # log ratio to the baseline
+
+    def add(self, result: Result) -> None:
+        run = (result.seed, result.note)
+        if run in self.results:
+            raise ValueError(
+                f"two results of {result.estimator!r} on {result.scenario} for seed {result.seed}; keep one of them"
+            )
+        self.results[run] = result
+
+    @property
+    def reference(self) -> bool:
+        return any(r.reference for r in self.results.values())
+
+    @cached_property
+    def tried(self) -> dict[Run, Result]:
+        return {run: r for run, r in sorted(self.results.items()) if r.status not in _NO_TRIAL}
+
+    def status(self, result: Result) -> str:
+        """Status of a run as it counts here: "incomplete" where too little came out of a run that ended well."""
+        if result.status != "ok":
+            return result.status
+        sparse = self.score == "horizontal_rmse" and not result.scores.get("availability", 1.0) >= MIN_AVAILABILITY
+        return "incomplete" if sparse or not np.isfinite(self.value(result)) else "ok"
+
+    def value(self, result: Result) -> float:
+        return float(result.scores.get(self.score, math.nan))
+
+    @cached_property
+    def good(self) -> dict[Run, float]:
+        """The score of the completed runs."""
+        return {run: self.value(r) for run, r in self.tried.items() if self.status(r) == "ok"}
+
+    def median(self) -> float:
+        values = list(self.good.values())
+        return float(np.median(values)) if values else math.nan
+
+    def unsuitable(self) -> str:
+        """Why there is no score here, or nothing."""
+        if not self.tried:
+            reasons = sorted({r.reason or r.status for r in self.results.values()})
+            return reasons[0]
+        ended = [r for r in self.tried.values() if r.status == "ok"]
+        if ended and len(ended) == len(self.tried) and not any(np.isfinite(self.value(r)) for r in ended):
+            return f"has no {self.score}"
+        return ""
+
+    def numbers(self, name: str) -> Array:
+        """A score over all runs, those that failed included as far as they went; only where it is finite."""
+        x = np.array([r.scores.get(name, math.nan) for r in self.tried.values()], dtype=np.float64)
+        return x[np.isfinite(x)]
+
+    def statuses(self) -> dict[str, int]:
+        found = [self.status(r) for r in self.tried.values()]
+        return {s: found.count(s) for s in sorted(set(found))}
+
+    def peak_memory(self) -> int:
+        return max((int(r.peak_memory) for r in self.tried.values()), default=0)
+
+
+class _Scenario:
+    """The cells of one scenario with their log ratios."""
+
+    def __init__(self, name: str, cells: Mapping[str, _Cell], oracle: str, resamples: int, index: int):
+        self.name = name
+        self.unsuitable = {n: why for n in sorted(cells) if (why := cells[n].unsuitable())}
+        self.cells = {n: cells[n] for n in sorted(cells) if n not in self.unsuitable}
+        self.baseline, errors, constant = self._baseline(oracle)
+        for cell in self.cells.values():
+            good = cell.good
+            for run in cell.tried:
+                cell.logs[run] = _log_ratio(good[run], errors.get(run, constant)) if run in good else _CAP
+        self.strata = {n: np.array(list(c.logs.values())) for n, c in self.cells.items()}
+        self.means = {n: interquartile_mean(x) for n, x in self.strata.items()}
+        self.draws = {n: bootstrap_means([x], resamples=resamples, seed=index)[:, 0] for n, x in self.strata.items()}
+
+    def _baseline(self, oracle: str) -> tuple[str, dict[Run, float], float]:
+        """In words, by run, and for runs without one."""
+        medians = {n: m for n, c in self.cells.items() if math.isfinite(m := c.median())}
+        references = {n: m for n, m in medians.items() if self.cells[n].reference and oracle in n}
+        if oracle in references:
+            references = {oracle: references[oracle]}
+        ranked = {n: m for n, m in medians.items() if not self.cells[n].reference}
+        if references:
+            name = min(references, key=lambda n: (references[n], n))
+            return f"{name}, on the same run", self.cells[name].good, references[name]
+        if ranked:
+            name = min(ranked, key=lambda n: (ranked[n], n))
+            return f"median of {name}, the best here: no oracle ran", {}, ranked[name]
+        return "none: no run was completed", {}, 1.0
+
+    def differences(self, a: str, b: str) -> Array:
+        """Paired differences of log ratios over the runs that both have."""
+        mine, other = self.cells[a].logs, self.cells[b].logs
+        if mine.keys() == other.keys():
+            return np.asarray(self.strata[a] - self.strata[b])
+        return np.array([mine[run] - other[run] for run in mine if run in other])
+
+    def ranking(self) -> ScenarioRanking:
+        ranked = {n: m for n, m in self.means.items() if not self.cells[n].reference}
+        places = tiers(ranked, lambda a, b: [self.differences(a, b)])
+        references = sorted((n for n in self.cells if n not in ranked), key=lambda n: (self.means[n], n))
+        rows = [self._row(n, k + 1, p) for k, (n, p) in enumerate(places.items())]
+        rows += [self._row(n, None, None) for n in references]
+        return ScenarioRanking(self.name, self.baseline, tuple(rows), self.unsuitable)
+
+    def _row(self, name: str, position: int | None, place: Place | None) -> ScenarioRow:
+        cell, x = self.cells[name], self.strata[name]
+        low, high = interval(self.draws[name]) if len(x) > 1 else (math.nan, math.nan)
+        statuses = cell.statuses()
+        nees, seconds = cell.numbers("nees_horizontal"), cell.numbers("update_median")
+        return ScenarioRow(
+            estimator=name,
+            reference=cell.reference,
+            rank=position,
+            tier=place.tier if place else None,
+            score=math.exp(self.means[name]),
+            low=math.exp(low),
+            high=math.exp(high),
+            p_value=place.p_value if place else None,
+            median=cell.median(),
+            runs=len(x),
+            failed=len(x) - statuses.get("ok", 0),
+            statuses=statuses,
+            badge=badge(nees),
+            nees=float(np.mean(nees)) if len(nees) else math.nan,
+            update_median=float(np.median(seconds)) if len(seconds) else math.nan,
+            peak_memory=cell.peak_memory(),
+        )
+
+
+def _log_ratio(value: float, baseline: float) -> float:
+    """Logarithm of a ratio of errors, within the cap on both sides."""
+    if value <= 0.0:
+        return -_CAP if baseline > 0.0 else 0.0
+    return float(np.clip(math.log(value) - math.log(max(baseline, 1e-300)), -_CAP, _CAP))
+
+
+def _overall(scenarios: Sequence[_Scenario]) -> list[OverallRow]:
+    names = sorted({n for s in scenarios for n in s.cells})
+    covers = {n: [s for s in scenarios if n in s.cells] for n in names}
+    references = [n for n in names if any(s.cells[n].reference for s in covers[n])]
+    entries = [n for n in names if n not in references]
+    used = [s for s in scenarios if any(n in s.cells for n in entries)]
+
+    pairs = [(n, s) for n in entries for s in covers[n]]
+    weights = _adjusted_means([(n, s.name) for n, s in pairs])
+    score, draws = {}, {}
+    for n in entries:
+        parts = [(w, s, m) for w, (m, s) in zip(weights[n].tolist(), pairs, strict=True) if abs(w) > 1e-12]
+        score[n] = float(sum(w * s.means[m] for w, s, m in parts))
+        draws[n] = np.sum([w * s.draws[m] for w, s, m in parts], axis=0)
+    for n in references:  # a plain mean over what they cover
+        score[n] = float(np.mean([s.means[n] for s in covers[n]]))
+        draws[n] = np.mean([s.draws[n] for s in covers[n]], axis=0)
+    several = {n: all(len(s.strata[n]) > 1 for s in covers[n]) for n in names}
+    spread = {n: interval(draws[n]) if several[n] else (math.nan, math.nan) for n in names}
+
+    ranked = {n: score[n] for n in entries if len(covers[n]) >= MIN_COVERAGE * len(used)}
+    places = tiers(ranked, lambda a, b: [s.differences(a, b) for s in scenarios if {a, b} <= s.cells.keys()])
+    order = list(places) + sorted((n for n in entries if n not in places), key=lambda n: (score[n], n))
+    order += sorted(references, key=lambda n: (score[n], n))
+    return [
+        _overall_row(n, k + 1, places.get(n), score[n], spread[n], covers[n], len(scenarios))
+        for k, n in enumerate(order)
+    ]
+
+
+def _overall_row(
+    name: str,
+    position: int,
+    place: Place | None,
+    score: float,
+    spread: tuple[float, float],
+    covers: Sequence[_Scenario],
+    scenarios: int,
+) -> OverallRow:
+    cells = [s.cells[name] for s in covers]
+    nees = np.concatenate([c.numbers("nees_horizontal") for c in cells])
+    seconds = [float(np.median(x)) for c in cells if len(x := c.numbers("update_median"))]
+    runs = sum(len(c.logs) for c in cells)
+    return OverallRow(
+        estimator=name,
+        reference=any(c.reference for c in cells),
+        rank=position if place else None,
+        tier=place.tier if place else None,
+        score=math.exp(score),
+        low=math.exp(spread[0]),
+        high=math.exp(spread[1]),
+        p_value=place.p_value if place else None,
+        covered=len(covers),
+        scenarios=scenarios,
+        runs=runs,
+        failed=runs - sum(c.statuses().get("ok", 0) for c in cells),
+        badge=badge(nees),
+        update_median=float(np.median(seconds)) if seconds else math.nan,
+        peak_memory=max(c.peak_memory() for c in cells),
+        ratios={s.name: math.exp(s.means[name]) for s in covers},
+    )
+
+
+def _adjusted_means(cells: Sequence[tuple[str, str]]) -> dict[str, Array]:
+    """Weights of the cells (estimator, scenario) in the adjusted mean of each estimator.
+
+    The additive model estimator + scenario is fitted by least squares; the adjusted mean is the estimator's effect plus
+    the mean of the scenario effects. Estimators without a chain of common scenarios cannot be adjusted to each other:
+    each such group is adjusted within itself. With full coverage the weights are those of a plain mean.
+    """
+    weights: dict[str, Array] = {}
+    left = list(range(len(cells)))
+    while left:
+        group, grown = [left[0]], True
+        while grown:  # all cells that share an estimator or a scenario with the group
+            rows, columns = {cells[i][0] for i in group}, {cells[i][1] for i in group}
+            more = [i for i in left if i not in group and (cells[i][0] in rows or cells[i][1] in columns)]
+            group += more
+            grown = bool(more)
+        left = [i for i in left if i not in group]
+        estimators = sorted({cells[i][0] for i in group})
+        scenarios = sorted({cells[i][1] for i in group})
+        # Effects: one an estimator, one a scenario with their sum zero (the last row), so that the mean effect is zero.
+        design = np.zeros((len(group) + 1, len(estimators) + len(scenarios)))
+        for row, i in enumerate(group):
+            design[row, estimators.index(cells[i][0])] = 1.0
+            design[row, len(estimators) + scenarios.index(cells[i][1])] = 1.0
+        design[-1, len(estimators) :] = 1.0
+        solution = np.linalg.pinv(design)[:, :-1]
+        for k, name in enumerate(estimators):
+            weights[name] = np.zeros(len(cells))
+            weights[name][group] = solution[k]
+    return weights
+
+
+def _plain(x: Any) -> Any:
+    if isinstance(x, Mapping):
+        return {str(k): _plain(v) for k, v in x.items()}
+    if isinstance(x, (list, tuple)):
+        return [_plain(v) for v in x]
+    if isinstance(x, float):
+        return x if math.isfinite(x) else None
+    return x

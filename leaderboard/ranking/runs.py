@@ -1,0 +1,143 @@
+"""Results condensed for pages and figures: per scenario and estimator, medians with intervals, bands over seeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simnav.leaderboard.figures.plots import Array, Band, Track
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.store import Result
+
+__all__ = ["Interval", "Runs", "group", "interval_of_median"]
+
+_RESAMPLES = 1000
+#: Statuses that say nothing about the estimator.
+NO_TRIAL = ("unsuitable", "no-recording")
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A median with its 95 % bootstrap interval; NaN where there is none."""
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+def interval_of_median(values: Iterable[float]) -> Interval:
+    """Median and its percentile-bootstrap interval over the runs; NaN is left out.
+
+    >>> interval_of_median([2.0, 2.0, 2.0])
+    Interval(value=2.0, low=2.0, high=2.0)
+    """
+    x = np.asarray([v for v in values if not math.isnan(v)], dtype=np.float64)
+    if not len(x):
+        return Interval(math.nan)
+    value = float(np.median(x))
+    if len(x) < 3 or not np.isfinite(x).all():
+        return Interval(value)
+    draws = np.random.default_rng(0).integers(0, len(x), (_RESAMPLES, len(x)))
+    low, high = np.quantile(np.median(x[draws], axis=1), (0.025, 0.975))
+    return Interval(value, float(low), float(high))
+
+
+class Runs:
+    """All runs of one estimator on one scenario.
+
+    Attributes
+    ----------
+    scenario, estimator : str
+    reference : bool
+    results : list of Result
+        In order of seed.
+    """
+
+    def __init__(self, results: Sequence[Result]):
+        self.results = sorted(results, key=lambda r: r.seed)
+        self.scenario, self.estimator = results[0].scenario, results[0].estimator
+        self.reference = any(r.reference for r in results)
+
+    @cached_property
+    def tried(self) -> list[Result]:
+        """Those for which the scenario suits the estimator."""
+        return [r for r in self.results if r.status not in NO_TRIAL]
+
+    @cached_property
+    def good(self) -> list[Result]:
+        """Those that ended well."""
+        return [r for r in self.tried if r.status == "ok"]
+
+    @property
+    def failed(self) -> int:
+        """Number of failures."""
+        return len(self.tried) - len(self.good)
+
+    def scores(self, name: str) -> list[float]:
+        """One score of the runs that ended well; NaN where it does not apply."""
+        return [float(r.scores.get(name, math.nan)) for r in self.good]
+
+    def score(self, name: str) -> Interval:
+        """Median of a score over the runs that ended well."""
+        return interval_of_median(self.scores(name))
+
+    def band(self, name: str, factor: float = 1.0) -> Band | None:
+        """Magnitude of an error over time, a row a run, on the time axis of the longest run; None without any."""
+        found = [(r.series["time"], np.abs(r.series[name])) for r in self.good if _has(r, name)]
+        if not found:
+            return None
+        time = max((t for t, _ in found), key=lambda t: float(t[-1])).astype(np.float64)
+        rows = [np.interp(time, t, v, right=np.nan) if len(t) != len(time) or not np.array_equal(t, time) else v
+                for t, v in found]  # fmt: skip
+        return Band(self.estimator, time, factor * np.asarray(rows, dtype=np.float64))
+
+    def quantiles(self) -> Band | None:
+        """Quantiles of the horizontal error, a row a run: their pooled distribution is that of all epochs."""
+        rows = [r.series["quantiles"] for r in self.good if _has(r, "quantiles")]
+        if not rows:
+            return None
+        values = np.asarray(rows, dtype=np.float64)
+        return Band(self.estimator, np.arange(values.shape[1], dtype=np.float64), values)
+
+    def at(self, seed: int) -> Result | None:
+        """The run with a seed, if it ended well."""
+        return next((r for r in self.good if r.seed == seed), None)
+
+
+def _has(result: Result, name: str) -> bool:
+    values = result.series.get(name)
+    return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
+
+
+def group(results: Iterable[Result]) -> dict[str, dict[str, Runs]]:
+    """Scenario -> estimator -> runs, both in the order in which they come."""
+    lists: dict[str, dict[str, list[Result]]] = {}
+    for r in results:
+        lists.setdefault(r.scenario, {}).setdefault(r.estimator, []).append(r)
+    return {s: {e: Runs(found) for e, found in by.items()} for s, by in lists.items()}
+
+
+def tracks(runs: Iterable[Runs], seed: int) -> tuple[Track | None, list[Track]]:
+    """Truth and estimates of one seed, from the series; (None, []) where no run of it has a track."""
+    truth: Array | None = None
+    estimates = []
+    for r in runs:
+        result = r.at(seed)
+        if result is None or not _has(result, "truth_north"):
+            continue
+        s = {k: np.asarray(v, dtype=np.float64) for k, v in result.series.items()}
+        known = np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"])
+        this = np.column_stack([s["truth_east"][known], s["truth_north"][known]])
+        if truth is None or len(this) > len(truth):
+            truth = this
+        if _has(result, "estimate_north"):
+            estimates.append(Track(r.estimator, s["estimate_east"], s["estimate_north"]))
+    if truth is None or not len(truth):
+        return None, []
+    return Track("truth", truth[:, 0], truth[:, 1]), estimates
