@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.cli.console import FAILED, Output, UserError, absolute, mistakes, sentence
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.runs import NO_TRIAL, group
+from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.results.plain import plain
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def evaluate(
     own = [r for r in results if r.estimator == mine.label]
     if own and all(r.status == "unsuitable" for r in own):
         raise UserError(f"{mine.label} does not suit {', '.join(sorted(wanted))}: {own[0].reason}")
-    return FAILED if any(r.status not in ("ok", *NO_TRIAL) for r in own) else 0
+    return FAILED if any(r.tried and r.status != "ok" for r in own) else 0
 
 
 @contextlib.contextmanager
@@ -210,7 +210,7 @@ def ranking_table(ranking: Ranking, results: Sequence[Result], mine: str | None 
 
 def standing(by: dict[str, Any], mine: str, scenario: str) -> dict[str, Any]:
     """How one estimator compares with each of the others on a scenario, paired by seed, on the horizontal RMSE."""
-    from simnav.scoring import compare
+    from simnav.leaderboard.ranking.statistics import compare
 
     def errors(label: str) -> dict[Any, float]:
         return {r.seed: r.scores.get("horizontal_rmse", math.nan) if r.status == "ok" else math.inf

@@ -1,4 +1,4 @@
-"""Our figure against a paper's: the interval over the runs, and the rule by which the two agree.
+"""Our figure against a paper's: the rule by which the two agree.
 
 A paper gives one figure, mostly without its scatter, from instruments and tracks that are only partly known. So the
 question is not whether the two are equal but whether they tell the same story:
@@ -20,13 +20,11 @@ question is not whether the two are equal but whether they tell the same story:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from simnav.leaderboard.papers.paper import Range, Rule
+from simnav.leaderboard.ranking.statistics import Interval
 
 __all__ = [
     "FEWEST",
@@ -34,20 +32,15 @@ __all__ = [
     "RULES",
     "TOLERANCE",
     "VAGUE",
-    "Interval",
     "Verdict",
     "judge",
     "judge_gain",
-    "mean",
-    "mean_ratio",
 ]
 
 TOLERANCE = 0.25
 GAIN = 1.5
 VAGUE = 0.5
 FEWEST = 3
-
-_LEVEL = 0.95
 
 #: The rule in short, for the command and the pages.
 RULES = (
@@ -58,16 +51,6 @@ RULES = (
     "factor of 1.5 of the paper's. Too wide an interval, or fewer than three runs, decide nothing. What differs has "
     "a note."
 )
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A mean over n runs with its 95 % interval; NaN where there is none."""
-
-    value: float
-    low: float
-    high: float
-    runs: int
 
 
 @dataclass(frozen=True)
@@ -83,42 +66,6 @@ class Verdict:
 
     word: Literal["agrees", "differs", "undecided"]
     side: int = 0
-
-
-def mean(values: Iterable[float]) -> Interval:
-    """Mean and Student's 95 % interval; values that are not finite are left out.
-
-    Examples
-    --------
-    Student's t with 2 degrees of freedom is 4.303; the standard error of 1, 2, 3 is 1 / sqrt(3).
-
-    >>> i = mean([1.0, 2.0, 3.0])
-    >>> i.value, round(i.high - 2.0, 3) == round(4.3027 / 3**0.5, 3)
-    (2.0, True)
-    """
-    x = np.array([v for v in values if math.isfinite(v)], dtype=np.float64)
-    if not len(x):
-        return Interval(math.nan, math.nan, math.nan, 0)
-    value = float(x.mean())
-    if len(x) < 2:
-        return Interval(value, math.nan, math.nan, len(x))
-    from scipy.stats import t
-
-    half = float(t.ppf(0.5 + 0.5 * _LEVEL, len(x) - 1)) * float(x.std(ddof=1)) / math.sqrt(len(x))
-    return Interval(value, value - half, value + half, len(x))
-
-
-def mean_ratio(a: Mapping[int, float], b: Mapping[int, float]) -> Interval:
-    """Geometric mean of a / b over the seeds that both have, with its interval; only positive scores have ratios.
-
-    Examples
-    --------
-    >>> mean_ratio({0: 2.0, 1: 8.0}, {0: 1.0, 1: 1.0, 2: 5.0}).value
-    4.0
-    """
-    seeds = [s for s in a if s in b and a[s] > 0.0 and b[s] > 0.0]
-    logs = mean(math.log(a[s] / b[s]) for s in seeds)
-    return Interval(math.exp(logs.value), math.exp(logs.low), math.exp(logs.high), logs.runs)
 
 
 def judge(ours: Interval, paper: Range, rule: Rule = "equal") -> Verdict:

@@ -15,11 +15,11 @@ import numpy as np
 
 from simnav.leaderboard.figures.plots import Band, Curve, Style, error_cdf, error_over_time, save, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
-from simnav.leaderboard.papers.comparison import Interval, mean, mean_ratio
 from simnav.leaderboard.papers.drawing import Bar, bars, curves_over_time
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.papers.paper import Figure, Gain, Range, Value
 from simnav.leaderboard.ranking.runs import Runs
+from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
 from simnav.types import Array
 
 if TYPE_CHECKING:

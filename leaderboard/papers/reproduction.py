@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.papers.comparison import Interval, Verdict, judge, judge_gain, mean, mean_ratio
+from simnav.leaderboard.papers.comparison import Verdict, judge, judge_gain
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row
-from simnav.leaderboard.ranking.runs import NO_TRIAL
+from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
@@ -222,7 +222,7 @@ def find(
     for name, runs in zip(names, all_runs, strict=True):
         if not any(r.status == "ok" for r in runs):
             reasons = [f"{name}: {r.reason}" for r in runs] or [f"{name}: no run"]
-            unsuitable = bool(runs) and all(r.status in NO_TRIAL for r in runs)
+            unsuitable = bool(runs) and not any(r.tried for r in runs)
             return Finding(table, row, None, "unsuitable" if unsuitable else "failed", reasons[0], names, len(runs))
     failures = [sum(r.status != "ok" for r in runs) for runs in all_runs]
     failed = sum(failures)

@@ -28,11 +28,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from simnav.leaderboard.ranking.runs import Run, Runs, group
 from simnav.leaderboard.ranking.statistics import (
     RESAMPLES,
     Array,
@@ -42,25 +42,20 @@ from simnav.leaderboard.ranking.statistics import (
     interval,
     tiers,
 )
+from simnav.leaderboard.results.plain import plain
 from simnav.scoring import badge
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["MIN_AVAILABILITY", "WORST", "OverallRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
+__all__ = ["WORST", "OverallRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
 
 #: Ratio to the oracle's error that stands for a failed run, and that no completed run exceeds.
 WORST = 1e6
-#: Least share of the epochs with a position in a run that does not count as failed.
-MIN_AVAILABILITY = 0.95
 #: Least share of the scenarios that an estimator covers to be ranked overall.
 MIN_COVERAGE = 0.5
 
-#: Statuses that say nothing about the estimator.
-_NO_TRIAL = ("unsuitable", "no-recording")
 _CAP = math.log(WORST)
-
-Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
 
 
 @dataclass(frozen=True)
@@ -195,9 +190,8 @@ class Ranking:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts and lists for JSON; numbers that are not finite become None."""
-        plain = _plain(asdict(self))
-        assert isinstance(plain, dict)
-        return plain
+        found: dict[str, Any] = plain(asdict(self))
+        return found
 
 
 def rank(
@@ -230,105 +224,39 @@ def rank(
     ValueError
         If an estimator has two results for one run.
     """
-    cells: dict[str, dict[str, _Cell]] = {}
-    for r in results:
-        cells.setdefault(r.scenario, {}).setdefault(r.estimator, _Cell(r.estimator, score)).add(r)
-    scenarios = [_Scenario(name, cells[name], oracle, resamples, k) for k, name in enumerate(sorted(cells))]
+    runs = group(results, score)
+    scenarios = [_Scenario(name, runs[name], oracle, resamples, k) for k, name in enumerate(sorted(runs))]
     return Ranking(score, tuple(_overall(scenarios)), tuple(s.ranking() for s in scenarios))
 
 
-class _Cell:
-    """All results of one estimator on one scenario."""
-
-    def __init__(self, estimator: str, score: str):
-        self.estimator, self.score = estimator, score
-        self.results: dict[Run, Result] = {}
-        self.logs: dict[Run, float] = {}  # log ratio to the baseline
-
-    def add(self, result: Result) -> None:
-        run = (result.seed, result.note)
-        if run in self.results:
-            raise ValueError(
-                f"two results of {result.estimator!r} on {result.scenario} for seed {result.seed}; keep one of them"
-            )
-        self.results[run] = result
-
-    @property
-    def reference(self) -> bool:
-        return any(r.reference for r in self.results.values())
-
-    @cached_property
-    def tried(self) -> dict[Run, Result]:
-        return {run: r for run, r in sorted(self.results.items()) if r.status not in _NO_TRIAL}
-
-    def status(self, result: Result) -> str:
-        """Status of a run as it counts here: "incomplete" where too little came out of a run that ended well."""
-        if result.status != "ok":
-            return result.status
-        sparse = self.score == "horizontal_rmse" and not result.scores.get("availability", 1.0) >= MIN_AVAILABILITY
-        return "incomplete" if sparse or not np.isfinite(self.value(result)) else "ok"
-
-    def value(self, result: Result) -> float:
-        return float(result.scores.get(self.score, math.nan))
-
-    @cached_property
-    def good(self) -> dict[Run, float]:
-        """The score of the completed runs."""
-        return {run: self.value(r) for run, r in self.tried.items() if self.status(r) == "ok"}
-
-    def median(self) -> float:
-        values = list(self.good.values())
-        return float(np.median(values)) if values else math.nan
-
-    def unsuitable(self) -> str:
-        """Why there is no score here, or nothing."""
-        if not self.tried:
-            reasons = sorted({r.reason or r.status for r in self.results.values()})
-            return reasons[0]
-        ended = [r for r in self.tried.values() if r.status == "ok"]
-        if ended and len(ended) == len(self.tried) and not any(np.isfinite(self.value(r)) for r in ended):
-            return f"has no {self.score}"
-        return ""
-
-    def numbers(self, name: str) -> Array:
-        """A score over all runs, those that failed included as far as they went; only where it is finite."""
-        x = np.array([r.scores.get(name, math.nan) for r in self.tried.values()], dtype=np.float64)
-        return x[np.isfinite(x)]
-
-    def statuses(self) -> dict[str, int]:
-        found = [self.status(r) for r in self.tried.values()]
-        return {s: found.count(s) for s in sorted(set(found))}
-
-    def peak_memory(self) -> int:
-        return max((int(r.peak_memory) for r in self.tried.values()), default=0)
-
-
 class _Scenario:
-    """The cells of one scenario with their log ratios."""
+    """The runs of one scenario with their log ratios."""
 
-    def __init__(self, name: str, cells: Mapping[str, _Cell], oracle: str, resamples: int, index: int):
+    def __init__(self, name: str, cells: Mapping[str, Runs], oracle: str, resamples: int, index: int):
         self.name = name
         self.unsuitable = {n: why for n in sorted(cells) if (why := cells[n].unsuitable())}
         self.cells = {n: cells[n] for n in sorted(cells) if n not in self.unsuitable}
         self.baseline, errors, constant = self._baseline(oracle)
-        for cell in self.cells.values():
-            good = cell.good
-            for run in cell.tried:
-                cell.logs[run] = _log_ratio(good[run], errors.get(run, constant)) if run in good else _CAP
-        self.strata = {n: np.array(list(c.logs.values())) for n, c in self.cells.items()}
+        self.logs: dict[str, dict[Run, float]] = {}
+        for n, cell in self.cells.items():
+            good, tried = cell.completed, [(r.seed, r.note) for r in cell.tried]
+            self.logs[n] = {
+                run: _log_ratio(good[run], errors.get(run, constant)) if run in good else _CAP for run in tried
+            }
+        self.strata = {n: np.array(list(logs.values())) for n, logs in self.logs.items()}
         self.means = {n: interquartile_mean(x) for n, x in self.strata.items()}
         self.draws = {n: bootstrap_means([x], resamples=resamples, seed=index)[:, 0] for n, x in self.strata.items()}
 
     def _baseline(self, oracle: str) -> tuple[str, dict[Run, float], float]:
         """In words, by run, and for runs without one."""
-        medians = {n: m for n, c in self.cells.items() if math.isfinite(m := c.median())}
+        medians = {n: m for n, c in self.cells.items() if math.isfinite(m := _median(c.completed.values()))}
         references = {n: m for n, m in medians.items() if self.cells[n].reference and oracle in n}
         if oracle in references:
             references = {oracle: references[oracle]}
         ranked = {n: m for n, m in medians.items() if not self.cells[n].reference}
         if references:
             name = min(references, key=lambda n: (references[n], n))
-            return f"{name}, on the same run", self.cells[name].good, references[name]
+            return f"{name}, on the same run", self.cells[name].completed, references[name]
         if ranked:
             name = min(ranked, key=lambda n: (ranked[n], n))
             return f"median of {name}, the best here: no oracle ran", {}, ranked[name]
@@ -336,7 +264,7 @@ class _Scenario:
 
     def differences(self, a: str, b: str) -> Array:
         """Paired differences of log ratios over the runs that both have."""
-        mine, other = self.cells[a].logs, self.cells[b].logs
+        mine, other = self.logs[a], self.logs[b]
         if mine.keys() == other.keys():
             return np.asarray(self.strata[a] - self.strata[b])
         return np.array([mine[run] - other[run] for run in mine if run in other])
@@ -352,7 +280,7 @@ class _Scenario:
     def _row(self, name: str, position: int | None, place: Place | None) -> ScenarioRow:
         cell, x = self.cells[name], self.strata[name]
         low, high = interval(self.draws[name]) if len(x) > 1 else (math.nan, math.nan)
-        statuses = cell.statuses()
+        statuses = cell.statuses
         nees, seconds = cell.numbers("nees_horizontal"), cell.numbers("update_median")
         return ScenarioRow(
             estimator=name,
@@ -363,15 +291,20 @@ class _Scenario:
             low=math.exp(low),
             high=math.exp(high),
             p_value=place.p_value if place else None,
-            median=cell.median(),
+            median=_median(cell.completed.values()),
             runs=len(x),
             failed=len(x) - statuses.get("ok", 0),
             statuses=statuses,
             badge=badge(nees),
             nees=float(np.mean(nees)) if len(nees) else math.nan,
-            update_median=float(np.median(seconds)) if len(seconds) else math.nan,
-            peak_memory=cell.peak_memory(),
+            update_median=_median(seconds),
+            peak_memory=cell.peak_memory,
         )
+
+
+def _median(values: Iterable[float]) -> float:
+    found = list(values)
+    return float(np.median(found)) if found else math.nan
 
 
 def _log_ratio(value: float, baseline: float) -> float:
@@ -423,7 +356,7 @@ def _overall_row(
     cells = [s.cells[name] for s in covers]
     nees = np.concatenate([c.numbers("nees_horizontal") for c in cells])
     seconds = [float(np.median(x)) for c in cells if len(x := c.numbers("update_median"))]
-    runs = sum(len(c.logs) for c in cells)
+    runs = sum(len(c.tried) for c in cells)
     return OverallRow(
         estimator=name,
         reference=any(c.reference for c in cells),
@@ -436,10 +369,10 @@ def _overall_row(
         covered=len(covers),
         scenarios=scenarios,
         runs=runs,
-        failed=runs - sum(c.statuses().get("ok", 0) for c in cells),
+        failed=runs - sum(c.statuses.get("ok", 0) for c in cells),
         badge=badge(nees),
-        update_median=float(np.median(seconds)) if seconds else math.nan,
-        peak_memory=max(c.peak_memory() for c in cells),
+        update_median=_median(seconds),
+        peak_memory=max(c.peak_memory for c in cells),
         ratios={s.name: math.exp(s.means[name]) for s in covers},
     )
 
@@ -474,13 +407,3 @@ def _adjusted_means(cells: Sequence[tuple[str, str]]) -> dict[str, Array]:
             weights[name] = np.zeros(len(cells))
             weights[name][group] = solution[k]
     return weights
-
-
-def _plain(x: Any) -> Any:
-    if isinstance(x, Mapping):
-        return {str(k): _plain(v) for k, v in x.items()}
-    if isinstance(x, (list, tuple)):
-        return [_plain(v) for v in x]
-    if isinstance(x, float):
-        return x if math.isfinite(x) else None
-    return x

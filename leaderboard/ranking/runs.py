@@ -1,55 +1,38 @@
-"""Results condensed for pages and figures: per scenario and estimator, medians with intervals, bands over seeds."""
+"""All runs of one estimator on one scenario, condensed: what ranking, pages and figures read."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simnav.leaderboard.figures.plots import Array, Band, Track
+from simnav.leaderboard.ranking.statistics import Interval, median
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.results.store import Result
+    from simnav.leaderboard.results.result import Result
 
-__all__ = ["Interval", "Runs", "group", "interval_of_median"]
+__all__ = ["MIN_AVAILABILITY", "Run", "Runs", "group", "tracks"]
 
-_RESAMPLES = 1000
-#: Statuses that say nothing about the estimator.
-NO_TRIAL = ("unsuitable", "no-recording")
+#: Least share of the epochs with a position in a run that does not count as failed.
+MIN_AVAILABILITY = 0.95
 
-
-@dataclass(frozen=True)
-class Interval:
-    """A median with its 95 % bootstrap interval; NaN where there is none."""
-
-    value: float
-    low: float = math.nan
-    high: float = math.nan
-
-
-def interval_of_median(values: Iterable[float]) -> Interval:
-    """Median and its percentile-bootstrap interval over the runs; NaN is left out.
-
-    >>> interval_of_median([2.0, 2.0, 2.0])
-    Interval(value=2.0, low=2.0, high=2.0)
-    """
-    x = np.asarray([v for v in values if not math.isnan(v)], dtype=np.float64)
-    if not len(x):
-        return Interval(math.nan)
-    value = float(np.median(x))
-    if len(x) < 3 or not np.isfinite(x).all():
-        return Interval(value)
-    draws = np.random.default_rng(0).integers(0, len(x), (_RESAMPLES, len(x)))
-    low, high = np.quantile(np.median(x[draws], axis=1), (0.025, 0.975))
-    return Interval(value, float(low), float(high))
+Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
 
 
 class Runs:
     """All runs of one estimator on one scenario.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        At least one.
+    ranked : str
+        Key of `simnav.scoring.SCORES` that the ranking is by; it decides which runs are `completed`.
 
     Attributes
     ----------
@@ -57,17 +40,26 @@ class Runs:
     reference : bool
     results : list of Result
         In order of seed.
+
+    Raises
+    ------
+    ValueError
+        If there are two results for one run.
     """
 
-    def __init__(self, results: Sequence[Result]):
-        self.results = sorted(results, key=lambda r: r.seed)
-        self.scenario, self.estimator = results[0].scenario, results[0].estimator
+    def __init__(self, results: Sequence[Result], ranked: str = "horizontal_rmse"):
+        self.results = sorted(results, key=_run)
+        self.scenario, self.estimator, self.ranked = results[0].scenario, results[0].estimator, ranked
         self.reference = any(r.reference for r in results)
+        for a, b in pairwise(self.results):
+            if _run(a) == _run(b):
+                what = f"two results of {self.estimator!r} on {self.scenario} for seed {a.seed}"
+                raise ValueError(f"{what}; keep one of them")
 
     @cached_property
     def tried(self) -> list[Result]:
         """Those for which the scenario suits the estimator."""
-        return [r for r in self.results if r.status not in NO_TRIAL]
+        return [r for r in self.results if r.tried]
 
     @cached_property
     def good(self) -> list[Result]:
@@ -79,13 +71,56 @@ class Runs:
         """Number of failures."""
         return len(self.tried) - len(self.good)
 
+    @property
+    def peak_memory(self) -> int:
+        """Largest of all runs [bytes]."""
+        return max((int(r.peak_memory) for r in self.tried), default=0)
+
     def scores(self, name: str) -> list[float]:
         """One score of the runs that ended well; NaN where it does not apply."""
         return [float(r.scores.get(name, math.nan)) for r in self.good]
 
     def score(self, name: str) -> Interval:
         """Median of a score over the runs that ended well."""
-        return interval_of_median(self.scores(name))
+        return median(self.scores(name))
+
+    def numbers(self, name: str) -> Array:
+        """A score over all runs, those that failed included as far as they went; only where it is finite."""
+        x = np.array([r.scores.get(name, math.nan) for r in self.tried], dtype=np.float64)
+        return x[np.isfinite(x)]
+
+    # -- as the ranking counts them ------------------------------------------------------------------
+
+    def status(self, result: Result) -> str:
+        """Status of a run in the ranking: "incomplete" where too little came out of a run that ended well."""
+        if result.status != "ok":
+            return result.status
+        sparse = self.ranked == "horizontal_rmse" and not result.scores.get("availability", 1.0) >= MIN_AVAILABILITY
+        return "incomplete" if sparse or not math.isfinite(self._value(result)) else "ok"
+
+    @cached_property
+    def statuses(self) -> dict[str, int]:
+        """How many runs have which `status`."""
+        found = [self.status(r) for r in self.tried]
+        return {s: found.count(s) for s in sorted(set(found))}
+
+    @cached_property
+    def completed(self) -> dict[Run, float]:
+        """The ranked score of the runs that are ok in the ranking."""
+        return {_run(r): self._value(r) for r in self.tried if self.status(r) == "ok"}
+
+    def unsuitable(self) -> str:
+        """Why the ranking has no score here, or nothing."""
+        if not self.tried:
+            return min(r.reason or r.status for r in self.results)
+        if len(self.good) == len(self.tried) and not any(math.isfinite(self._value(r)) for r in self.good):
+            return f"has no {self.ranked}"
+        return ""
+
+    def _value(self, result: Result) -> float:
+        return float(result.scores.get(self.ranked, math.nan))
+
+    # -- curves --------------------------------------------------------------------------------------
 
     def band(self, name: str, factor: float = 1.0) -> Band | None:
         """Magnitude of an error over time, a row a run, on the time axis of the longest run; None without any."""
@@ -110,17 +145,21 @@ class Runs:
         return next((r for r in self.good if r.seed == seed), None)
 
 
+def _run(result: Result) -> Run:
+    return result.seed, result.note
+
+
 def _has(result: Result, name: str) -> bool:
     values = result.series.get(name)
     return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
 
 
-def group(results: Iterable[Result]) -> dict[str, dict[str, Runs]]:
+def group(results: Iterable[Result], ranked: str = "horizontal_rmse") -> dict[str, dict[str, Runs]]:
     """Scenario -> estimator -> runs, both in the order in which they come."""
     lists: dict[str, dict[str, list[Result]]] = {}
     for r in results:
         lists.setdefault(r.scenario, {}).setdefault(r.estimator, []).append(r)
-    return {s: {e: Runs(found) for e, found in by.items()} for s, by in lists.items()}
+    return {s: {e: Runs(found, ranked) for e, found in by.items()} for s, by in lists.items()}
 
 
 def tracks(runs: Iterable[Runs], seed: int) -> tuple[Track | None, list[Track]]:

@@ -1,43 +1,128 @@
-"""Statistics of a few runs: interquartile mean, stratified bootstrap, multiple paired tests, tiers.
+"""All intervals and tests: figures of a few runs, how sure they are, and who can be told from whom.
 
+Intervals are of 95 % and come as `Interval`:
+
+- `median`: with a bootstrap interval; what tables show of one estimator.
+- `mean`, `mean_ratio`: with Student's interval; what is compared with figures of papers.
 - `interquartile_mean`: robust like the median, far less noisy with few runs (Agarwal et al., *Deep reinforcement
-  learning at the edge of the statistical precipice*, NeurIPS 2021).
-- `bootstrap_means`, `interval`: percentile bootstrap, resampled within each stratum (scenario).
-- `holm`: p-values adjusted for many tests (Holm, *A simple sequentially rejective multiple test procedure*, 1979).
-- `stratified_test`: paired, over several scenarios that count the same, by sign flips (E. J. G. Pitman 1937).
-- `tiers`: who cannot be told from the best, who not from the best of the rest, and so on.
+  learning at the edge of the statistical precipice*, NeurIPS 2021); what is ranked. `bootstrap_means` resamples it
+  within each stratum (scenario), and `interval` reads the percentiles of any bootstrap distribution.
 
-The paired test on one scenario is `simnav.scoring.paired_test`.
+Tests are paired by run:
+
+- `paired_test`: on one scenario, by signed ranks; `compare`: the same with the ratio of two scores (`simnav.scoring`).
+- `stratified_test`: over several scenarios that count the same, by sign flips (E. J. G. Pitman 1937).
+- `holm`: p-values adjusted for many tests (Holm, *A simple sequentially rejective multiple test procedure*, 1979).
+- `tiers`: who cannot be told from the best, who not from the best of the rest, and so on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simnav.scoring import paired_test
+from simnav.scoring import compare, paired_test
 
 __all__ = [
     "RESAMPLES",
+    "Interval",
     "Place",
     "bootstrap_means",
+    "compare",
     "holm",
     "interquartile_mean",
     "interval",
+    "mean",
+    "mean_ratio",
+    "median",
+    "paired_test",
     "stratified_test",
     "tiers",
 ]
 
 Array = NDArray[np.float64]
 
-#: Bootstrap resamples.
-RESAMPLES = 2000
+#: Probability of all intervals.
+LEVEL = 0.95
+#: Bootstrap resamples: of the ranking, of a median.
+RESAMPLES, _MEDIAN_RESAMPLES = 2000, 1000
 #: Sign flips of a test; of up to `_FEW` differences all are tried.
 _FLIPS, _FEW = 20_000, 12
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A figure with its 95 % interval.
+
+    Attributes
+    ----------
+    value, low, high : float
+        NaN where there is none.
+    runs : int
+        How many runs it is of.
+    """
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+    runs: int = 0
+
+
+def median(values: Iterable[float]) -> Interval:
+    """Median and its percentile-bootstrap interval, from three runs on; NaN is left out.
+
+    >>> median([2.0, 2.0, 2.0])
+    Interval(value=2.0, low=2.0, high=2.0, runs=3)
+    """
+    x = np.asarray([v for v in values if not math.isnan(v)], dtype=np.float64)
+    if not len(x):
+        return Interval(math.nan)
+    value = float(np.median(x))
+    if len(x) < 3 or not np.isfinite(x).all():
+        return Interval(value, runs=len(x))
+    draws = np.random.default_rng(0).integers(0, len(x), (_MEDIAN_RESAMPLES, len(x)))
+    return Interval(value, *interval(np.median(x[draws], axis=1)), len(x))
+
+
+def mean(values: Iterable[float]) -> Interval:
+    """Mean and Student's interval, from two runs on; values that are not finite are left out.
+
+    Examples
+    --------
+    Student's t with 2 degrees of freedom is 4.303; the standard error of 1, 2, 3 is 1 / sqrt(3).
+
+    >>> i = mean([1.0, 2.0, 3.0])
+    >>> i.value, round(i.high - 2.0, 3) == round(4.3027 / 3**0.5, 3)
+    (2.0, True)
+    """
+    x = np.array([v for v in values if math.isfinite(v)], dtype=np.float64)
+    if not len(x):
+        return Interval(math.nan)
+    value = float(x.mean())
+    if len(x) < 2:
+        return Interval(value, runs=len(x))
+    from scipy.stats import t
+
+    half = float(t.ppf(0.5 + 0.5 * LEVEL, len(x) - 1)) * float(x.std(ddof=1)) / math.sqrt(len(x))
+    return Interval(value, value - half, value + half, len(x))
+
+
+def mean_ratio(a: Mapping[int, float], b: Mapping[int, float]) -> Interval:
+    """Geometric mean of a / b over the seeds that both have, with its interval; only positive scores have ratios.
+
+    Examples
+    --------
+    >>> mean_ratio({0: 2.0, 1: 8.0}, {0: 1.0, 1: 1.0, 2: 5.0}).value
+    4.0
+    """
+    seeds = [s for s in a if s in b and a[s] > 0.0 and b[s] > 0.0]
+    logs = mean(math.log(a[s] / b[s]) for s in seeds)
+    return Interval(math.exp(logs.value), math.exp(logs.low), math.exp(logs.high), logs.runs)
 
 
 def _weights(n: int) -> Array:
@@ -105,7 +190,7 @@ def bootstrap_means(strata: Sequence[ArrayLike], *, resamples: int = RESAMPLES, 
     return np.stack(columns, axis=1)
 
 
-def interval(distribution: ArrayLike, level: float = 0.95) -> tuple[float, float]:
+def interval(distribution: ArrayLike, level: float = LEVEL) -> tuple[float, float]:
     """Percentile interval of a bootstrap distribution.
 
     Parameters

@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["BATCH", "FORMAT", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
+__all__ = ["BATCH", "FORMAT", "NO_TRIAL", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
 
 #: Version of the format of results.
 FORMAT = 1
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
+
+#: Statuses that say nothing about the estimator.
+NO_TRIAL = ("unsuitable", "no-recording")
 
 Series = NDArray[np.float32]
 
@@ -80,6 +83,11 @@ class Result:
     def variant(self) -> str:
         """The key without the seed."""
         return self.key.rpartition("-")[0]
+
+    @property
+    def tried(self) -> bool:
+        """Whether the run says something about the estimator."""
+        return self.status not in NO_TRIAL
 
 
 def schema() -> pa.Schema:

@@ -34,7 +34,8 @@ from simnav.leaderboard.ranking.ranking_table import (
     score_caption,
     sortable,
 )
-from simnav.leaderboard.ranking.runs import NO_TRIAL, Interval, Runs, group
+from simnav.leaderboard.ranking.runs import Runs, group
+from simnav.leaderboard.ranking.statistics import Interval
 from simnav.leaderboard.results import export
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, ExtraPage, environment
 from simnav.leaderboard.site.scenario_figures import catalogued, scenario_figures, write_figure
@@ -301,7 +302,7 @@ class _Site:
     # -- index -----------------------------------------------------------------------------------
 
     def _index(self) -> dict[str, Any]:
-        tried = [r for r in self.results if r.status not in NO_TRIAL]
+        tried = [r for r in self.results if r.tried]
         facts = [
             ("Scenarios", len(self.scenarios)),
             ("Estimators", len(self.estimators)),

@@ -18,7 +18,7 @@ from simnav.leaderboard.cli import app
 from simnav.leaderboard.figures.plots import Style
 from simnav.leaderboard.papers import PAPERS, paper_001
 from simnav.leaderboard.papers import paper as papers
-from simnav.leaderboard.papers.comparison import Interval, judge, judge_gain, mean, mean_ratio
+from simnav.leaderboard.papers.comparison import judge, judge_gain
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.drawing import Bar, bars, broken
 from simnav.leaderboard.papers.figures import ERRORS
@@ -27,6 +27,7 @@ from simnav.leaderboard.papers.page import find as find_pages
 from simnav.leaderboard.papers.paper import Figure, Gain, Left, Method, Paper, Table, Value
 from simnav.leaderboard.papers.report import paper_tables, summary, write_csv
 from simnav.leaderboard.papers.reproduction import Reproduction, find, find_method
+from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
 from simnav.leaderboard.results.result import Result
 from simnav.scenario import load
 from simnav.scoring import SCORES

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +16,7 @@ from simnav.leaderboard.ranking.statistics import (
     holm,
     interquartile_mean,
     interval,
+    median,
     stratified_test,
     tiers,
 )
@@ -173,3 +175,14 @@ def test_equal_entries_rarely_fall_into_different_tiers() -> None:
         split += max(p.tier for p in places.values()) > 1
     # The leader is chosen for its luck, so somewhat more than 5 % is expected.
     assert split / 150 < 0.2
+
+
+def test_median_interval_is_that_of_the_bootstrap():
+    values = np.random.default_rng(1).normal(10.0, 1.0, 400)
+    found = median(values)
+    spread = 1.2533 / math.sqrt(400)  # standard error of a normal sample's median
+    assert found.value == np.median(values)
+    assert found.low == pytest.approx(found.value - 1.96 * spread, abs=0.05)
+    assert found.high == pytest.approx(found.value + 1.96 * spread, abs=0.05)
+    assert math.isnan(median([math.nan]).value)
+    assert math.isnan(median([1.0, 2.0]).low)

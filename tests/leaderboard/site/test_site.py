@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.ranking import ranking
-from simnav.leaderboard.ranking.runs import Runs, group, interval_of_median
 from simnav.leaderboard.results.export import SCHEMA_VERSION
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import site
@@ -283,32 +282,3 @@ def test_where_everything_failed_there_is_still_a_site(tmp_path):
     page = Page(site.build(few, rank(few), tmp_path / "site"))
     assert "3 of 3" in page.text
     assert "failed" in page.text
-
-
-def test_median_interval_is_that_of_the_bootstrap():
-    values = np.random.default_rng(1).normal(10.0, 1.0, 400)
-    found = interval_of_median(values)
-    spread = 1.2533 / math.sqrt(400)  # standard error of a normal sample's median
-    assert found.value == np.median(values)
-    assert found.low == pytest.approx(found.value - 1.96 * spread, abs=0.05)
-    assert found.high == pytest.approx(found.value + 1.96 * spread, abs=0.05)
-    assert math.isnan(interval_of_median([math.nan]).value)
-    assert math.isnan(interval_of_median([1.0, 2.0]).low)
-
-
-def test_runs_of_different_length_share_a_time_axis():
-    def run(seed: int, end: float) -> Result:
-        time = np.linspace(0.0, end, 11, dtype=np.float32)
-        return Result("s-v1", seed, "e", {}, False, "ok", "", {}, {"time": time, "horizontal": 2.0 * time})
-
-    band = Runs([run(0, 50.0), run(1, 100.0)]).band("horizontal")
-    np.testing.assert_allclose(band.time, np.linspace(0.0, 100.0, 11))
-    np.testing.assert_allclose(band.values[1], 2.0 * band.time)
-    np.testing.assert_allclose(band.values[0, :6], 2.0 * band.time[:6])
-    assert np.isnan(band.values[0, 6:]).all()
-
-
-def test_failures_do_not_count_as_runs_that_do_not_suit(results):
-    runs = group(results)[SCENARIOS[1]]
-    assert runs["inertial"].tried == []
-    assert (runs[HOSTILE].failed, len(runs[HOSTILE].good)) == (1, 5)
