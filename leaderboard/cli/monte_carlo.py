@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from simnav.leaderboard.cli.console import FAILED, Output, UserError, absolute, mistakes, sentence
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.ranking_table import ranking_table
 from simnav.leaderboard.ranking.runs import group
+from simnav.leaderboard.ranking.standing import standing, standing_table
 from simnav.leaderboard.results.plain import plain
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.leaderboard.ranking.ranking import Ranking
@@ -157,9 +156,9 @@ def evaluate(
     ranking = _rank(results)
     stands = [standing(by, mine.label, s) for s, by in group(results).items()]
     out.document({"estimator": mine.label, "scenarios": [s.id for s in scenarios], "seeds": list(seeds),
-                  "ranking": ranking.to_dict(), "comparisons": stands,
+                  "ranking": ranking.to_dict(), "comparisons": [plain(s) for s in stands],
                   "results": None if keep is None else str(absolute(keep))})  # fmt: skip
-    out.print(ranking_table(ranking, results, mine.label))
+    out.print(ranking_table(ranking, results, [mine.label]))
     for stand in stands:
         out.print(standing_table(stand))
     _print_failures(out, results)
@@ -186,77 +185,6 @@ def _rank(results: Sequence[Result]) -> Ranking:
     from simnav.leaderboard.ranking.ranking import rank
 
     return rank(results)
-
-
-def ranking_table(ranking: Ranking, results: Sequence[Result], mine: str | None = None) -> Table:
-    """The overall ranking."""
-    from simnav.leaderboard.ranking.ranking_table import SCORE_TITLE, ranking_rows, score_caption
-
-    content = ranking.to_dict()
-    rows = ranking_rows(content, results)
-    columns = ["rank", "tier", "estimator", SCORE_TITLE, "95 % interval", "consistency", "95 % coverage", "failed",
-               "per epoch", "memory"]  # fmt: skip
-    cells = [
-        [r["rank"], r["tier"], r["label"] + (" *" if r["reference"] else ""), r["score"], r["interval"], r["badge"],
-         r["coverage"], f"{r['failed']} of {r['runs']}", r["cost"], r["memory"]]
-        for r in rows
-    ]  # fmt: skip
-    reference = [i for i, r in enumerate(rows) if r["reference"]]
-    caption = score_caption(content) + (" * reference: told the truth, not ranked." if reference else "")
-    own = [i for i, r in enumerate(rows) if r["label"] == mine]
-    numeric = ["rank", "tier", SCORE_TITLE, "95 % coverage", "failed", "per epoch", "memory"]
-    return tables.table("Ranking", columns, cells, numeric=numeric, dim=reference, strong=own, caption=caption)
-
-
-def standing(by: dict[str, Any], mine: str, scenario: str) -> dict[str, Any]:
-    """How one estimator compares with each of the others on a scenario, paired by seed, on the horizontal RMSE."""
-    from simnav.leaderboard.ranking.statistics import compare
-
-    def errors(label: str) -> dict[Any, float]:
-        return {r.seed: r.scores.get("horizontal_rmse", math.nan) if r.status == "ok" else math.inf
-                for r in by[label].tried}  # fmt: skip
-
-    rows: list[dict[str, Any]] = []
-    for label, runs in by.items():
-        score = runs.score("horizontal_rmse")
-        row = {"estimator": label, "reference": runs.reference, "runs": len(runs.tried), "failed": runs.failed,
-               "horizontal_rmse": score.value, "low": score.low, "high": score.high, "ratio": None, "ratio_low": None,
-               "ratio_high": None, "better": None, "p_value": None}  # fmt: skip
-        if label != mine and mine in by and runs.tried and by[mine].tried:
-            with contextlib.suppress(ValueError):  # no seed in common, or errors of zero
-                c = compare(errors(mine), errors(label))
-                row |= {"ratio": c.ratio, "ratio_low": math.exp(c.low), "ratio_high": math.exp(c.high),
-                        "better": c.better, "p_value": c.p_value}  # fmt: skip
-        if runs.tried:
-            rows.append(row)
-    rows.sort(key=lambda r: r["horizontal_rmse"] if r["horizontal_rmse"] == r["horizontal_rmse"] else math.inf)
-    ranked = [r["estimator"] for r in rows if not r["reference"]]
-    place = ranked.index(mine) + 1 if mine in ranked else None
-    return {"scenario": scenario, "estimator": mine, "place": place, "of": len(ranked), "rows": plain(rows)}
-
-
-def standing_table(stand: dict[str, Any]) -> Table:
-    """The table of `standing`."""
-    rows = []
-    for r in stand["rows"]:
-        better = "" if r["better"] is None else tables.percent(r["better"])
-        ratio = "" if r["ratio"] is None else tables.interval(r["ratio"], r["ratio_low"], r["ratio_high"])
-        p = "" if r["p_value"] is None else ("< 0.001" if r["p_value"] < 0.001 else f"{r['p_value']:.3f}")
-        rows.append([r["estimator"] + (" *" if r["reference"] else ""), f"{r['failed']} of {r['runs']}",
-                     tables.interval(r["horizontal_rmse"], r["low"], r["high"]), ratio, better, p])  # fmt: skip
-    mine = stand["estimator"]
-    columns = ["estimator", "failed", "horizontal RMSE [m]", f"{mine} / it", f"{mine} better in", "p"]
-    place = f"is {stand['place']} of {stand['of']}" if stand["place"] else "does not suit it"
-    return tables.table(
-        f"{stand['scenario']}: {mine} {place}",
-        columns,
-        rows,
-        numeric=columns[1:],
-        dim=[i for i, r in enumerate(stand["rows"]) if r["reference"]],
-        strong=[i for i, r in enumerate(stand["rows"]) if r["estimator"] == mine],
-        caption="Median over the seeds with its 95 % interval. Ratio: geometric mean over the same seeds; below 1 "
-        "the estimator is better. p: Wilcoxon signed-rank test. * reference: told the truth.",
-    )
 
 
 def _failures(results: Sequence[Result]) -> dict[str, int]:

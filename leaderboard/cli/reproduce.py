@@ -79,7 +79,7 @@ def run(
         drawn = figures.write_figures(found, folder, lambda done, total, note: bar(done, total, note=note))
     written = page.write(found, drawn, folder)
     paths = [d.path for d in drawn if d.path is not None]
-    out.document({**found.to_dict(), "contents": report.contents_rows(found, drawn), "csv": str(table),
+    out.document({**found.to_dict(), "contents": report.whereabouts(found, drawn), "csv": str(table),
                   "page": str(written), "figures": [str(p) for p in paths]})  # fmt: skip
     out.print(f"Paper {key}: {chosen.title}", f"{chosen.citation}\n")
     for shown in report.paper_tables(found):

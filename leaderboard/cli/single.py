@@ -134,15 +134,12 @@ def _times(value: float | None, factor: float) -> float | None:
 
 def simulate(out: Output, scenario: Scenario, seed: int, output: Path, csv: Path | None) -> None:
     """Write the recording of a run as .npz, and as CSV where asked."""
+    from simnav.leaderboard.results.formats import write
+
     recording = record(scenario, seed)
     target = absolute(output)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    recording.save(target)
-    written = []
-    if csv is not None:
-        from simnav.leaderboard.results.recording_csv import write
-
-        written = write(recording, absolute(csv))
+    write("recording", "npz", recording, target)
+    written = [] if csv is None else write("recording", "csv", recording, absolute(csv))
     counts = {name: len(stream) for name, stream in recording.data.aids.items()}
     out.document(
         {

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import math
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from simnav.leaderboard.results.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -272,10 +273,7 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
             if kind == "svg":
                 content = _follow_theme(content.decode()).encode()
             target = path.with_suffix(f".{kind}")
-            partial = target.with_name(f".{target.name}.part")
-            partial.write_bytes(content)
-            os.replace(partial, target)
-            written.append(target)
+            written.append(write_whole(target, content))
     return written
 
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -80,17 +80,15 @@ class Drawn:
     height: int = 0
     missing: tuple[str, ...] = ()
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "number": _number(self.figure),
-            "title": _title(self.figure),
-            "file": None if self.path is None else self.path.name,
-            "caption": self.caption,
-            "width": self.width,
-            "height": self.height,
-            "missing": list(self.missing),
-        }
+    @property
+    def number(self) -> str:
+        """With the letter of its part, where it has one."""
+        return _number(self.figure)
+
+    @property
+    def title(self) -> str:
+        """What it shows."""
+        return _title(self.figure)
 
 
 def write_figures(

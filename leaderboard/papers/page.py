@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import json
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter
 
 from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers.comparison import RULES
-from simnav.leaderboard.papers.report import NUMERIC, contents_rows, sheets, summary
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.papers.report import NUMERIC, Whereabouts, sheets, summary, whereabouts
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.site.content import SiteFacts
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 
 if TYPE_CHECKING:
@@ -25,22 +27,62 @@ __all__ = ["PaperPage", "find", "write"]
 _FORMAT = 1  # of the document
 
 
-def write(found: Reproduction, drawn: Sequence[Drawn], folder: Path) -> Path:
-    """Write ``paper-KEY.html`` and ``paper-KEY.json`` (what the page is made of) into the folder of the figures.
+@dataclass(frozen=True)
+class _Column:
+    title: str
+    numeric: bool
 
-    Returns
-    -------
-    Path
-        Of the page.
-    """
-    key = found.paper.key
-    document = plain(_document(found, drawn))
-    _replace(folder / f"paper-{key}.json", json.dumps(document, indent=1, ensure_ascii=False) + "\n")
-    for name in STATIC:
-        shutil.copyfile(TEMPLATES / name, folder / name)
-    target = folder / f"paper-{key}.html"
-    _replace(target, _render(document, "", {"papers": [], "scenarios": [], "total": 0}))
-    return target
+
+@dataclass(frozen=True)
+class _Row:
+    cells: list[str]
+    verdict: str
+
+
+@dataclass(frozen=True)
+class _Table:
+    title: str
+    number: str
+    columns: list[_Column]
+    rows: list[_Row]
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class _Figure:
+    number: str
+    title: str
+    file: str
+    caption: str
+    width: int
+    height: int
+    missing: list[str]
+
+
+@dataclass(frozen=True)
+class _Document:
+    """What the page is made of, as ``paper-KEY.json`` has it."""
+
+    format: int
+    paper: str
+    title: str
+    citation: str
+    version: str
+    generated: str
+    runs: int
+    summary: str
+    rules: str
+    command: str
+    full: str
+    notes: list[str]
+    tables: list[_Table]
+    figures: list[_Figure]
+    contents: list[Whereabouts]
+
+
+@cache
+def _json() -> TypeAdapter[_Document]:
+    return TypeAdapter(_Document)
 
 
 @dataclass(frozen=True)
@@ -49,19 +91,19 @@ class PaperPage:
 
     Attributes
     ----------
-    document : dict
-        What the page is made of, as ``paper-KEY.json`` has it.
+    document : object
+        What is shown.
     folder : Path
         Where its figures are.
     """
 
-    document: dict[str, Any]
+    document: _Document
     folder: Path
 
     @property
     def paper(self) -> str:
         """Key of the paper."""
-        return str(self.document["paper"])
+        return self.document.paper
 
     @property
     def page(self) -> str:
@@ -71,21 +113,37 @@ class PaperPage:
     @property
     def title(self) -> str:
         """Of the paper."""
-        return str(self.document["title"])
+        return self.document.title
 
     @property
     def summary(self) -> str:
         """How many rows agree."""
-        return str(self.document["summary"])
+        return self.document.summary
 
-    def install(self, site: Path, shared: dict[str, Any]) -> None:
-        """Write the page into a site, and copy its figures; ``shared`` is what all pages are given."""
+    def install(self, folder: Path, site: SiteFacts) -> None:
+        """Write the page into the folder of a site, and copy its figures."""
         place = f"figures/paper-{self.paper}/"
-        (site / place).mkdir(parents=True, exist_ok=True)
-        for figure in self.document["figures"]:
-            name = Path(figure["file"]).name
-            shutil.copyfile(self.folder / name, site / place / name)
-        (site / self.page).write_text(_render(self.document, place, shared), encoding="utf-8")
+        (folder / place).mkdir(parents=True, exist_ok=True)
+        for figure in self.document.figures:
+            shutil.copyfile(self.folder / figure.file, folder / place / figure.file)
+        write_whole(folder / self.page, _render(self.document, place, site))
+
+
+def write(found: Reproduction, drawn: Sequence[Drawn], folder: Path) -> Path:
+    """Write ``paper-KEY.html`` and ``paper-KEY.json`` (what the page is made of) into the folder of the figures.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    document = _document(found, drawn)
+    write_whole(folder / f"paper-{document.paper}.json", _json().dump_json(document, indent=1) + b"\n")
+    for name in STATIC:
+        shutil.copyfile(TEMPLATES / name, folder / name)
+    target = folder / f"paper-{document.paper}.html"
+    write_whole(target, _render(document, "", SiteFacts(document.version, document.generated)))
+    return target
 
 
 def find(folder: Path) -> list[PaperPage]:
@@ -97,56 +155,52 @@ def find(folder: Path) -> list[PaperPage]:
     for key in PAPERS:
         place = folder / key
         try:
-            document = json.loads((place / f"paper-{key}.json").read_text(encoding="utf-8"))
-            files = [f["file"] for f in document["figures"]]
-            known = (document["format"], document["paper"]) == (_FORMAT, key)
-        except (OSError, ValueError, KeyError, TypeError):
+            document = _json().validate_json((place / f"paper-{key}.json").read_bytes())
+        except (OSError, ValueError):
             continue
-        if known and all((place / Path(name).name).is_file() for name in files):
+        known = (document.format, document.paper) == (_FORMAT, key)
+        if known and all(Path(f.file).name == f.file and (place / f.file).is_file() for f in document.figures):
             pages.append(PaperPage(document, place))
     return pages
 
 
-def _render(document: dict[str, Any], place: str, shared: dict[str, Any]) -> str:
-    values = {"version": document["version"], "generated": document["generated"], **shared}
-    values |= {"paper": document, "place": place, "page": f"paper-{document['paper']}.html"}
-    return str(environment().get_template("paper.html").render(**values))
+def _render(document: _Document, place: str, site: SiteFacts) -> str:
+    template = environment().get_template("paper.html")
+    return str(template.render(paper=document, place=place, page=f"paper-{document.paper}.html", site=site))
 
 
-def _document(found: Reproduction, drawn: Sequence[Drawn]) -> dict[str, Any]:
+def _document(found: Reproduction, drawn: Sequence[Drawn]) -> _Document:
     from datetime import UTC, datetime
     from importlib.metadata import version
 
     paper = found.paper
-    return {
-        "format": _FORMAT,
-        "paper": paper.key,
-        "title": paper.title,
-        "citation": paper.citation,
-        "version": version("simnav"),
-        "generated": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "runs": len(found.seeds),
-        "summary": summary(found),
-        "rules": RULES,
-        "command": f"simnav reproduce {paper.key} --runs {len(found.seeds)}",
-        "full": f"simnav reproduce {paper.key} --runs {paper.full}",
-        "notes": list(paper.notes),
-        "tables": [
-            {
-                "title": s.title,
-                "number": s.number,
-                "columns": [{"title": c, "numeric": c in NUMERIC} for c in s.columns],
-                "rows": [{"cells": cells, "verdict": v} for cells, v in zip(s.rows, s.verdicts, strict=True)],
-                "notes": s.notes,
-            }
+    return _Document(
+        format=_FORMAT,
+        paper=paper.key,
+        title=paper.title,
+        citation=paper.citation,
+        version=version("simnav"),
+        generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        runs=len(found.seeds),
+        summary=summary(found),
+        rules=RULES,
+        command=f"simnav reproduce {paper.key} --runs {len(found.seeds)}",
+        full=f"simnav reproduce {paper.key} --runs {paper.full}",
+        notes=list(paper.notes),
+        tables=[
+            _Table(
+                s.title,
+                s.number,
+                [_Column(c, c in NUMERIC) for c in s.columns],
+                [_Row(cells, v) for cells, v in zip(s.rows, s.verdicts, strict=True)],
+                s.notes,
+            )
             for s in sheets(found)
         ],
-        "figures": [d.to_dict() for d in drawn if d.path is not None],
-        "contents": contents_rows(found, drawn),
-    }
-
-
-def _replace(path: Path, text: str) -> None:
-    partial = path.with_name(f".{path.name}.part")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+        figures=[
+            _Figure(d.number, d.title, d.path.name, d.caption, d.width, d.height, list(d.missing))
+            for d in drawn
+            if d.path is not None
+        ],
+        contents=whereabouts(found, drawn),
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.measures import measure
 from simnav.leaderboard.papers.paper import Gain, Range
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.files import write_whole
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,7 +21,17 @@ if TYPE_CHECKING:
     from simnav.leaderboard.papers.figures import Drawn
     from simnav.leaderboard.papers.reproduction import Finding, Reproduction
 
-__all__ = ["NUMERIC", "Sheet", "contents_rows", "contents_table", "paper_tables", "sheets", "summary", "write_csv"]
+__all__ = [
+    "NUMERIC",
+    "Sheet",
+    "Whereabouts",
+    "contents_table",
+    "paper_tables",
+    "sheets",
+    "summary",
+    "whereabouts",
+    "write_csv",
+]
 
 #: Columns that are right-aligned.
 NUMERIC = ("paper", "ours [95 %]", "runs")
@@ -94,15 +104,24 @@ def paper_tables(found: Reproduction) -> Iterator[Table]:
                            caption="\n".join(sheet.notes) or None)  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Whereabouts:
+    """A table or figure of the paper, what it is, and where ours is, or why there is none."""
+
+    number: str
+    what: str
+    where: str
+
+
 def contents_table(found: Reproduction, drawn: Sequence[Drawn]) -> Table:
     """What the paper has, and where ours is, or why not."""
-    rows = [[row["number"], row["what"], row["where"]] for row in contents_rows(found, drawn)]
+    rows = [[row.number, row.what, row.where] for row in whereabouts(found, drawn)]
     dim = [i for i, item in enumerate(contents(found.paper)) if not item.shown]
     return tables.table("What the paper has, and where ours is", ["paper", "what", "ours, or why not"], rows, dim=dim)
 
 
-def contents_rows(found: Reproduction, drawn: Sequence[Drawn]) -> list[dict[str, str]]:
-    """The list of `contents_table`: number, what, where."""
+def whereabouts(found: Reproduction, drawn: Sequence[Drawn]) -> list[Whereabouts]:
+    """All that the paper has, in its order."""
     missing = {f"{d.figure.name}.png": d.missing for d in drawn if d.path is None}
     rows = []
     for item in contents(found.paper):
@@ -110,7 +129,7 @@ def contents_rows(found: Reproduction, drawn: Sequence[Drawn]) -> list[dict[str,
         for place in item.shown:
             why = f" (not there yet: {', '.join(missing[place])})" if missing.get(place) else ""
             places.append(f"{place}{why}")
-        rows.append({"number": item.number, "what": item.what, "where": "; ".join(places) or f"not shown: {item.why}"})
+        rows.append(Whereabouts(item.number, item.what, "; ".join(places) or f"not shown: {item.why}"))
     return rows
 
 
@@ -181,7 +200,4 @@ def write_csv(found: Reproduction, path: Path) -> Path:
         if isinstance(row["paper"], list):
             flat["paper"] = " to ".join(map(str, row["paper"]))
         writer.writerow(flat)
-    partial = path.with_name(f".{path.name}.part")
-    partial.write_text(text.getvalue(), encoding="utf-8")
-    os.replace(partial, path)
-    return path
+    return write_whole(path, text.getvalue())

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -190,7 +190,7 @@ class Ranking:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts and lists for JSON; numbers that are not finite become None."""
-        found: dict[str, Any] = plain(asdict(self))
+        found: dict[str, Any] = plain(vars(self))
         return found
 
 

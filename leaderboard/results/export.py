@@ -7,109 +7,129 @@ every column and angles in degrees. A score that does not apply is null, or an e
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.formats import writes
 from simnav.leaderboard.results.plain import plain
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.results.store import Result
+    import pyarrow as pa
 
-__all__ = ["SCHEMA_VERSION", "as_document", "write_csv", "write_json", "write_parquet"]
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["SCHEMA_VERSION", "Document", "table", "write_csv", "write_json", "write_parquet"]
 
 #: Raised whenever a reader of ``results.json`` would have to change.
 SCHEMA_VERSION = 1
 
 _UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
 _DEGREES = math.degrees(1.0)
+_FACTS = ("scenario", "seed", "estimator", "parameters", "reference", "status", "reason", "note")
+_COSTS = ("seconds", "peak_memory")
 
 
-def as_document(
-    results: Sequence[Result],
-    ranking: Mapping[str, Any],
-    scenarios: Sequence[Mapping[str, Any]],
-    *,
-    command: str,
-    versions: Mapping[str, str],
-    generated: str,
-) -> dict[str, Any]:
-    """The content of ``results.json``."""
-    return {
-        "schema": {"name": "simnav-leaderboard", "version": SCHEMA_VERSION},
-        "generated": generated,
-        "command": command,
-        "versions": dict(versions),
-        "scores": {name: {"title": s.title, "unit": s.unit, "better": s.better} for name, s in SCORES.items()},
-        "scenarios": [dict(s) for s in scenarios],
-        "ranking": plain(ranking),
-        "results": [
-            {
-                "scenario": r.scenario,
-                "seed": r.seed,
-                "estimator": r.estimator,
-                "parameters": plain(r.parameters),
-                "reference": r.reference,
-                "status": r.status,
-                "reason": r.reason,
-                "note": r.note,
-                "seconds": plain(float(r.seconds)),
-                "peak_memory": r.peak_memory,
-                "scores": {name: plain(float(r.scores.get(name, math.nan))) for name in SCORES},
-            }
-            for r in results
-        ],
-    }
+@dataclass(frozen=True)
+class Document:
+    """Results with what is needed to understand them elsewhere.
+
+    Attributes
+    ----------
+    results : sequence of Result
+    ranking : mapping
+        Of the same results, plain (``Ranking.to_dict``).
+    scenarios : sequence of mapping
+        What is known of each.
+    command : str
+        That makes the results again.
+    versions : mapping of str to str
+    generated : str
+        Date and time.
+    """
+
+    results: Sequence[Result]
+    ranking: Mapping[str, Any] = field(default_factory=dict)
+    scenarios: Sequence[Mapping[str, Any]] = ()
+    command: str = ""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    generated: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``results.json``."""
+        return {
+            "schema": {"name": "simnav-leaderboard", "version": SCHEMA_VERSION},
+            "generated": self.generated,
+            "command": self.command,
+            "versions": dict(self.versions),
+            "scores": {name: {"title": s.title, "unit": s.unit, "better": s.better} for name, s in SCORES.items()},
+            "scenarios": plain(self.scenarios),
+            "ranking": plain(self.ranking),
+            "results": [
+                {
+                    **{name: plain(getattr(r, name)) for name in (*_FACTS, *_COSTS)},
+                    "scores": {name: plain(float(r.scores.get(name, math.nan))) for name in SCORES},
+                }
+                for r in self.results
+            ],
+        }
 
 
-def write_json(path: Path, document: Mapping[str, Any]) -> None:
-    """Write a JSON file; NaN is not JSON and must have become null before."""
-    text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+@writes("results", "json")
+def write_json(document: Document, path: Path) -> list[Path]:
+    """Write ``results.json``; NaN is not JSON and has become null."""
+    text = json.dumps(document.to_dict(), indent=1, allow_nan=False, ensure_ascii=False)
+    return [write_whole(path, text + "\n")]
 
 
-def write_csv(path: Path, results: Sequence[Result]) -> None:
+@writes("results", "csv")
+def write_csv(document: Document, path: Path) -> list[Path]:
     """A row a run."""
     columns = {f"{name}{_UNIT_SUFFIX.get(s.unit, '_' + s.unit)}": (name, s.unit) for name, s in SCORES.items()}
-    head = ["scenario", "seed", "estimator", "parameters", "reference", "status", "reason", "note", "wall_time_s",
-            "peak_memory_bytes"]  # fmt: skip
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([*head, *columns])
-        for r in results:
-            row: list[Any] = [r.scenario, r.seed, r.estimator, _parameters(r), r.reference, r.status, r.reason, r.note,
-                              f"{r.seconds:.6g}", r.peak_memory]  # fmt: skip
-            for name, unit in columns.values():
-                value = r.scores.get(name, math.nan) * (_DEGREES if unit == "rad" else 1.0)
-                row.append("" if math.isnan(value) else f"{value:.9g}")
-            writer.writerow(row)
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow([*_FACTS, "wall_time_s", "peak_memory_bytes", *columns])
+    for r in document.results:
+        row: list[Any] = [*_facts(r).values(), f"{r.seconds:.6g}", r.peak_memory]
+        for name, unit in columns.values():
+            value = r.scores.get(name, math.nan) * (_DEGREES if unit == "rad" else 1.0)
+            row.append("" if math.isnan(value) else f"{value:.9g}")
+        writer.writerow(row)
+    return [write_whole(path, text.getvalue())]
 
 
-def write_parquet(path: Path, results: Sequence[Result]) -> None:
+@writes("results", "parquet")
+def write_parquet(document: Document, path: Path) -> list[Path]:
     """The same rows as Parquet, a column a score."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns: dict[str, Any] = {
-        "scenario": [r.scenario for r in results],
-        "seed": pa.array([r.seed for r in results], pa.int64()),
-        "estimator": [r.estimator for r in results],
-        "parameters": [_parameters(r) for r in results],
-        "reference": [r.reference for r in results],
-        "status": [r.status for r in results],
-        "reason": [r.reason for r in results],
-        "note": [r.note for r in results],
-        "seconds": pa.array([r.seconds for r in results], pa.float64()),
-        "peak_memory": pa.array([r.peak_memory for r in results], pa.int64()),
-    }
-    for name in SCORES:
-        values = [r.scores.get(name, math.nan) for r in results]
-        columns[name] = pa.array([None if math.isnan(v) else v for v in values], pa.float64())
-    pq.write_table(pa.table(columns), path, compression="zstd")
+    sink = pa.BufferOutputStream()
+    pq.write_table(table(document.results), sink, compression="zstd")
+    return [write_whole(path, sink.getvalue().to_pybytes())]
 
 
-def _parameters(result: Result) -> str:
-    return json.dumps(plain(dict(result.parameters)), sort_keys=True)
+def table(results: Sequence[Result]) -> pa.Table:
+    """Results as a pyarrow table: a row a run, a column a score, in SI units and radians."""
+    import pyarrow as pa
+
+    rows = [
+        {**_facts(r), **{name: getattr(r, name) for name in _COSTS}}
+        | {name: None if math.isnan(v := r.scores.get(name, math.nan)) else v for name in SCORES}
+        for r in results
+    ]
+    text, flag, whole, real = pa.string(), pa.bool_(), pa.int64(), pa.float64()
+    kinds = {"seed": whole, "reference": flag, "seconds": real, "peak_memory": whole, **dict.fromkeys(SCORES, real)}
+    schema = pa.schema([(name, kinds.get(name, text)) for name in (*_FACTS, *_COSTS, *SCORES)])
+    return pa.Table.from_pylist(rows, schema=schema)
+
+
+def _facts(result: Result) -> dict[str, Any]:
+    found = {name: getattr(result, name) for name in _FACTS}
+    return found | {"parameters": json.dumps(plain(dict(result.parameters)), sort_keys=True)}

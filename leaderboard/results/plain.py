@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +11,7 @@ __all__ = ["plain"]
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON can hold it: arrays become lists, paths strings, NaN and infinities null."""
+    """A value as JSON can hold it: arrays become lists, dataclasses dicts, NaN and infinities null."""
     if value is None or isinstance(value, (bool, int, str)):
         return value
     if isinstance(value, float):
@@ -25,4 +26,6 @@ def plain(value: Any) -> Any:
         return plain(value.to_dict())
     if hasattr(value, "model_dump"):
         return plain(value.model_dump())
+    if dataclasses.is_dataclass(value):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     return str(value)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.figures.plots import Dot, Style, Track, dots, error_cdf, error_over_time, save, trajectory
 from simnav.leaderboard.ranking.runs import Runs, tracks
+from simnav.leaderboard.site.content import Image, ScenarioEntry
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,43 +28,33 @@ _PANELS = (
 )
 
 
-def write_figure(folder: Path, fig: Figure, name: str, caption: str, alt: str) -> dict[str, Any]:
-    """Write a figure as SVG and PNG; returns what a page needs to show it."""
+def write_figure(folder: Path, fig: Figure, name: str, caption: str, alt: str) -> Image:
+    """Write a figure as SVG and PNG."""
     save(fig, folder / "figures" / f"{name}.svg")
     width, height = fig.get_size_inches() * _PIXELS
-    return {
-        "file": f"figures/{name}",
-        "caption": caption,
-        "alt": alt,
-        "width": round(width),
-        "height": round(height),
-    }
+    return Image(f"figures/{name}", caption, alt, round(width), round(height))
 
 
-def scenario_figures(
-    folder: Path, scenario: Mapping[str, Any], runs: Sequence[Runs], style: Style
-) -> list[dict[str, Any]]:
+def scenario_figures(folder: Path, scenario: ScenarioEntry, runs: Sequence[Runs], style: Style) -> list[Image]:
     """Draw the figures of a scenario's page.
 
     Parameters
     ----------
     folder : Path
         Of the site.
-    scenario : mapping
-        Its ``id``, ``page`` and ``seeds``.
+    scenario : ScenarioEntry
     runs : sequence of Runs
         Of the estimators that it suits, best first. Curves are drawn of the `MOST_CURVES` best, and of references.
     style : Style
 
     Returns
     -------
-    list of dict
-        As from `write_figure`.
+    list of Image
     """
-    name, made = Path(scenario["page"]).stem, []
-    count = len(scenario["seeds"])
-    seed = _seed_to_show(runs, scenario["seeds"])
-    fixes, outages = _of_recording(scenario["id"], seed)
+    name, made = Path(scenario.page).stem, []
+    count = len(scenario.seeds)
+    seed = _seed_to_show(runs, scenario.seeds)
+    fixes, outages = _of_recording(scenario.id, seed)
     best = [r for r in runs if not r.reference][:MOST_CURVES]
     drawn = [*best, *(r for r in runs if r.reference)]
     which = f" The {MOST_CURVES} best." if len(drawn) < len(runs) else ""

@@ -27,22 +27,39 @@ from simnav.leaderboard.ranking.ranking_table import (
     SCORE_AXIS,
     SCORE_LEAD,
     SCORE_TITLE,
-    add_bars,
-    between,
-    ranking_rows,
+    coverages,
     ratio,
     score_caption,
-    sortable,
+    tier_starts,
 )
 from simnav.leaderboard.ranking.runs import Runs, group
-from simnav.leaderboard.ranking.statistics import Interval
-from simnav.leaderboard.results import export
-from simnav.leaderboard.site.pages import STATIC, TEMPLATES, ExtraPage, environment
+from simnav.leaderboard.results.export import Document
+from simnav.leaderboard.results.formats import formats, write
+from simnav.leaderboard.site.content import (
+    Cell,
+    EstimatorEntry,
+    EstimatorPage,
+    EstimatorRow,
+    ExtraPage,
+    Fact,
+    Failure,
+    Image,
+    IndexRow,
+    MatrixRow,
+    ScenarioEntry,
+    ScenarioPage,
+    ScenarioPageRow,
+    SiteFacts,
+    bars,
+    score_cells,
+)
+from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 from simnav.leaderboard.site.scenario_figures import catalogued, scenario_figures, write_figure
+from simnav.scoring import badge
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.ranking import Ranking
-    from simnav.leaderboard.results.store import Result
+    from simnav.leaderboard.ranking.ranking import Ranking, ScenarioRanking
+    from simnav.leaderboard.results.result import Result
 
 __all__ = ["SiteError", "build"]
 
@@ -50,24 +67,6 @@ _WORTH_PROCESSES = 3  # scenarios
 _STALE = 3600.0  # a build of this age runs no more [s]
 _NAME_OF_LABEL = re.compile(r"[(\[ ]")  # a label is a name, and its parameters in brackets
 _STATIC = (*STATIC, "results.schema.json")
-_DEGREES = math.degrees(1.0)
-
-#: Columns of score tables: score, heading, factor, how it is written ("": with interval), whether small is best.
-_COLUMNS: tuple[tuple[str, str, float, str, bool], ...] = (
-    ("horizontal_rmse", "Horizontal RMSE [m]", 1.0, "", True),
-    ("r95", "R95 [m]", 1.0, "", True),
-    ("vertical_rmse", "Vertical RMSE [m]", 1.0, "", True),
-    ("velocity_horizontal_rmse", "Velocity RMSE [m/s]", 1.0, "", True),
-    ("heading_rmse", "Heading RMSE [deg]", _DEGREES, "", True),
-    ("outage_end_error", "At outage end [m]", 1.0, "", True),
-    ("recovery_time", "Recovery [s]", 1.0, "", True),
-    ("nees_horizontal", "NEES / dof", 1.0, "-", False),
-    ("coverage_95", "95 % coverage", 1.0, "%", False),
-    ("detection_rate", "Faults detected", 1.0, "%", False),
-    ("false_alarm_rate", "False alarms", 1.0, "%", False),
-    ("smoothed_horizontal_rmse", "Smoothed RMSE [m]", 1.0, "", True),
-    ("update_median", "Per epoch", 1.0, "time", False),
-)
 
 
 class SiteError(RuntimeError):
@@ -121,11 +120,8 @@ def build(
     draft = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent))
     try:
         draft.chmod(0o755)
-        site = _Site(
-            results, ranking, draft, command or reproduce(results), progress or (lambda *_, **__: None), workers
-        )
-        site.papers = list(papers)
-        site.write()
+        report = progress or (lambda *_, **__: None)
+        _Site(results, ranking, draft, command or reproduce(results), report, workers, papers).write()
         _swap(draft, output)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -208,80 +204,75 @@ class _Site:
         command: str,
         progress: Callable[..., None],
         workers: int,
+        papers: Sequence[ExtraPage],
     ):
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
-        self.ranking = ranking.to_dict()
-        self.folder, self.command, self.progress, self.workers = folder, command, progress, workers
-        self.papers: list[ExtraPage] = []
+        self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
         self.runs = group(self.results)
-        self.rows = ranking_rows(self.ranking, self.results)
         labels = list(
-            dict.fromkeys([*(row["label"] for row in self.rows), *sorted({r.estimator for r in self.results})])
+            dict.fromkeys([*(row.estimator for row in ranking.rows), *sorted({r.estimator for r in self.results})])
         )
         references = {r.estimator for r in self.results if r.reference}
         self.style = Style(labels, references)
         taken = {"index"}
-        self.estimators = {label: self._estimator(label, taken) for label in labels}
-        self.scenarios = [_describe(s, by, f"{slug(s, taken)}.html") for s, by in self.runs.items()]
-
-    def _estimator(self, label: str, taken: set[str]) -> dict[str, Any]:
-        return {
-            "label": label,
-            "page": f"estimator-{slug(label, taken)}.html",
-            "colour": self.style.colour(label),
-            "dark": self.style.colour(label, dark=True),
-            "reference": any(r.reference for r in self.results if r.estimator == label),
+        self.estimators = {
+            label: EstimatorEntry(
+                label,
+                f"estimator-{slug(label, taken)}.html",
+                self.style.colour(label),
+                self.style.colour(label, dark=True),
+                label in references,
+            )
+            for label in labels
         }
+        self.scenarios = [_describe(s, by, f"{slug(s, taken)}.html") for s, by in self.runs.items()]
+        versions = _versions()
+        generated = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+        self.facts = SiteFacts(
+            versions["simnav"], generated, len(self.results), self.scenarios, papers, command, versions
+        )
 
     def write(self) -> None:
         """Write all pages, figures and data."""
         pages = environment()
         (self.folder / "figures").mkdir()
-        generated = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-        shared = {
-            "version": _versions()["simnav"],
-            "versions": _versions(),
-            "generated": generated,
-            "scenarios": self.scenarios,
-            "papers": self.papers,
-            "total": len(self.results),
-            "command": self.command,
-        }
         steps = len(self.scenarios) + 1
         self.progress(0, steps)
         for k, (scenario, figures) in enumerate(zip(self.scenarios, self._draw(), strict=True)):
-            page = {**scenario, **self._scenario(scenario), "figures": figures}
-            self._page(pages, "scenario.html", scenario["page"], scenario=page, **shared)
-            self.progress(k + 1, steps, note=scenario["name"])
+            self._page(pages, "scenario.html", scenario.page, scenario=self._scenario(scenario, figures))
+            self.progress(k + 1, steps, note=scenario.name)
         for label, estimator in self.estimators.items():
-            self._page(pages, "estimator.html", estimator["page"], estimator=self._of_estimator(label), **shared)
-        self._page(pages, "index.html", "index.html", **self._index(), **shared)
-        for extra in self.papers:
-            extra.install(self.folder, shared)
+            self._page(pages, "estimator.html", estimator.page, estimator=self._estimator(label))
+        self._page(pages, "index.html", "index.html", **self._index())
+        for extra in self.facts.papers:
+            extra.install(self.folder, self.facts)
         for name in _STATIC:
             shutil.copyfile(TEMPLATES / name, self.folder / name)
-        facts = ("id", "name", "title", "description", "source", "seeds")
-        document = export.as_document(
-            self.results,
-            self.ranking,
-            [{key: s[key] for key in facts} for s in self.scenarios],
-            command=self.command,
-            versions=_versions(),
-            generated=generated,
-        )
-        export.write_json(self.folder / "results.json", document)
-        export.write_csv(self.folder / "results.csv", self.results)
-        export.write_parquet(self.folder / "results.parquet", self.results)
+        self._export()
         self.progress(steps, steps)
 
-    def _draw(self) -> Iterator[list[dict[str, Any]]]:
+    def _export(self) -> None:
+        known = ("id", "name", "title", "description", "source", "seeds")
+        document = Document(
+            self.results,
+            self.ranking.to_dict(),
+            [{key: getattr(s, key) for key in known} for s in self.scenarios],
+            self.facts.command,
+            self.facts.versions,
+            self.facts.generated,
+        )
+        for name in formats("results"):
+            write("results", name, document, self.folder / f"results.{name}")
+
+    def _ranking_of(self, scenario: ScenarioEntry) -> ScenarioRanking:
+        return next(s for s in self.ranking.scenarios if s.scenario == scenario.id)
+
+    def _draw(self) -> Iterator[list[Image]]:
         """The figures of one scenario after the other; several processes where it is worth their start."""
-        tasks = []
-        ranked = {s["scenario"]: [row["estimator"] for row in s["rows"]] for s in self.ranking["scenarios"]}
-        for s in self.scenarios:
-            by = self.runs[s["id"]]
-            head = {key: s[key] for key in ("id", "page", "seeds")}
-            tasks.append((self.folder, head, [by[e] for e in ranked[s["id"]]], self.style))
+        tasks = [
+            (self.folder, s, [self.runs[s.id][row.estimator] for row in self._ranking_of(s).rows], self.style)
+            for s in self.scenarios
+        ]
         if self.workers < 2 or len(tasks) < _WORTH_PROCESSES:
             yield from (scenario_figures(*task) for task in tasks)
             return
@@ -296,28 +287,32 @@ class _Site:
             os.environ.pop("PYTHONSAFEPATH") if before is None else os.environ.update(PYTHONSAFEPATH=before)
 
     def _page(self, pages: Any, template: str, name: str, **values: Any) -> None:
-        text = pages.get_template(template).render(page="index" if name == "index.html" else name, **values)
+        page = "index" if name == "index.html" else name
+        text = pages.get_template(template).render(page=page, site=self.facts, **values)
         (self.folder / name).write_text(text, encoding="utf-8")
 
     # -- index -----------------------------------------------------------------------------------
 
-    def _index(self) -> dict[str, Any]:
-        tried = [r for r in self.results if r.tried]
+    def _index(self) -> dict[str, object]:
+        ranked = self.ranking.rows
         facts = [
-            ("Scenarios", len(self.scenarios)),
-            ("Estimators", len(self.estimators)),
-            ("Seeds a scenario", max(len(s["seeds"]) for s in self.scenarios)),
-            ("Runs", len(tried)),
-            ("Failed", sum(row["failed"] for row in self.rows)),
+            Fact("Scenarios", len(self.scenarios)),
+            Fact("Estimators", len(self.estimators)),
+            Fact("Seeds a scenario", max(len(s.seeds) for s in self.scenarios)),
+            Fact("Runs", sum(r.tried for r in self.results)),
+            Fact("Failed", sum(row.failed for row in ranked)),
         ]
-        rows = [{**row, **self.estimators[row["label"]]} for row in self.rows]
-        add_bars(rows)
+        coverage = coverages(self.results)
+        rows = [
+            IndexRow(row, self.estimators[row.estimator], coverage[row.estimator], starts, bar)
+            for row, starts, bar in zip(ranked, tier_starts([r.tier for r in ranked]), bars(ranked), strict=True)
+        ]
         figure = None
-        if any(row["value"] is not None for row in rows):
+        if any(math.isfinite(row.score) for row in ranked):
             points = [
-                Dot(r["label"], _number(r["value"]), _number(r["low"]), _number(r["high"]), hollow=r["reference"],
-                    note=f"({r['failed']} failed)" if r["failed"] else "")
-                for r in rows if r["value"] is not None
+                Dot(r.estimator, r.score, r.low, r.high, hollow=r.reference,
+                    note=f"({r.failed} failed)" if r.failed else "")
+                for r in ranked if math.isfinite(r.score)
             ]  # fmt: skip
             figure = write_figure(
                 self.folder,
@@ -326,98 +321,75 @@ class _Site:
                 "The ranking with its intervals; hollow: reference.",
                 "Overall score of every estimator with its interval, as in the table above",
             )
-        return {
-            "score": {
-                "title": SCORE_TITLE.replace(" ", "\u00a0"),
-                "caption": score_caption(self.ranking),
-                "lead": SCORE_LEAD,
-            },
-            "facts": [{"name": n, "value": v} for n, v in facts],
-            "ranking": rows,
-            "matrix": self._matrix(),
-            "figure": figure,
-        }
+        title = SCORE_TITLE.replace(" ", "\u00a0")
+        texts = {"title": title, "lead": SCORE_LEAD, "caption": score_caption(self.ranking)}
+        return {"texts": texts, "facts": facts, "ranking": rows, "matrix": self._matrix(), "figure": figure}
 
-    def _matrix(self) -> list[dict[str, Any]]:
+    def _matrix(self) -> list[MatrixRow]:
         medians = {
-            (label, s["id"]): self.runs[s["id"]][label].score("horizontal_rmse").value
+            (label, s.id): self.runs[s.id][label].score("horizontal_rmse").value
             for label in self.estimators
             for s in self.scenarios
-            if label in self.runs[s["id"]]
+            if label in self.runs[s.id]
         }
-        rows = []
-        for label, estimator in self.estimators.items():
-            row = []
-            for s in self.scenarios:
-                value = medians.get((label, s["id"]), math.nan)
-                ranked = [v for (e, i), v in medians.items() if i == s["id"] and not self.estimators[e]["reference"]]
-                best = min((v for v in ranked if not math.isnan(v)), default=math.nan)
-                text = "" if math.isnan(value) else tables.number(value)
-                row.append({"text": text, "sort": sortable(value), "page": s["page"],
-                            "best": value == best and not estimator["reference"]})  # fmt: skip
-            rows.append({**estimator, "row": row})
-        return rows
+        best: dict[str, float] = {}
+        for (label, scenario), value in medians.items():
+            if not self.estimators[label].reference and not math.isnan(value):
+                best[scenario] = min(value, best.get(scenario, math.inf))
+
+        def cell(entry: EstimatorEntry, s: ScenarioEntry) -> Cell:
+            value = medians.get((entry.label, s.id), math.nan)
+            text = "" if math.isnan(value) else tables.number(value)
+            return Cell(text, value, best=value == best.get(s.id) and not entry.reference, page=s.page)
+
+        return [MatrixRow(e, tuple(cell(e, s) for s in self.scenarios)) for e in self.estimators.values()]
 
     # -- scenario --------------------------------------------------------------------------------
 
-    def _scenario(self, scenario: Mapping[str, Any]) -> dict[str, Any]:
-        by = self.runs[scenario["id"]]
-        ranking = next(s for s in self.ranking["scenarios"] if s["scenario"] == scenario["id"])
-        ranked = ranking["rows"]
-        suited = [by[row["estimator"]] for row in ranked]
-        columns, cells = _score_cells([(r, r.reference) for r in suited])
-        before = [None, *(row["tier"] for row in ranked)]
-        rows = [
-            {
-                **row,
-                **self.estimators[row["estimator"]],
-                "cells": c,
-                "ratio": ratio(row["score"]),
-                "sort": sortable(row["score"]),
-                "interval": between(row["low"], row["high"], ratio),
-                "starts_tier": k > 0 and row["tier"] != before[k],
-            }
-            for k, (row, c) in enumerate(zip(ranked, cells, strict=True))
-        ]
-        return {
-            "columns": columns,
-            "rows": rows,
-            "baseline": ranking["baseline"],
-            "unsuitable": _by_reason(ranking["unsuitable"]),
-            "failures": [
-                {"label": row["estimator"], "status": status, "runs": count,
-                 "reason": _reason(by[row["estimator"]], status)}
-                for row in ranked for status, count in row["statuses"].items() if status != "ok"
-            ],
-            "seeds": len(scenario["seeds"]),
-            "first_seed": scenario["seeds"][0],
-        }  # fmt: skip
+    def _scenario(self, entry: ScenarioEntry, figures: Sequence[Image]) -> ScenarioPage:
+        by, ranking = self.runs[entry.id], self._ranking_of(entry)
+        columns, cells = score_cells([(by[row.estimator], row.reference) for row in ranking.rows])
+        return ScenarioPage(
+            entry=entry,
+            baseline=ranking.baseline,
+            columns=columns,
+            rows=tuple(
+                ScenarioPageRow(row, self.estimators[row.estimator], c, starts)
+                for row, c, starts in zip(ranking.rows, cells, tier_starts([r.tier for r in ranking.rows]), strict=True)
+            ),
+            unsuitable=_by_reason(ranking.unsuitable),
+            failures=tuple(
+                Failure(row.estimator, status, count, _reason(by[row.estimator], status))
+                for row in ranking.rows
+                for status, count in row.statuses.items()
+                if status != "ok"
+            ),
+            figures=tuple(figures),
+        )
 
     # -- estimator -------------------------------------------------------------------------------
 
-    def _of_estimator(self, label: str) -> dict[str, Any]:
-        mine = [self.runs[s["id"]][label] for s in self.scenarios if label in self.runs[s["id"]]]
-        suited = [r for r in mine if r.tried]
-        columns, cells = _score_cells([(r, True) for r in suited])
-        described = {s["id"]: s for s in self.scenarios}
-        row = next((r for r in self.rows if r["label"] == label), None)  # None: no scenario suits it
-        facts = [] if row is None else [
-            ("Rank", row["rank"] or "–"), ("Tier", row["tier"] or "–"), (SCORE_TITLE, row["score"]),
-            ("Failed", f"{row['failed']} of {row['runs']}"), ("Per epoch", row["cost"]),
-        ]  # fmt: skip
-        return {
-            **self.estimators[label],
-            "summary": _summary(label),
-            "facts": [{"name": n, "value": v} for n, v in facts],
-            "columns": columns,
-            "rows": [
-                {"name": described[r.scenario]["name"], "page": described[r.scenario]["page"], "failed": r.failed,
-                 "runs": len(r.tried), "cells": c, "badge": _badge(r)}
-                for r, c in zip(suited, cells, strict=True)
-            ],
-            "unsuitable": _by_reason({described[r.scenario]["name"]: r.results[0].reason for r in mine if not r.tried}),
-            "parameters": tables.parameters(mine[0].results[0].parameters) if mine else "",
-        }  # fmt: skip
+    def _estimator(self, label: str) -> EstimatorPage:
+        mine = [(s, self.runs[s.id][label]) for s in self.scenarios if label in self.runs[s.id]]
+        suited = [(s, r) for s, r in mine if r.tried]
+        columns, cells = score_cells([(r, True) for _, r in suited])
+        row = next((r for r in self.ranking.rows if r.estimator == label), None)  # None: no scenario suits it
+        facts = () if row is None else (
+            Fact("Rank", row.rank or "–"), Fact("Tier", row.tier or "–"), Fact(SCORE_TITLE, ratio(row.score)),
+            Fact("Failed", f"{row.failed} of {row.runs}"), Fact("Per epoch", tables.duration(row.update_median)),
+        )  # fmt: skip
+        return EstimatorPage(
+            entry=self.estimators[label],
+            summary=_summary(label),
+            facts=facts,
+            columns=columns,
+            rows=tuple(
+                EstimatorRow(s, len(r.tried), r.failed, c, badge(np.array(r.scores("nees_horizontal"))))
+                for (s, r), c in zip(suited, cells, strict=True)
+            ),
+            unsuitable=_by_reason({s.name: r.results[0].reason for s, r in mine if not r.tried}),
+            parameters=tables.parameters(mine[0][1].results[0].parameters) if mine else "",
+        )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -430,22 +402,21 @@ def _versions() -> dict[str, str]:
     return {"simnav": version("simnav"), "python": platform.python_version(), "numpy": version("numpy")}
 
 
-def _describe(identity: str, by: Mapping[str, Runs], page: str) -> dict[str, Any]:
+def _describe(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry:
     """What is known of a scenario, from the catalogue where it is in there."""
     name, _, version = identity.rpartition("-v")
-    seeds = sorted({r.seed for runs in by.values() for r in runs.results})
-    found: dict[str, Any] = {"id": identity, "name": name or identity, "page": page, "seeds": seeds}
-    found |= {"title": "", "description": "", "source": "", "argument": _argument(identity)}
-    facts = [("Version", version or "–"), ("Seeds", len(seeds))]
+    seeds = tuple(sorted({r.seed for runs in by.values() for r in runs.results}))
+    facts = [Fact("Version", version or "–"), Fact("Seeds", len(seeds))]
     scenario = catalogued(identity)
-    if scenario is not None:
-        found |= {"title": scenario.title, "description": scenario.description, "source": scenario.source}
-        facts += [("Duration", tables.duration(scenario.duration)), ("Step", tables.duration(scenario.step))]
-        if scenario.instruments:
-            facts.append(("Instruments", len(scenario.instruments)))
-        if scenario.faults:
-            facts.append(("Faults", len(scenario.faults)))
-    return {**found, "facts": [{"name": n, "value": v} for n, v in facts]}
+    if scenario is None:
+        return ScenarioEntry(identity, name or identity, page, seeds, _argument(identity), tuple(facts))
+    facts += [Fact("Duration", tables.duration(scenario.duration)), Fact("Step", tables.duration(scenario.step))]
+    if scenario.instruments:
+        facts.append(Fact("Instruments", len(scenario.instruments)))
+    if scenario.faults:
+        facts.append(Fact("Faults", len(scenario.faults)))
+    texts = (scenario.title, scenario.description, scenario.source)
+    return ScenarioEntry(identity, name or identity, page, seeds, _argument(identity), tuple(facts), *texts)
 
 
 def _summary(label: str) -> str:
@@ -456,12 +427,6 @@ def _summary(label: str) -> str:
         return describe(_NAME_OF_LABEL.split(label, maxsplit=1)[0]).summary
     except (ValueError, ImportError):
         return ""
-
-
-def _badge(runs: Runs) -> str:
-    from simnav.scoring import badge
-
-    return str(badge(np.array(runs.scores("nees_horizontal"))))
 
 
 def _by_reason(reasons: Mapping[str, str]) -> dict[str, list[str]]:
@@ -477,35 +442,3 @@ def _reason(runs: Runs, status: str) -> str:
     if status == "incomplete":
         return "it ended well, but gave a position at too few of the epochs"
     return next((r.reason for r in runs.results if r.status == status), "")
-
-
-def _score_cells(runs: Sequence[tuple[Runs, bool]]) -> tuple[list[dict[str, str]], list[dict[str, Any]]]:
-    """Columns in which anybody who is ranked has a figure, and the cells of each row.
-
-    The second of a pair says whether it is barred from being the best.
-    """
-    columns = []
-    cells: list[dict[str, Any]] = [{} for _ in runs]
-    for key, title, factor, form, lower in _COLUMNS:
-        found = [r.score(key) for r, _ in runs]
-        ranked = [f for f, (r, _) in zip(found, runs, strict=True) if not r.reference] or found
-        if all(math.isnan(f.value) for f in ranked):
-            continue
-        columns.append({"key": key, "title": title})
-        best = min((f.value for f, (_, barred) in zip(found, runs, strict=True) if not barred and f.value == f.value),
-                   default=math.nan)  # fmt: skip
-        for cell, f, (_, barred) in zip(cells, found, runs, strict=True):
-            cell[key] = {**_cell(f, factor, form), "best": lower and not barred and f.value == best}
-    return columns, cells
-
-
-def _cell(f: Interval, factor: float, form: str) -> dict[str, Any]:
-    if math.isnan(f.value):
-        return {"text": "–", "sort": "", "interval": ""}
-    write = {"%": tables.percent, "time": tables.duration}.get(form, tables.number)
-    interval = "" if form else between(f.low * factor, f.high * factor)
-    return {"text": write(f.value * factor), "sort": sortable(f.value), "interval": interval}
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)

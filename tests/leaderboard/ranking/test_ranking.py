@@ -149,8 +149,8 @@ def test_without_an_oracle_the_best_estimator_is_the_measure_and_it_is_said() ->
     ranking = rank(results)
     assert ranking.scenarios[0].baseline == "median of good, the best here: no oracle ran"
     assert ranking.scenarios[1].baseline == "oracle, on the same run"
-    assert "Where no oracle ran (one-v1), 1 is the best estimator's median." in score_caption(ranking.to_dict())
-    assert "no oracle" not in score_caption(rank(campaign(SIMPLE)).to_dict())
+    assert "Where no oracle ran (one-v1), 1 is the best estimator's median." in score_caption(ranking)
+    assert "no oracle" not in score_caption(rank(campaign(SIMPLE)))
     r = row(ranking, "fair", "one-v1")
     assert r.score / row(ranking, "good", "one-v1").score == pytest.approx(2.0 / 1.2, rel=0.3)
     assert r.tier == 2

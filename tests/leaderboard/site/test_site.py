@@ -257,7 +257,11 @@ def test_a_failure_leaves_the_old_site_and_nothing_else(results, tmp_path, monke
     few = [r for r in results if r.scenario == SCENARIOS[0]]
     site.build(few, rank(few), output)
     before = (output / "index.html").read_bytes()
-    monkeypatch.setattr(site.export, "write_parquet", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left")))
+
+    def full(*_):
+        raise OSError(28, "No space left")
+
+    monkeypatch.setattr(site, "write", full)
     with pytest.raises(OSError, match="No space"):
         site.build(few, rank(few), output)
     assert (output / "index.html").read_bytes() == before
