@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav.check import check
+from simnav.contract_check import check
 from simnav.estimator import make
 from simnav.scenario import load
 

@@ -19,13 +19,16 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from simnav.estimator import EstimatorError, find
 from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.session_class import carry, is_session
 from simnav.leaderboard.campaign.worker import Entrant, Unit, run_unit
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
@@ -42,7 +45,7 @@ _RESTARTS = 3  # of the workers, where one died
 
 
 class CampaignError(RuntimeError):
-    """A campaign that cannot begin or go on; the message is one sentence."""
+    """A campaign that cannot go on; the message is one sentence."""
 
 
 @dataclass(frozen=True)
@@ -155,8 +158,10 @@ def run_campaign(
 
     Raises
     ------
-    CampaignError
+    RequestError
         On a request that makes no sense: one sentence; nothing was run.
+    CampaignError
+        If workers die again and again; what is there stays valid.
     StoreError
         If the folder cannot be used, or the disk is full. What is there stays valid.
     KeyboardInterrupt
@@ -166,20 +171,20 @@ def run_campaign(
     report = progress or (lambda p: None)
     seeds = list(dict.fromkeys(seeds))
     if workers < 1:
-        raise CampaignError(f"workers = {workers}: at least one is wanted")
+        raise RequestError(f"workers = {workers}: at least one is wanted")
     if timeout is not None and not timeout > 0.0:
-        raise CampaignError(f"timeout = {timeout:g} s should be greater than 0")
+        raise RequestError(f"timeout = {timeout:g} s should be greater than 0")
     if memory < 16 << 20:
-        raise CampaignError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
+        raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
     for seed in seeds:
         if not 0 <= seed < 2**63:
-            raise CampaignError(f"seed {seed} should lie between 0 and 2**63 - 1")
+            raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
     _unique("scenario", [s.id for s in scenarios])
     _unique("estimator", [e.label for e in estimators])
     if backend not in ("loky", "dask"):
-        raise CampaignError(f"backend = {backend!r} is unknown; there are 'loky' and 'dask'")
+        raise RequestError(f"backend = {backend!r} is unknown; there are 'loky' and 'dask'")
     if backend == "dask" and importlib.util.find_spec("distributed") is None:
-        raise CampaignError("backend = 'dask' needs the extra 'distributed': pip install 'simnav[distributed]'")
+        raise RequestError("backend = 'dask' needs the extra 'distributed': pip install 'simnav[distributed]'")
 
     path = store.create(Path(folder).resolve())
     there = {key for key, status in store.keys(path).items() if status != "no-recording"}
@@ -228,11 +233,11 @@ def run_campaign(
 
 def _unique(what: str, labels: list[str]) -> None:
     if not labels:
-        raise CampaignError(f"no {what} was asked for")
+        raise RequestError(f"no {what} was asked for")
     twice = [label for label, count in Counter(labels).items() if count > 1]
     if twice:
         hint = "; give each its own label" if what == "estimator" else ""
-        raise CampaignError(f"the {what} {twice[0]!r} was asked for twice{hint}")
+        raise RequestError(f"the {what} {twice[0]!r} was asked for twice{hint}")
 
 
 def _variant(entrant: Entrant, recording: str) -> str:
@@ -245,35 +250,29 @@ def _variant(entrant: Entrant, recording: str) -> str:
 
 def _resolve(request: EstimatorRequest) -> Entrant:
     """Find an estimator and look at it, in isolation: importing a file runs it."""
-    name = request.name
+    name, code = request.name, b""
     file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
     if file:
         name = f"{Path(file[1]).resolve()}{file[2] or ''}"
     else:
         _import_estimators()
-    outcome = isolate(_describe, name, dict(request.parameters), timeout=_IMPORT_TIME, memory=MEMORY)
+        with mistakes(EstimatorError):
+            cls = request.cls or find(name)
+        if request.cls is not None or is_session(cls.__module__):
+            code = carry(cls)
+    entrant = Entrant(name, dict(request.parameters), request.label, False, "", code)
+    outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=MEMORY)
     if outcome.status != "ok":
-        reason = outcome.reason.removeprefix("EstimatorError: ").removeprefix("CampaignError: ")
-        raise CampaignError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
+        reason = re.sub(r"^(Estimator|Request)Error: ", "", outcome.reason)
+        raise RequestError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
     reference, source = outcome.value
-    return Entrant(name, dict(request.parameters), request.label, reference, source)
+    return replace(entrant, reference=reference, source=source)
 
 
-def _describe(name: str, parameters: dict[str, Any]) -> tuple[bool, str]:
-    from simnav.estimator import find, make
-
-    cls = find(name)
-    module = cls.__module__
-    if module == "__main__" or not (name.endswith(".py") or ".py:" in name or _importable(module)):
-        raise CampaignError(f"{cls.__name__} is defined in a session; put it into a file, which the workers can import")
-    make(name, **parameters)
+def _describe(entrant: Entrant) -> tuple[bool, str]:
+    """In the isolated process: whether it is a reference, and the digest of its sources."""
+    cls = type(entrant.make())
     return cls.reference, estimator_source(cls)
-
-
-def _importable(module: str) -> bool:
-    with contextlib.suppress(ImportError, ValueError):
-        return importlib.util.find_spec(module.partition(".")[0]) is not None
-    return False
 
 
 def _import_estimators() -> None:

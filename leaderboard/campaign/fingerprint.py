@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import simnav
+from simnav.leaderboard.campaign.session_class import is_session, source_text
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -111,10 +112,14 @@ def estimator_source(cls: type[Estimator]) -> str:
     """Digest of the sources of an estimator.
 
     Of a class in an installed package: all files of the package. Of a class in a file: this file and those
-    beside it that it imports, directly or not. Base classes count likewise.
+    beside it that it imports, directly or not. Of a class in a session: its text, and what it uses of the session.
+    Base classes count likewise.
     """
     parts = []
     for base in cls.__mro__:
+        if is_session(base.__module__) and not base.__module__.startswith("simnav_file_"):
+            parts.append(digest(source_text(base)))
+            continue
         package = base.__module__.partition(".")[0]
         if _is_ours(base.__module__):
             package = OUR_ESTIMATORS

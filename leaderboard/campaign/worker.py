@@ -16,10 +16,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.isolation import Outcome, isolate
+from simnav.leaderboard.campaign.request import enlist
+from simnav.leaderboard.campaign.session_class import receive
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.result import Result
 
 if TYPE_CHECKING:
+    from simnav.estimator import Estimator
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.trial import Trial
@@ -45,6 +48,8 @@ class Entrant:
     reference : bool
     source : str
         Digest.
+    code : bytes
+        The class itself, where no other process can import it.
     """
 
     name: str
@@ -52,6 +57,15 @@ class Entrant:
     label: str
     reference: bool
     source: str
+    code: bytes = b""
+
+    def make(self) -> Estimator:
+        """An instance, in the isolated process."""
+        from simnav.estimator import make
+
+        if self.code:
+            enlist(receive(self.code))
+        return make(self.name, **self.parameters)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +169,7 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
 
     outcome: Outcome = isolate(
         _attempt,
-        entrant.name,
-        dict(entrant.parameters),
+        entrant,
         recording,
         timeout=unit.timeout,
         memory=unit.memory,
@@ -187,17 +200,16 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
     )
 
 
-def _attempt(name: str, parameters: dict[str, Any], recording: Recording) -> tuple[Trial, list[str]]:
+def _attempt(entrant: Entrant, recording: Recording) -> tuple[Trial, list[str]]:
     """In the isolated process: make the estimator and run it."""
     import numpy as np
 
-    from simnav.estimator import make
     from simnav.trial import run_trial
 
     before = set(sys.modules)
     # Whoever draws from a global generator gets the same numbers in every campaign.
     random.seed(recording.seed)
     np.random.seed(recording.seed % 2**32)  # noqa: NPY002
-    trial = run_trial(make(name, **parameters), recording)
+    trial = run_trial(entrant.make(), recording)
     new = [m for m in sorted(set(sys.modules) - before) if m.partition(".")[0] in _LIBRARIES]
     return trial, new

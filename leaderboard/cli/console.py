@@ -13,48 +13,21 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.results.errors import RequestError, sentence
 from simnav.leaderboard.results.plain import plain
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-__all__ = ["Output", "Progress", "UserError", "mistakes", "session"]
+__all__ = ["Output", "ProgressBar", "session"]
 
 USER, FAILED, INTERRUPTED = 2, 1, 130
 _WIDTH_WITHOUT_TERMINAL = 150
 
 
-class UserError(Exception):
-    """What the user asked for cannot be done; the message is one sentence that says what would be right."""
-
-
-@contextlib.contextmanager
-def mistakes(*kinds: type[Exception]) -> Iterator[None]:
-    """Turn exceptions of the given kinds (by default those of wrong input) into `UserError`."""
-    expected = kinds or (ValueError, LookupError, TypeError, OSError, SyntaxError, ImportError, AttributeError)
-    try:
-        yield
-    except expected as error:
-        raise UserError(sentence(error)) from error
-
-
-def sentence(error: BaseException) -> str:
-    """The message of an exception on one line."""
-    if isinstance(error, KeyError) and error.args:
-        text = str(error.args[0])  # str(KeyError) is the repr of its message
-    elif isinstance(error, OSError) and error.strerror:
-        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    elif isinstance(error, SyntaxError) and error.filename:
-        text = f"{error.filename}, line {error.lineno}: {error.msg}"
-    else:
-        text = str(error)
-    return " ".join(text.split()) or type(error).__name__
-
-
-class Progress:
+class ProgressBar:
     """A live bar with time left on a terminal; a line every few seconds elsewhere.
 
     Parameters
@@ -91,7 +64,7 @@ class Progress:
         )
         self._task = self._bar.add_task(text, total=total, note="", left="–")
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> ProgressBar:
         self._bar.start()
         return self
 
@@ -172,9 +145,13 @@ class Output:
         """Say something on standard error."""
         self._console(stderr=True).print(text, highlight=False, markup=False, soft_wrap=True)
 
-    def progress(self, text: str, total: int | None = None) -> Progress:
+    def remark(self, text: str) -> None:
+        """Say something in the command's name."""
+        self.note(f"simnav: {text}")
+
+    def progress(self, text: str, total: int | None = None) -> ProgressBar:
         """A progress display on standard error."""
-        return Progress(self._console(stderr=True), text, total)
+        return ProgressBar(self._console(stderr=True), text, total)
 
     def document(self, value: Any) -> None:
         """Set what ``--json`` prints when the command ends."""
@@ -243,7 +220,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
             import traceback
 
             traceback.print_exc()
-        mistake = isinstance(error, (UserError, _spec_error()))
+        mistake = isinstance(error, (RequestError, _spec_error()))
         text = sentence(error)
         module = type(error).__module__
         ours = module.startswith("simnav") and not module.startswith(
@@ -267,8 +244,3 @@ def _spec_error() -> type[Exception]:
     from simnav.spec import SpecError
 
     return SpecError
-
-
-def absolute(path: Path | str) -> Path:
-    """The absolute form of a path, for messages."""
-    return Path(path).expanduser().resolve()

@@ -1,28 +1,23 @@
-"""The command ``simnav reproduce``."""
+"""``simnav reproduce``: a paper's comparison, run again."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simnav.leaderboard.cli.console import Output, UserError, absolute, mistakes, sentence, session
+from simnav.leaderboard.cli.console import session
+from simnav.leaderboard.cli.options import Debug, Json, Workers, absolute
 from simnav.leaderboard.papers import PAPERS
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
 
-__all__ = ["register", "run"]
+__all__ = ["command"]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the application."""
-    app.command("reproduce")(_command)
-
-
-def _command(
+def command(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help=f"{', '.join(PAPERS)}: see docs/papers.md.")],
     runs: Annotated[
         int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [few: ends within minutes]")
@@ -33,59 +28,37 @@ def _command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of results, tables, figures, page. [reproduced/PAPER]")
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    workers: Workers = 2,
+    json: Json = False,
+    debug: Debug = False,
 ) -> None:
     """Run a paper's comparison again: ours beside theirs, row by row; started again, it goes on where it was."""
     with session(json, debug) as out:
-        run(out, paper, runs, output, workers, method or ())
+        from simnav.leaderboard import interface
+        from simnav.leaderboard.papers import figures, page, report
+        from simnav.leaderboard.papers.comparison import RULES
 
+        folder = absolute(output or Path("reproduced") / paper)
+        with out.progress("starting") as bar:
 
-def run(
-    out: Output, key: str, runs: int | None, output: Path | None, workers: int, methods: Sequence[str] = ()
-) -> None:
-    """Reproduce a paper and show it; all of it, or what is about some of its methods."""
-    from simnav.leaderboard.campaign.campaign import CampaignError
-    from simnav.leaderboard.papers import figures, page, paper, report
-    from simnav.leaderboard.papers.comparison import RULES
-    from simnav.leaderboard.papers.reproduction import reproduce
-    from simnav.leaderboard.results.store import StoreError
+            def told(scenario: str, p: Progress) -> None:
+                bar.begin("compiling kernels" if p.stage == "compile" else scenario)
+                bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
 
-    with mistakes(ValueError):
-        chosen = paper.load(key)
-        if methods:
-            chosen = chosen.only(methods)
-    folder = absolute(output or Path("reproduced") / key)
-    begun: list[str] = []
-    with out.progress("starting") as bar:
-
-        def told(scenario: str, p: Progress) -> None:
-            begun.append(scenario)
-            bar.begin("compiling kernels" if p.stage == "compile" else scenario)
-            bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
-
-        try:
-            found = reproduce(chosen, runs or chosen.runs, folder / "results", workers=workers, progress=told)
-        except StoreError as error:
-            raise UserError(sentence(error)) from error
-        except CampaignError as error:
-            if not begun:
-                raise UserError(sentence(error)) from error
-            raise
-    folder.mkdir(parents=True, exist_ok=True)
-    table = report.write_csv(found, folder / f"paper-{key}.csv")
-    with out.progress("drawing", len(chosen.figures)) as bar:
-        drawn = figures.write_figures(found, folder, lambda done, total, note: bar(done, total, note=note))
-    written = page.write(found, drawn, folder)
-    paths = [d.path for d in drawn if d.path is not None]
-    out.document({**found.to_dict(), "contents": report.whereabouts(found, drawn), "csv": str(table),
-                  "page": str(written), "figures": [str(p) for p in paths]})  # fmt: skip
-    out.print(f"Paper {key}: {chosen.title}", f"{chosen.citation}\n")
-    for shown in report.paper_tables(found):
-        out.print(shown)
-    out.print(report.contents_table(found, drawn))
-    for note in chosen.notes:
-        out.print(f"note: {note}")
-    out.print(f"rule: {RULES}", f"{report.summary(found)}; the paper's number: --runs {chosen.full}")
-    out.print(f"table:   {table}", f"figures: {len(paths)} as PNG in {folder}", f"page:    {written}")
+            found = interface.reproduce(
+                paper, runs=runs, methods=method or (), output=folder, workers=workers, progress=told
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        table = report.write_csv(found, folder / f"paper-{paper}.csv")
+        with out.progress("drawing") as bar:
+            drawn = figures.write_figures(found, folder, lambda done, total, note: bar(done, total, note=note))
+        written = page.write(found, drawn, folder)
+        paths = [d.path for d in drawn if d.path is not None]
+        out.document({**found.to_dict(), "contents": report.whereabouts(found, drawn), "csv": str(table),
+                      "page": str(written), "figures": [str(p) for p in paths]})  # fmt: skip
+        out.print(f"Paper {paper}: {found.paper.title}", f"{found.paper.citation}\n")
+        out.print(*report.paper_tables(found), report.contents_table(found, drawn))
+        for note in found.paper.notes:
+            out.print(f"note: {note}")
+        out.print(f"rule: {RULES}", f"{report.summary(found)}; the paper's number: --runs {found.paper.full}")
+        out.print(f"table:   {table}", f"figures: {len(paths)} as PNG in {folder}", f"page:    {written}")

@@ -1,4 +1,4 @@
-"""The command ``simnav train``: learns the parameters of an estimator that has been to school."""
+"""``simnav train``: learns the parameters of a trained estimator anew."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from simnav.leaderboard.cli.console import Output, UserError, absolute, mistakes, session
+from simnav.leaderboard.cli.console import Output, session
+from simnav.leaderboard.cli.options import Debug, Json, absolute
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.estimators.adaptations.anfis_file import Parameters
@@ -56,8 +58,8 @@ def _command(
     output: Annotated[
         Path | None, typer.Option("--output", "--out", "-o", help="Parameter file. [anfis_FEATURES.json]")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    json: Json = False,
+    debug: Debug = False,
 ) -> None:
     """Train the network of anfis-fgo (a reconstruction of paper 002), and draw what it has learnt."""
     with session(json, debug) as out:
@@ -78,9 +80,9 @@ def run(out: Output, features: str, seeds: int, passes: int, output: Path | None
 
     path = absolute(output or Path(f"anfis_{features}.json"))
     if path.suffix != ".json":
-        raise UserError(f"--output {path}: the file should end in .json")
+        raise RequestError(f"--output {path}: the file should end in .json")
     if not path.parent.is_dir():
-        raise UserError(f"--output {path}: there is no folder {path.parent}")
+        raise RequestError(f"--output {path}: there is no folder {path.parent}")
     first = {"training": FIRST_TRAINING_SEED, "validation": FIRST_VALIDATION_SEED}
     count = {"training": seeds, "validation": max(seeds // 2, _LEAST_VALIDATION)}
     data = {}

@@ -5,7 +5,7 @@
 - `comparison`: means with intervals, and the rule by which a row agrees or differs.
 - `measures`: what can be compared: the named scores, and cost.
 - `reproduction`: finds the methods among the registered estimators, runs them, fills the rows.
-- `report`: tables, CSV; `figures` and `drawing`: PNG; `contents`: what the paper has, and where ours is; `page`: HTML.
+- `report`: tables, CSV; `figures`: PNG; `contents`: what the paper has, and where ours is; `page`: HTML.
 
 A method that nobody has registered yet gets a row that says so, and figures as soon as it is there.
 """

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simnav.leaderboard.figures.panels import Bar, bars, curves_over_time
 from simnav.leaderboard.figures.plots import Band, Curve, Style, error_cdf, error_over_time, save, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
-from simnav.leaderboard.papers.drawing import Bar, bars, curves_over_time
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.papers.paper import Figure, Gain, Range, Value
 from simnav.leaderboard.ranking.runs import Runs
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.trial import Trial
 
-__all__ = ["ERRORS", "Drawn", "write_figures"]
+__all__ = ["ERRORS", "Drawn", "draw", "write_figures"]
 
 _DEGREES = math.degrees(1.0)
 _PIXELS = 96  # of an inch, in CSS
@@ -121,6 +121,11 @@ def write_figures(
     return drawn
 
 
+def draw(found: Reproduction, entry: Figure) -> matplotlib.figure.Figure | None:
+    """One of the paper's figures; None where there is nothing to draw."""
+    return _Sketch(found).draw(entry)[0]
+
+
 def _number(entry: Figure) -> str:
     """With the letter of its part, where it has one."""
     return f"{entry.number}{entry.part}" if len(entry.part) == 1 else entry.number
@@ -139,8 +144,8 @@ class _Sketch:
         self.recordings: dict[str, Recording] = {}
         self.trials: dict[tuple[str, str], Trial | None] = {}
 
-    def write(self, entry: Figure, folder: Path) -> Drawn:
-        """Draw one figure and write it."""
+    def draw(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+        """A figure, the methods in it, and its caption."""
         draw = {
             "track": self._track,
             "run": self._run,
@@ -149,7 +154,11 @@ class _Sketch:
             "gains": self._gains,
             "distribution": self._distribution,
         }[entry.draw]
-        fig, shown, caption = draw(entry)
+        return draw(entry)
+
+    def write(self, entry: Figure, folder: Path) -> Drawn:
+        """Draw one figure and write it."""
+        fig, shown, caption = self.draw(entry)
         missing = tuple(m for m in entry.methods if m not in shown)
         path = folder / f"{entry.name}.png"
         if fig is None:

@@ -12,8 +12,12 @@ from simnav.leaderboard.papers.comparison import Verdict, judge, judge_gain
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
+from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.frame import frame
 
 if TYPE_CHECKING:
+    import matplotlib.figure
+
     from simnav.leaderboard.campaign.campaign import Progress
     from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.leaderboard.results.result import Result
@@ -89,6 +93,33 @@ class Reproduction:
             "methods": {name: None if r is None else r.label for name, r in self.stands_for.items()},
             "rows": [_row_dict(f) for f in self.findings],
         }
+
+    def to_frame(self) -> Any:
+        """A row of the paper's tables a row; see `simnav.leaderboard.results.frame.frame`."""
+        rows = [_row_dict(f) for f in self.findings]
+        texts = [{k: " / ".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()} for row in rows]
+        return frame([{**row, "paper": None if row["paper"] is None else str(row["paper"])} for row in texts])
+
+    def plot(self, number: str = "") -> matplotlib.figure.Figure:
+        """One of the paper's figures from our runs.
+
+        Parameters
+        ----------
+        number : str
+            ``Figure 4``; default: the first that there is something to draw of.
+
+        Raises
+        ------
+        RequestError
+            If there is none; one sentence.
+        """
+        from simnav.leaderboard.papers.figures import draw
+
+        for entry in self.paper.figures:
+            if number in ("", entry.number) and (fig := draw(self, entry)) is not None:
+                return fig
+        known = ", ".join(dict.fromkeys(f.number for f in self.paper.figures if f.number))
+        raise RequestError(f"there is nothing to draw of {number or 'this paper'}; it has {known or 'no figures'}")
 
 
 def _row_dict(f: Finding) -> dict[str, Any]:

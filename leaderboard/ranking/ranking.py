@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import Run, Runs, group
 from simnav.leaderboard.ranking.statistics import (
     RESAMPLES,
@@ -42,10 +43,13 @@ from simnav.leaderboard.ranking.statistics import (
     interval,
     tiers,
 )
+from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.plain import plain
 from simnav.scoring import badge
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["WORST", "OverallRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
@@ -192,6 +196,14 @@ class Ranking:
         """Plain dicts and lists for JSON; numbers that are not finite become None."""
         found: dict[str, Any] = plain(vars(self))
         return found
+
+    def to_frame(self) -> Any:
+        """A row an estimator, over all scenarios; see `simnav.leaderboard.results.frame.frame`."""
+        return frame([{k: v for k, v in vars(row).items() if k != "ratios"} | row.ratios for row in self.rows])
+
+    def plot(self) -> Figure:
+        """The scores with their intervals."""
+        return ranking_figure(self.rows)
 
 
 def rank(

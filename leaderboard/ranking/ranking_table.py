@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
 __all__ = [
-    "SCORE_AXIS",
     "SCORE_LEAD",
     "SCORE_TITLE",
     "between",
@@ -28,7 +27,6 @@ __all__ = [
 ]
 
 SCORE_TITLE = "× oracle"
-SCORE_AXIS = "Horizontal RMSE, as a multiple of the oracle's"
 _CAPTION = (
     "× oracle: ratio of the horizontal RMSE to the oracle's on the same run; interquartile mean over the runs, "
     "each scenario counting the same. Who does not suit all scenarios is adjusted for how hard the others are."

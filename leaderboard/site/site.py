@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.figures.plots import Dot, Style, dots
+from simnav.leaderboard.figures.plots import Style
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.ranking_table import (
-    SCORE_AXIS,
     SCORE_LEAD,
     SCORE_TITLE,
     coverages,
@@ -33,6 +33,7 @@ from simnav.leaderboard.ranking.ranking_table import (
     tier_starts,
 )
 from simnav.leaderboard.ranking.runs import Runs, group
+from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.site.content import (
@@ -61,16 +62,12 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.ranking import Ranking, ScenarioRanking
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["SiteError", "build"]
+__all__ = ["build"]
 
 _WORTH_PROCESSES = 3  # scenarios
 _STALE = 3600.0  # a build of this age runs no more [s]
 _NAME_OF_LABEL = re.compile(r"[(\[ ]")  # a label is a name, and its parameters in brackets
 _STATIC = (*STATIC, "results.schema.json")
-
-
-class SiteError(RuntimeError):
-    """A site that cannot be built here; the message is one sentence."""
 
 
 def build(
@@ -108,11 +105,11 @@ def build(
 
     Raises
     ------
-    SiteError
+    RequestError
         If there are no results, or the folder holds something that is no site.
     """
     if not results:
-        raise SiteError("there are no results to show")
+        raise RequestError("there are no results to show")
     output = Path(output).expanduser().resolve()
     _refuse_strangers(output)
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -130,9 +127,9 @@ def build(
 
 def _refuse_strangers(output: Path) -> None:
     if output.is_file():
-        raise SiteError(f"{output} is a file; a folder for the site is wanted")
+        raise RequestError(f"{output} is a file; a folder for the site is wanted")
     if output.is_dir() and any(output.iterdir()) and not (output / "results.schema.json").is_file():
-        raise SiteError(f"{output} holds other files and no site of simnav; name an empty or a new folder")
+        raise RequestError(f"{output} holds other files and no site of simnav; name an empty or a new folder")
 
 
 def _sweep(output: Path) -> None:
@@ -309,14 +306,9 @@ class _Site:
         ]
         figure = None
         if any(math.isfinite(row.score) for row in ranked):
-            points = [
-                Dot(r.estimator, r.score, r.low, r.high, hollow=r.reference,
-                    note=f"({r.failed} failed)" if r.failed else "")
-                for r in ranked if math.isfinite(r.score)
-            ]  # fmt: skip
             figure = write_figure(
                 self.folder,
-                dots(points, self.style, label=SCORE_AXIS, title="Overall, 95 % interval"),
+                ranking_figure(ranked, self.style),
                 "ranking",
                 "The ranking with its intervals; hollow: reference.",
                 "Overall score of every estimator with its interval, as in the table above",

@@ -21,6 +21,7 @@ from simnav.leaderboard.campaign import campaign
 from simnav.leaderboard.campaign.campaign import CampaignError, Progress, run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.store import Result, StoreError
 from simnav.scenario import Scenario, load, parse
 from simnav.warmup import warmup
@@ -396,7 +397,7 @@ def test_requests_that_make_no_sense(tmp_path: Path) -> None:
     ]
     for change, message in cases:
         arguments = {"scenarios": [s], "estimators": [good], "seeds": [0], **change}
-        with pytest.raises(CampaignError, match=message) as caught:
+        with pytest.raises(RequestError, match=message) as caught:
             run_campaign(folder=out, **arguments)
         assert "\n" not in str(caught.value)
         assert not list(out.glob("results/*"))

@@ -16,8 +16,9 @@ from typer.testing import CliRunner
 
 from simnav import estimator
 from simnav.leaderboard import cli
-from simnav.leaderboard.cli import arguments
-from simnav.leaderboard.cli.console import Output, Progress, plain
+from simnav.leaderboard.cli.console import Output, ProgressBar
+from simnav.leaderboard.interface import scenarios_of
+from simnav.leaderboard.results.plain import plain
 
 SCENARIO = """
 name = "pond"
@@ -216,7 +217,7 @@ def test_an_estimator_that_does_not_suit_is_a_mistake_if_it_is_alone(here):
         (["run", "pond.toml", "-e", "gnss-only:gian=1"], "gian"),
         (["run", "pond.toml", "-e", "gain=1"], "'gain=1' is no estimator"),
         (["run", "pond.toml", "-e", "gnss-only", "--set", "acceleration"], "name=value"),
-        (["run", "pond.toml", "-e", "gnss-only,ship-ekf", "--set", "nothing=1"], "--set nothing"),
+        (["run", "pond.toml", "-e", "gnss-only,ship-ekf", "--set", "nothing=1"], "nothing: none of the estimators"),
         (["run", "pond.toml", "--plot", "run.doc"], ".png, .svg or .pdf"),
         (["run", "broken.toml"], "broken.toml"),
         (["run", "wrong.toml"], "duration_s"),
@@ -362,12 +363,11 @@ def test_campaign_reports_failures_and_succeeds(here):
 
 
 def test_quick_leaves_out_what_is_long():
-    out = Output()
-    every = {s.name for s in arguments.scenarios(None, out)}
-    quick = {s.name for s in arguments.scenarios(None, out, quick=True)}
+    every = {s.name for s in scenarios_of(None, note=str)}
+    quick = {s.name for s in scenarios_of(None, quick=True, note=str)}
     assert quick < every
     assert len(quick) >= 6
-    assert arguments.scenarios(["coastal-voyage"], out, quick=True)  # what is asked for is run
+    assert scenarios_of(["coastal-voyage"], quick=True)  # what is asked for is run
 
 
 # -- the console ---------------------------------------------------------------------------------------------
@@ -385,7 +385,7 @@ def test_json_has_no_nan_and_knows_arrays():
 
 
 def test_progress_without_a_terminal_says_how_long(capsys, monkeypatch):
-    monkeypatch.setattr(Progress, "_PAUSE", 0.0)
+    monkeypatch.setattr(ProgressBar, "_PAUSE", 0.0)
     with Output().progress("running") as progress:
         progress(1, 4, left=75.0)
         progress(4, 4)
@@ -398,7 +398,7 @@ def test_progress_without_a_terminal_says_how_long(capsys, monkeypatch):
 def test_progress_on_a_terminal_begins_each_stage_anew():
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=True, width=100)
-    with Progress(console, "starting") as progress:
+    with ProgressBar(console, "starting") as progress:
         progress.begin("compiling")
         progress(7, 16, "a kernel", 30.0)
         progress._bar.refresh()

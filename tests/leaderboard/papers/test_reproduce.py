@@ -15,12 +15,12 @@ import pytest
 from typer.testing import CliRunner
 
 from simnav.leaderboard.cli import app
+from simnav.leaderboard.figures.panels import Bar, bars, broken
 from simnav.leaderboard.figures.plots import Style
 from simnav.leaderboard.papers import PAPERS, paper_001
 from simnav.leaderboard.papers import paper as papers
 from simnav.leaderboard.papers.comparison import judge, judge_gain
 from simnav.leaderboard.papers.contents import contents
-from simnav.leaderboard.papers.drawing import Bar, bars, broken
 from simnav.leaderboard.papers.figures import ERRORS
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.page import find as find_pages

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.ranking import ranking
+from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import site
-from simnav.leaderboard.site.site import SiteError
 from simnav.scoring import SCORES
 
 HOSTILE = '"><script>alert(1)</script> & {{ 7 * 7 }}/../x'
@@ -270,13 +270,13 @@ def test_a_failure_leaves_the_old_site_and_nothing_else(results, tmp_path, monke
 
 def test_a_folder_with_other_files_is_left_alone(results, tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(SiteError, match="other files"):
+    with pytest.raises(RequestError, match="other files"):
         site.build(results, rank(results), tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
 def test_without_results_there_is_no_site(tmp_path):
-    with pytest.raises(SiteError, match="no results"):
+    with pytest.raises(RequestError, match="no results"):
         site.build([], rank([]), tmp_path / "site")
     assert not (tmp_path / "site").exists()
 

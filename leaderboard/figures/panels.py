@@ -1,4 +1,4 @@
-"""Two kinds of figure that only the papers' comparisons need, in the house style: from plain arrays."""
+"""Figures with a panel for each quantity, from plain arrays: curves over time, and values beside a paper's."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.check import check, contract_recording
+from simnav.contract_check import check, contract_recording
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.types import KINDS, Estimate
 

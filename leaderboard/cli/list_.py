@@ -1,11 +1,16 @@
-"""What ``simnav list`` shows: scenarios, estimators, kinds of instruments and kinds of faults."""
+"""``simnav list``: scenarios, estimators, kinds of instruments and kinds of faults."""
 
 from __future__ import annotations
 
 import typing
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
+
+from simnav.leaderboard.cli.console import session
+from simnav.leaderboard.cli.options import Debug, Json
 from simnav.leaderboard.ranking import tables
 
 if TYPE_CHECKING:
@@ -13,7 +18,33 @@ if TYPE_CHECKING:
 
     from simnav.spec import Spec
 
-__all__ = ["estimators", "faults", "instruments", "scenarios", "table_of"]
+__all__ = ["command", "estimators", "faults", "instruments", "scenarios"]
+
+
+class Topic(StrEnum):
+    """What is listed."""
+
+    SCENARIOS = "scenarios"
+    ESTIMATORS = "estimators"
+    INSTRUMENTS = "instruments"
+    FAULTS = "faults"
+
+
+def command(
+    topic: Annotated[Topic | None, typer.Argument(help="What to list; without it, scenarios and estimators.")] = None,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+    listed = {
+        Topic.SCENARIOS: scenarios, Topic.ESTIMATORS: estimators, Topic.INSTRUMENTS: instruments, Topic.FAULTS: faults
+    }  # fmt: skip
+    with session(json, debug) as out:
+        topics = [topic] if topic else [Topic.SCENARIOS, Topic.ESTIMATORS]
+        found = {t.value: listed[t]() for t in topics}
+        out.document(found)
+        for name, entries in found.items():
+            out.print(_table(name, entries))
 
 
 def scenarios() -> list[dict[str, Any]]:
@@ -100,7 +131,7 @@ def _kind(spec: type[Spec], fallback: str) -> dict[str, Any]:
     return {"kind": _name(spec), "summary": summary, "keys": keys}
 
 
-def table_of(topic: str, entries: list[dict[str, Any]]) -> Table:
+def _table(topic: str, entries: list[dict[str, Any]]) -> Table:
     """The table of one topic."""
     if topic == "scenarios":
         rows = [[e["name"], f"v{e['id'].rpartition('-v')[2]}", tables.duration(e["duration"]), e["title"],
