@@ -1,8 +1,8 @@
 """Estimators that are defined in a session: a cell of a notebook, a script, a prompt.
 
-No file can be imported for them elsewhere. So a worker is sent the class itself (`carry`, by cloudpickle, which joblib
-brings), and only the isolated process of an attempt unpacks it. The key of its results is made of its source text and
-of all that it uses of the session (`source_text`).
+No file can be imported for them elsewhere. So a worker is sent the class itself (`carry`, by cloudpickle), and only the
+isolated process of an attempt unpacks it. The key of its results is made of its source text and of all that it uses of
+the session (`source_text`).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def carry(cls: type) -> bytes:
     RequestError
         If it uses something of the session that cannot be sent, like an open file.
     """
-    from joblib.externals import cloudpickle
+    import cloudpickle
 
     module = sys.modules.get(cls.__module__)
     by_value = module is not None and module.__name__ != "__main__" and is_session(cls.__module__)
