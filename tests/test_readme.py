@@ -65,6 +65,13 @@ def test_environment_is_made():
     assert namespace["env"].observation_space.contains(namespace["observation"])
 
 
+def test_calls_from_python(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    exec(next(b for b in BLOCKS["python"] if "simnav.evaluate" in b), {})
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.strip().endswith("of 2")
+
+
 def test_links_lead_somewhere():
     for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
         for target in re.findall(r"\]\((?!http)([^)#]+)", document.read_text()):

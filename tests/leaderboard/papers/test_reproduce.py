@@ -10,10 +10,12 @@ import os
 import re
 from pathlib import Path
 
+import matplotlib.figure
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import simnav
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.figures.panels import Bar, bars, broken
 from simnav.leaderboard.figures.plots import Style
@@ -28,6 +30,7 @@ from simnav.leaderboard.papers.paper import Figure, Gain, Left, Method, Paper, T
 from simnav.leaderboard.papers.report import paper_tables, summary, write_csv
 from simnav.leaderboard.papers.reproduction import Reproduction, find, find_method
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
+from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.results.result import Result
 from simnav.scenario import load
 from simnav.scoring import SCORES
@@ -496,6 +499,21 @@ def test_the_site_shows_what_was_reproduced(tiny):
     assert find_pages(Path("reproduced")) == []
     assert CliRunner().invoke(app, ["leaderboard", "reproduced/001/results", "--workers", "1"]).exit_code == 0
     assert not Path("site/paper-001.html").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
+def test_the_command_and_its_call_say_the_same(tiny):
+    done = call("001", "--workers", "1", "--output", "out", "--json")
+    document = json.loads(done.stdout)
+    found = simnav.reproduce("001", output="out", workers=1)
+    called = plain(found.to_dict())
+    assert {key: document[key] for key in called} == called
+    assert set(document) - set(called) == {"contents", "csv", "page", "figures"}
+    assert len(found.to_frame()) == len(document["rows"])
+    assert isinstance(found.plot(), matplotlib.figure.Figure)
+    assert isinstance(found.plot("Figure 5"), matplotlib.figure.Figure)
+    with pytest.raises(simnav.RequestError, match="nothing to draw of Figure 3; it has Figure 1"):
+        found.plot("Figure 3")
 
 
 def test_a_curve_is_broken_where_nothing_was_measured():
