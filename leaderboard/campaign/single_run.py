@@ -125,21 +125,7 @@ def run_once(
     seed: int = 0,
     progress: Callable[..., None] | None = None,
 ) -> RunReport:
-    """Run estimators over one recording.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    requests : sequence of EstimatorRequest
-    seed : int
-    progress : callable, optional
-        Called with how many of how many are done, and ``note=`` the label of the next.
-
-    Raises
-    ------
-    RequestError
-        If an estimator cannot be made, or the scenario not be recorded.
-    """
+    """Run estimators over one recording; see `simnav.leaderboard.interface.run`."""
     from simnav.scoring import score
     from simnav.trial import run_trial
 

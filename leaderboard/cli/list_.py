@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -36,58 +37,85 @@ def command(
     debug: Debug = False,
 ) -> None:
     """List scenarios, estimators, kinds of instruments or kinds of faults."""
-    listed = {
-        Topic.SCENARIOS: scenarios, Topic.ESTIMATORS: estimators, Topic.INSTRUMENTS: instruments, Topic.FAULTS: faults
-    }  # fmt: skip
     with session(json, debug) as out:
-        topics = [topic] if topic else [Topic.SCENARIOS, Topic.ESTIMATORS]
-        found = {t.value: listed[t]() for t in topics}
+        found: dict[str, Any] = {}
+        if topic in (None, Topic.SCENARIOS):
+            found["scenarios"] = scenarios()
+            out.print(_scenario_table(found["scenarios"]))
+        if topic in (None, Topic.ESTIMATORS):
+            found["estimators"] = estimators()
+            out.print(_estimator_table(found["estimators"]))
+        if topic in (Topic.INSTRUMENTS, Topic.FAULTS):
+            found[topic] = instruments() if topic is Topic.INSTRUMENTS else faults()
+            out.print(_kind_table(topic.value.capitalize(), found[topic]))
         out.document(found)
-        for name, entries in found.items():
-            out.print(_table(name, entries))
 
 
-def scenarios() -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class ScenarioItem:
+    """A scenario; the fields are the keys of the JSON document."""
+
+    name: str
+    id: str
+    title: str
+    duration: float
+    tags: tuple[str, ...]
+    gymnasium: str
+    file: str
+
+
+@dataclass(frozen=True)
+class EstimatorItem:
+    """An estimator; ``parameters`` maps a name to its default."""
+
+    name: str
+    aliases: tuple[str, ...]
+    summary: str
+    reference: bool
+    parameters: Mapping[str, object]
+    file: str
+    line: int
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a scenario file."""
+
+    required: bool
+    description: str
+
+
+@dataclass(frozen=True)
+class KindItem:
+    """A kind of instrument or fault, with its keys in a scenario file."""
+
+    kind: str
+    summary: str
+    keys: Mapping[str, Key]
+
+
+def scenarios() -> list[ScenarioItem]:
     """Every scenario of every pack."""
     from simnav.catalogue import headers
 
     return [
-        {
-            "name": h.name,
-            "id": h.id,
-            "title": h.title,
-            "duration": h.duration,
-            "tags": list(h.tags),
-            "gymnasium": f"simnav:{h.gym_id}",
-            "file": str(h.path),
-        }
-        for h in headers()
+        ScenarioItem(h.name, h.id, h.title, h.duration, h.tags, f"simnav:{h.gym_id}", str(h.path)) for h in headers()
     ]
 
 
-def estimators() -> list[dict[str, Any]]:
+def estimators() -> list[EstimatorItem]:
     """Every registered estimator."""
     from simnav.estimator import describe, names
 
-    found = []
-    for d in map(describe, names()):
-        values = {p.name: None if p.required else p.default for p in d.parameters}
-        found.append(
-            {
-                "name": d.name,
-                "aliases": list(d.aliases),
-                "summary": d.summary,
-                "reference": d.reference,
-                "parameters": values,
-                "file": d.file,
-                "line": d.line,
-            }
-        )
-    return found
+    return [
+        EstimatorItem(d.name, d.aliases, d.summary, d.reference,
+                      {p.name: None if p.required else p.default for p in d.parameters}, d.file, d.line)
+        for d in map(describe, names())
+    ]  # fmt: skip
 
 
-def instruments() -> list[dict[str, Any]]:
-    """Every kind of instrument, with its keys in a scenario file."""
+def instruments() -> list[KindItem]:
+    """Every kind of instrument."""
     from simnav import sensors
     from simnav.types import KINDS
 
@@ -98,8 +126,8 @@ def instruments() -> list[dict[str, Any]]:
     return found
 
 
-def faults() -> list[dict[str, Any]]:
-    """Every kind of fault, with its keys in a scenario file."""
+def faults() -> list[KindItem]:
+    """Every kind of fault."""
     from simnav import sensors
 
     return [_kind(spec, "") for spec in _specs(sensors.FaultSpec)]
@@ -121,28 +149,28 @@ def _name(spec: type[Spec]) -> str:
     return str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
 
 
-def _kind(spec: type[Spec], fallback: str) -> dict[str, Any]:
-    summary = (spec.__doc__ or fallback).strip().splitlines()[0]
+def _kind(spec: type[Spec], fallback: str) -> KindItem:
     keys = {
-        key: {"required": info.is_required(), "description": info.description or ""}
+        key: Key(info.is_required(), info.description or "")
         for key, (name, info) in spec.toml_keys().items()
         if name != "kind"
     }
-    return {"kind": _name(spec), "summary": summary, "keys": keys}
+    return KindItem(_name(spec), (spec.__doc__ or fallback).strip().splitlines()[0], keys)
 
 
-def _table(topic: str, entries: list[dict[str, Any]]) -> Table:
-    """The table of one topic."""
-    if topic == "scenarios":
-        rows = [[e["name"], f"v{e['id'].rpartition('-v')[2]}", tables.duration(e["duration"]), e["title"],
-                 ", ".join(e["tags"])] for e in entries]  # fmt: skip
-        return tables.table("Scenarios", ["name", "version", "duration", "title", "tags"], rows, numeric=["duration"])
-    if topic == "estimators":
-        rows = [[e["name"] + (" *" if e["reference"] else ""), e["summary"], tables.parameters(e["parameters"])]
-                for e in entries]  # fmt: skip
-        dim = [i for i, e in enumerate(entries) if e["reference"]]
-        caption = "* reference: it is told the truth, and is not ranked" if dim else None
-        return tables.table("Estimators", ["name", "what it is", "parameters"], rows, dim=dim, caption=caption)
-    rows = [[e["kind"], e["summary"], ", ".join(k + ("!" if v["required"] else "") for k, v in e["keys"].items())]
-            for e in entries]  # fmt: skip
-    return tables.table(topic.capitalize(), ["kind", "what it is", "keys in TOML (! required)"], rows)
+def _scenario_table(found: list[ScenarioItem]) -> Table:
+    rows = [[e.name, f"v{e.id.rpartition('-v')[2]}", tables.duration(e.duration), e.title, ", ".join(e.tags)]
+            for e in found]  # fmt: skip
+    return tables.table("Scenarios", ["name", "version", "duration", "title", "tags"], rows, numeric=["duration"])
+
+
+def _estimator_table(found: list[EstimatorItem]) -> Table:
+    rows = [[e.name + (" *" if e.reference else ""), e.summary, tables.parameters(e.parameters)] for e in found]
+    dim = [i for i, e in enumerate(found) if e.reference]
+    caption = "* reference: it is told the truth, and is not ranked" if dim else None
+    return tables.table("Estimators", ["name", "what it is", "parameters"], rows, dim=dim, caption=caption)
+
+
+def _kind_table(title: str, found: list[KindItem]) -> Table:
+    rows = [[e.kind, e.summary, ", ".join(k + ("!" if v.required else "") for k, v in e.keys.items())] for e in found]
+    return tables.table(title, ["kind", "what it is", "keys in TOML (! required)"], rows)

@@ -78,23 +78,7 @@ class BoundReport:
 def bounds_of(
     scenario: Scenario, runs: int = 12, smoothed: bool = False, progress: Callable[..., None] | None = None
 ) -> BoundReport:
-    """Compute the bounds of all kinds.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        A simulated one.
-    runs : int
-        Seeds, from 0 on.
-    smoothed : bool
-    progress : callable, optional
-        Called with how many of how many kinds are done, and ``note=`` the next.
-
-    Raises
-    ------
-    RequestError
-        If the scenario is recorded, or has no state that the bound knows.
-    """
+    """Compute the bounds of all kinds; see `simnav.leaderboard.interface.bound`."""
     from simnav.estimators.bound import KINDS, bound
 
     report = progress or (lambda *_, **__: None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import subprocess
@@ -11,14 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
 from simnav import estimator
 from simnav.leaderboard import cli
-from simnav.leaderboard.cli.console import Output, ProgressBar
 from simnav.leaderboard.interface import scenarios_of
-from simnav.leaderboard.results.plain import plain
 
 SCENARIO = """
 name = "pond"
@@ -377,38 +373,6 @@ def test_warmup_counts_kernels():
     from simnav.compiled import kernels
 
     assert document("warmup")["kernels"] == len(kernels()) > 0
-
-
-def test_json_has_no_nan_and_knows_arrays():
-    value = {"a": np.array([1.0, np.nan]), "b": float("inf"), "c": Path("x"), 3: np.float64(2.5), "d": (True, None)}
-    assert plain(value) == {"a": [1.0, None], "b": None, "c": "x", "3": 2.5, "d": [True, None]}
-
-
-def test_progress_without_a_terminal_says_how_long(capsys, monkeypatch):
-    monkeypatch.setattr(ProgressBar, "_PAUSE", 0.0)
-    with Output().progress("running") as progress:
-        progress(1, 4, left=75.0)
-        progress(4, 4)
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert "running: 1/4" in said.err
-    assert "1:15 left" in said.err
-
-
-def test_progress_on_a_terminal_begins_each_stage_anew():
-    screen = io.StringIO()
-    console = Console(file=screen, force_terminal=True, width=100)
-    with ProgressBar(console, "starting") as progress:
-        progress.begin("compiling")
-        progress(7, 16, "a kernel", 30.0)
-        progress._bar.refresh()
-        assert "7/16" in screen.getvalue()
-        assert "0:30" in screen.getvalue()
-        screen.truncate(0)
-        progress.begin("running")
-        progress._bar.refresh()
-    assert "running" in screen.getvalue()
-    assert "16" not in screen.getvalue()
 
 
 def entry(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
