@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["WORST", "OverallRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
+__all__ = ["WORST", "OverallRow", "RankedRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
 
 #: Ratio to the oracle's error that stands for a failed run, and that no completed run exceeds.
 WORST = 1e6
@@ -62,9 +62,9 @@ MIN_COVERAGE = 0.5
 _CAP = math.log(WORST)
 
 
-@dataclass(frozen=True)
-class ScenarioRow:
-    """One estimator on one scenario.
+@dataclass(frozen=True, kw_only=True)
+class RankedRow:
+    """One estimator, as it is ranked.
 
     Attributes
     ----------
@@ -72,22 +72,16 @@ class ScenarioRow:
     reference : bool
         Told the truth, not ranked.
     rank, tier : int or None
-        None for references.
+        None for references, and overall for those that cover too few scenarios.
     score, low, high : float
         Ratio to the baseline's error with its 95 % bootstrap interval (NaN with fewer than two runs).
     p_value : float or None
         Holm-adjusted, against the first; None for the first and for references.
-    median : float
-        Of the ranked score over the completed runs, in its unit; NaN without any.
     runs, failed : int
-    statuses : dict of str to int
-        How many runs ended how; ``incomplete`` are those with too few positions.
     badge : str
-        Consistency of the horizontal position (`simnav.scoring.badge`).
-    nees : float
-        Mean over the runs, by degree of freedom; NaN without a covariance.
+        Consistency of the horizontal position (`simnav.scoring.badge`) over all runs.
     update_median : float
-        Median time per epoch [s].
+        Median time per epoch [s]; overall, the median over the scenarios.
     peak_memory : int
         Largest [bytes].
     """
@@ -100,14 +94,47 @@ class ScenarioRow:
     low: float
     high: float
     p_value: float | None
-    median: float
     runs: int
     failed: int
-    statuses: dict[str, int]
     badge: str
-    nees: float
     update_median: float
     peak_memory: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioRow(RankedRow):
+    """One estimator on one scenario.
+
+    Attributes
+    ----------
+    median : float
+        Of the ranked score over the completed runs, in its unit; NaN without any.
+    statuses : dict of str to int
+        How many runs ended how; ``incomplete`` are those with too few positions.
+    nees : float
+        Mean over the runs, by degree of freedom; NaN without a covariance.
+    """
+
+    median: float
+    statuses: dict[str, int]
+    nees: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverallRow(RankedRow):
+    """One estimator over all scenarios; the interval is stratified by scenario.
+
+    Attributes
+    ----------
+    covered, scenarios : int
+        How many scenarios it covers, of how many.
+    ratios : dict of str to float
+        Score by scenario.
+    """
+
+    covered: int
+    scenarios: int
+    ratios: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -129,49 +156,6 @@ class ScenarioRanking:
     baseline: str
     rows: tuple[ScenarioRow, ...]
     unsuitable: dict[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class OverallRow:
-    """One estimator over all scenarios.
-
-    Attributes
-    ----------
-    estimator : str
-    reference : bool
-    rank, tier : int or None
-        None for references and for those that cover too few scenarios.
-    score, low, high : float
-        As in `ScenarioRow`, over all scenarios (see the module), the interval stratified by scenario.
-    p_value : float or None
-    covered, scenarios : int
-        How many scenarios it covers, of how many.
-    runs, failed : int
-    badge : str
-        Over all runs.
-    update_median : float
-        Median over the scenarios of the time per epoch [s].
-    peak_memory : int
-    ratios : dict of str to float
-        Score by scenario.
-    """
-
-    estimator: str
-    reference: bool
-    rank: int | None
-    tier: int | None
-    score: float
-    low: float
-    high: float
-    p_value: float | None
-    covered: int
-    scenarios: int
-    runs: int
-    failed: int
-    badge: str
-    update_median: float
-    peak_memory: int
-    ratios: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -291,27 +275,34 @@ class _Scenario:
 
     def _row(self, name: str, position: int | None, place: Place | None) -> ScenarioRow:
         cell, x = self.cells[name], self.strata[name]
-        low, high = interval(self.draws[name]) if len(x) > 1 else (math.nan, math.nan)
-        statuses = cell.statuses
-        nees, seconds = cell.numbers("nees_horizontal"), cell.numbers("update_median")
+        spread = interval(self.draws[name]) if len(x) > 1 else (math.nan, math.nan)
+        nees = cell.numbers("nees_horizontal")
         return ScenarioRow(
-            estimator=name,
-            reference=cell.reference,
+            **_common([cell], place, self.means[name], spread),
             rank=position,
-            tier=place.tier if place else None,
-            score=math.exp(self.means[name]),
-            low=math.exp(low),
-            high=math.exp(high),
-            p_value=place.p_value if place else None,
+            update_median=_median(cell.numbers("update_median")),
             median=_median(cell.completed.values()),
-            runs=len(x),
-            failed=len(x) - statuses.get("ok", 0),
-            statuses=statuses,
-            badge=badge(nees),
+            statuses=cell.statuses,
             nees=float(np.mean(nees)) if len(nees) else math.nan,
-            update_median=_median(seconds),
-            peak_memory=cell.peak_memory,
         )
+
+
+def _common(cells: Sequence[Runs], place: Place | None, score: float, spread: tuple[float, float]) -> dict[str, Any]:
+    """The fields of a row that are the same on one scenario and over all."""
+    runs = sum(len(c.tried) for c in cells)
+    return {
+        "estimator": cells[0].estimator,
+        "reference": any(c.reference for c in cells),
+        "tier": place.tier if place else None,
+        "score": math.exp(score),
+        "low": math.exp(spread[0]),
+        "high": math.exp(spread[1]),
+        "p_value": place.p_value if place else None,
+        "runs": runs,
+        "failed": runs - sum(c.statuses.get("ok", 0) for c in cells),
+        "badge": badge(np.concatenate([c.numbers("nees_horizontal") for c in cells])),
+        "peak_memory": max(c.peak_memory for c in cells),
+    }
 
 
 def _median(values: Iterable[float]) -> float:
@@ -350,43 +341,20 @@ def _overall(scenarios: Sequence[_Scenario]) -> list[OverallRow]:
     places = tiers(ranked, lambda a, b: [s.differences(a, b) for s in scenarios if {a, b} <= s.cells.keys()])
     order = list(places) + sorted((n for n in entries if n not in places), key=lambda n: (score[n], n))
     order += sorted(references, key=lambda n: (score[n], n))
-    return [
-        _overall_row(n, k + 1, places.get(n), score[n], spread[n], covers[n], len(scenarios))
-        for k, n in enumerate(order)
-    ]
 
+    def row(name: str, position: int) -> OverallRow:
+        mine, place = covers[name], places.get(name)
+        seconds = [float(np.median(x)) for s in mine if len(x := s.cells[name].numbers("update_median"))]
+        return OverallRow(
+            **_common([s.cells[name] for s in mine], place, score[name], spread[name]),
+            rank=position if place else None,
+            update_median=_median(seconds),
+            covered=len(mine),
+            scenarios=len(scenarios),
+            ratios={s.name: math.exp(s.means[name]) for s in mine},
+        )
 
-def _overall_row(
-    name: str,
-    position: int,
-    place: Place | None,
-    score: float,
-    spread: tuple[float, float],
-    covers: Sequence[_Scenario],
-    scenarios: int,
-) -> OverallRow:
-    cells = [s.cells[name] for s in covers]
-    nees = np.concatenate([c.numbers("nees_horizontal") for c in cells])
-    seconds = [float(np.median(x)) for c in cells if len(x := c.numbers("update_median"))]
-    runs = sum(len(c.tried) for c in cells)
-    return OverallRow(
-        estimator=name,
-        reference=any(c.reference for c in cells),
-        rank=position if place else None,
-        tier=place.tier if place else None,
-        score=math.exp(score),
-        low=math.exp(spread[0]),
-        high=math.exp(spread[1]),
-        p_value=place.p_value if place else None,
-        covered=len(covers),
-        scenarios=scenarios,
-        runs=runs,
-        failed=runs - sum(c.statuses.get("ok", 0) for c in cells),
-        badge=badge(nees),
-        update_median=_median(seconds),
-        peak_memory=max(c.peak_memory for c in cells),
-        ratios={s.name: math.exp(s.means[name]) for s in covers},
-    )
+    return [row(name, k + 1) for k, name in enumerate(order)]
 
 
 def _adjusted_means(cells: Sequence[tuple[str, str]]) -> dict[str, Array]:
