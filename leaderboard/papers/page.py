@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 
 from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers.comparison import RULES
-from simnav.leaderboard.papers.report import NUMERIC, Whereabouts, sheets, summary, whereabouts
+from simnav.leaderboard.papers.report import Sheet, Whereabouts, sheets, summary, whereabouts
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.site.content import SiteFacts
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
@@ -25,27 +25,6 @@ if TYPE_CHECKING:
 __all__ = ["PaperPage", "find", "write"]
 
 _FORMAT = 1  # of the document
-
-
-@dataclass(frozen=True)
-class _Column:
-    title: str
-    numeric: bool
-
-
-@dataclass(frozen=True)
-class _Row:
-    cells: list[str]
-    verdict: str
-
-
-@dataclass(frozen=True)
-class _Table:
-    title: str
-    number: str
-    columns: list[_Column]
-    rows: list[_Row]
-    notes: list[str]
 
 
 @dataclass(frozen=True)
@@ -75,7 +54,7 @@ class _Document:
     command: str
     full: str
     notes: list[str]
-    tables: list[_Table]
+    tables: list[Sheet]
     figures: list[_Figure]
     contents: list[Whereabouts]
 
@@ -187,16 +166,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn]) -> _Document:
         command=f"simnav reproduce {paper.key} --runs {len(found.seeds)}",
         full=f"simnav reproduce {paper.key} --runs {paper.full}",
         notes=list(paper.notes),
-        tables=[
-            _Table(
-                s.title,
-                s.number,
-                [_Column(c, c in NUMERIC) for c in s.columns],
-                [_Row(cells, v) for cells, v in zip(s.rows, s.verdicts, strict=True)],
-                s.notes,
-            )
-            for s in sheets(found)
-        ],
+        tables=list(sheets(found)),
         figures=[
             _Figure(d.number, d.title, d.path.name, d.caption, d.width, d.height, list(d.missing))
             for d in drawn

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from simnav.leaderboard.papers.reproduction import Finding, Reproduction
 
 __all__ = [
-    "NUMERIC",
     "Sheet",
     "Whereabouts",
     "contents_table",
@@ -33,9 +32,8 @@ __all__ = [
     "write_csv",
 ]
 
-#: Columns that are right-aligned.
-NUMERIC = ("paper", "ours [95 %]", "runs")
 _COLUMNS = ("method", "ours by", "measure", "paper", "ours [95 %]", "runs", "verdict")
+_NUMERIC = ("paper", "ours [95 %]", "runs")
 
 
 def summary(found: Reproduction) -> str:
@@ -47,26 +45,39 @@ def summary(found: Reproduction) -> str:
 
 
 @dataclass(frozen=True)
+class Column:
+    """A column of a sheet; a numeric one is right-aligned."""
+
+    title: str
+    numeric: bool
+
+
+@dataclass(frozen=True)
+class SheetRow:
+    """A row of a sheet: its cells as plain text, and the verdict of its finding."""
+
+    cells: list[str]
+    verdict: str
+
+
+@dataclass(frozen=True)
 class Sheet:
-    """One of the paper's tables with our figures, as plain text.
+    """One of the paper's tables with our figures.
 
     Attributes
     ----------
     title, number : str
         Ours, and the paper's.
-    columns : list of str
-    rows : list of list of str
-    verdicts : list of str
-        Of each row.
+    columns : list of Column
+    rows : list of SheetRow
     notes : list of str
         Why rows differ, with the letter that the rows refer to; what the marks mean.
     """
 
     title: str
     number: str
-    columns: list[str]
-    rows: list[list[str]]
-    verdicts: list[str]
+    columns: list[Column]
+    rows: list[SheetRow]
     notes: list[str]
 
 
@@ -84,23 +95,24 @@ def sheets(found: Reproduction) -> Iterator[Sheet]:
             name = _method(f)
             same = name == before
             who = ["", ""] if same else [name, _by(f)]
-            cells.append([*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys)])
+            texts = [*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys)]
+            cells.append(SheetRow(texts, f.verdict))
             before = name
         notes = [f"({chr(ord('a') + i)}) {why}" for i, why in enumerate(whys)]
         if any(not isinstance(f.row, Gain) and f.row.rule == "beside" for f in rows):
             notes.insert(0, "° of other data than ours: beside it, without a verdict")
         if any(f.row.derived and f.row.paper is not None for f in rows):
             notes.insert(0, "~ follows from other figures of the paper, or from its prose")
-        yield Sheet(of.title, of.number, list(_COLUMNS), cells, [f.verdict for f in rows], notes)
+        yield Sheet(of.title, of.number, [Column(c, c in _NUMERIC) for c in _COLUMNS], cells, notes)
 
 
 def paper_tables(found: Reproduction) -> Iterator[Table]:
     """The sheets as tables for the console."""
     for sheet in sheets(found):
-        strong = [i for i, v in enumerate(sheet.verdicts) if v == "differs"]
-        dim = [i for i, v in enumerate(sheet.verdicts) if v in ("absent", "ours")]
+        strong = [i for i, r in enumerate(sheet.rows) if r.verdict == "differs"]
+        dim = [i for i, r in enumerate(sheet.rows) if r.verdict in ("absent", "ours")]
         title = f"{sheet.number}: {sheet.title}" if sheet.number else sheet.title
-        yield tables.table(title, sheet.columns, sheet.rows, numeric=NUMERIC, strong=strong, dim=dim,
+        yield tables.table(title, _COLUMNS, [r.cells for r in sheet.rows], numeric=_NUMERIC, strong=strong, dim=dim,
                            caption="\n".join(sheet.notes) or None)  # fmt: skip
 
 
