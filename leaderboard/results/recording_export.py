@@ -7,6 +7,7 @@ angles are in degrees. Nothing is rounded: a file read back holds the same numbe
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,21 +23,15 @@ if TYPE_CHECKING:
 
 __all__ = ["write_csv", "write_npz"]
 
-_UNITS = {
-    "latitude": "deg",
-    "longitude": "deg",
-    "heading": "deg",
-    "roll": "deg",
-    "pitch": "deg",
-    "yaw": "deg",
+#: Columns of the truth and of the IMU, with their units.
+_TRUTH = {
+    **dict.fromkeys(("latitude", "longitude"), "deg"),
     "height": "m",
-    "depth": "m",
-    "angular_rate": "deg_s",
-    "specific_force": "m_s2",
+    **dict.fromkeys(("velocity_north", "velocity_east", "velocity_down"), "m_s"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "deg"),
 }
-_VELOCITY = "m_s"
-_VELOCITIES = ["velocity_north", "velocity_east", "velocity_down"]
-_STATES = ["latitude", "longitude", "height", *_VELOCITIES, "roll", "pitch", "yaw"]
+_IMU_UNITS = (("angular_rate", "deg_s"), ("specific_force", "m_s2"))
+_IMU = {f"{name}_{axis}": unit for name, unit in _IMU_UNITS for axis in "xyz"}
 
 
 @writes("recording", "npz")
@@ -53,28 +48,29 @@ def write_csv(recording: Recording, path: Path) -> list[Path]:
     path.mkdir(parents=True, exist_ok=True)
     truth, imu = recording.data.truth, recording.data.imu
     states = np.hstack([truth.position, truth.velocity, truth.attitude])
-    written = [_table(path / "truth.csv", truth.time, _STATES, states)]
+    written = [_table(path / "truth.csv", truth.time, _TRUTH, states)]
     if imu is not None:
-        names = [f"{q}_{axis}" for q in ("angular_rate", "specific_force") for axis in "xyz"]
         samples = np.hstack([imu.angular_rate, imu.specific_force])
-        written.append(_table(path / "imu.csv", imu.time, names, samples))
+        written.append(_table(path / "imu.csv", imu.time, _IMU, samples))
     for stream in recording.data.aids.values():
-        names = list(KINDS[stream.kind].values)
-        written.append(_table(path / f"{stream.name}.csv", stream.time, names, stream.value, stream.faults))
+        file = path / f"{stream.name}.csv"
+        written.append(_table(file, stream.time, _units(stream.kind), stream.value, stream.faults))
     return written
 
 
-def _unit(name: str) -> str:
-    stem = name[:-2] if name[-2:] in ("_x", "_y", "_z") else name
-    return _UNITS.get(stem, _VELOCITY)
+def _units(kind: str) -> dict[str, str]:
+    """The unit of each column of a kind of instrument; what no other dict names is a velocity."""
+    return {name: _TRUTH.get(name, {"heading": "deg", "depth": "m"}.get(name, "m_s")) for name in KINDS[kind].values}
 
 
-def _table(path: Path, time: Array, names: list[str], values: Array, faults: NDArray[np.uint32] | None = None) -> Path:
-    units = [_unit(n) for n in names]
-    scale = np.array([np.degrees(1.0) if u.startswith("deg") else 1.0 for u in units])
-    header = ["time_s", *(f"{n}_{u}" for n, u in zip(names, units, strict=True))]
+def _table(
+    path: Path, time: Array, units: Mapping[str, str], values: Array, faults: NDArray[np.uint32] | None = None
+) -> Path:
+    """Write the columns, of the given names and units."""
+    scale = np.array([np.degrees(1.0) if u.startswith("deg") else 1.0 for u in units.values()])
+    header = ["time_s", *(f"{name}_{unit}" for name, unit in units.items())]
     columns = [time[:, None], values * scale]
-    formats = ["%.17g"] * (1 + len(names))
+    formats = ["%.17g"] * (1 + len(units))
     if faults is not None:
         header.append("faults")  # bit mask of the faults that touched the measurement
         columns.append(np.asarray(faults, dtype=np.float64)[:, None])
