@@ -57,7 +57,7 @@ __all__ = [
 ScenarioLike: TypeAlias = "str | Path | Scenario"
 Scenarios: TypeAlias = "ScenarioLike | Iterable[ScenarioLike] | None"
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
-Told: TypeAlias = "Callable[[Progress], None] | None"
+CampaignProgress: TypeAlias = "Callable[[Progress], None] | None"
 
 
 def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
@@ -147,7 +147,7 @@ def evaluate(
     time_limit: float | None = None,
     memory_limit: float = 2048.0,
     results: str | os.PathLike[str] | None = None,
-    progress: Told = None,
+    progress: CampaignProgress = None,
 ) -> EvaluationReport:
     """Run estimators beside the baselines on the same seeds, and say where they stand.
 
@@ -217,7 +217,7 @@ def campaign(
     workers: int = 2,
     time_limit: float | None = None,
     memory_limit: float = 2048.0,
-    progress: Told = None,
+    progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run scenarios x estimators x seeds; started again, it goes on where it was.
 
@@ -365,7 +365,7 @@ def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str],
     quick : bool
         Of the catalogue, leave out those that are tagged ``long``.
     note : callable, optional
-        Told what is left out; default: a warning.
+        Called with a sentence on what is left out; default: a warning.
     """
     from simnav.scenario import names
 
@@ -440,7 +440,7 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
 
 def _run(
     scenarios: Sequence[Scenario], everyone: Sequence[EstimatorRequest], seeds: range, folder: Path, workers: int,
-    time_limit: float | None, memory_limit: float, progress: Told,
+    time_limit: float | None, memory_limit: float, progress: CampaignProgress,
 ) -> Summary:  # fmt: skip
     from simnav.leaderboard.campaign.campaign import run_campaign
     from simnav.leaderboard.results.store import StoreError, create

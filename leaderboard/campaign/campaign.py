@@ -167,7 +167,7 @@ def run_campaign(
     KeyboardInterrupt
         By the user; all finished results are on disk.
     """
-    begun = time.monotonic()
+    started = time.monotonic()
     report = progress or (lambda p: None)
     seeds = list(dict.fromkeys(seeds))
     if workers < 1:
@@ -212,14 +212,14 @@ def run_campaign(
     statuses: Counter[str] = Counter()
     if units:
         _compile(report)
-        run_begun = time.monotonic()
+        run_started = time.monotonic()
         weight, left = 0.0, sum(u.weight for u in units)
         report(Progress("run", skipped, total))
         with contextlib.closing(_outcomes(units, workers, backend, scheduler)) as outcomes:
             for unit, outcome in outcomes:
                 statuses.update(outcome)
                 weight, left = weight + unit.weight, left - unit.weight
-                elapsed = time.monotonic() - run_begun
+                elapsed = time.monotonic() - run_started
                 failed = Summary(path, total, skipped, statuses, 0.0).failed
                 done = skipped + statuses.total()
                 note = f"{unit.scenario.id}, seed {unit.seed}"
@@ -228,7 +228,7 @@ def run_campaign(
         store.compact(path)
     else:
         report(Progress("run", total, total))
-    return Summary(path, total, skipped, dict(statuses), time.monotonic() - begun)
+    return Summary(path, total, skipped, dict(statuses), time.monotonic() - started)
 
 
 def _unique(what: str, labels: list[str]) -> None:
@@ -285,12 +285,12 @@ def _compile(report: Callable[[Progress], None]) -> None:
     """Compile what is not in the cache, before several workers would do it at once."""
     from simnav.warmup import warmup
 
-    begun = time.monotonic()
+    started = time.monotonic()
 
-    def told(done: int, total: int, name: str) -> None:
-        report(Progress("compile", done, total, elapsed=time.monotonic() - begun, note=name))
+    def compiled(done: int, total: int, name: str) -> None:
+        report(Progress("compile", done, total, elapsed=time.monotonic() - started, note=name))
 
-    warmup(told, load=False)
+    warmup(compiled, load=False)
 
 
 # --- spreading the work -------------------------------------------------------------------------------

@@ -74,14 +74,14 @@ class RunReport:
         """What ``simnav run --json`` prints, but for the figure."""
         from simnav.scoring import SCORES
 
-        told = ("estimator", "parameters", "reference", "status", "reason", "seconds", "scores")
+        fields = ("estimator", "parameters", "reference", "status", "reason", "seconds", "scores")
         return {
             "scenario": self.recording.scenario,
             "seed": self.recording.seed,
             "duration": self.recording.duration,
             "note": self.recording.note,
             "simulation_seconds": self.simulation_seconds,
-            "estimators": [{name: getattr(e, name) for name in told} for e in self.estimators],
+            "estimators": [{name: getattr(e, name) for name in fields} for e in self.estimators],
             "scores": {name: {"title": s.title, "unit": s.unit, "better": s.better} for name, s in SCORES.items()},
         }
 
@@ -131,16 +131,16 @@ def run_once(
 
     with mistakes(ValueError):
         estimators = [request.make() for request in requests]
-    begun = time.perf_counter()
+    started = time.perf_counter()
     recording = record(scenario, seed)
-    simulated = time.perf_counter() - begun
+    simulated = time.perf_counter() - started
     report = progress or (lambda *_, **__: None)
     runs = []
     for k, (request, estimator) in enumerate(zip(requests, estimators, strict=True)):
         report(k, len(requests), note=request.label)
-        begun = time.perf_counter()
+        started = time.perf_counter()
         trial = run_trial(estimator, recording)
-        seconds = time.perf_counter() - begun
+        seconds = time.perf_counter() - started
         scores = score(trial, recording) if len(trial) else {}
         runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status, trial.reason,
                                  seconds, scores, trial))  # fmt: skip

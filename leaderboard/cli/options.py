@@ -83,8 +83,8 @@ def absolute(path: Path | str) -> Path:
 def campaign_progress(bar: ProgressBar) -> Callable[[Progress], None]:
     """What shows a campaign's progress on a bar."""
 
-    def told(p: Progress) -> None:
+    def show(p: Progress) -> None:
         bar.begin(_STAGES.get(p.stage, p.stage))
         bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
 
-    return told
+    return show

@@ -41,12 +41,12 @@ def command(
         folder = absolute(output or Path("reproduced") / paper)
         with out.progress("starting") as bar:
 
-            def told(scenario: str, p: Progress) -> None:
+            def show(scenario: str, p: Progress) -> None:
                 bar.begin("compiling kernels" if p.stage == "compile" else scenario)
                 bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
 
             found = interface.reproduce(
-                paper, runs=runs, methods=method or (), output=folder, workers=workers, progress=told
+                paper, runs=runs, methods=method or (), output=folder, workers=workers, progress=show
             )
         folder.mkdir(parents=True, exist_ok=True)
         table = report.write_csv(found, folder / f"paper-{paper}.csv")

@@ -16,9 +16,9 @@ def command(json: Json = False, debug: Debug = False) -> None:
         from simnav.compiled import kernels
         from simnav.warmup import warmup
 
-        begun = time.perf_counter()
+        started = time.perf_counter()
         with out.progress("compiling kernels") as progress:
             warmup(progress)
-        seconds, count = time.perf_counter() - begun, len(kernels())
+        seconds, count = time.perf_counter() - started, len(kernels())
         out.document({"kernels": count, "seconds": seconds})
         out.print(f"{count} kernels ready in {seconds:.1f} s")

@@ -58,8 +58,8 @@ def _entries(paper: Paper) -> Iterator[tuple[str, str, tuple[str, ...], str]]:
     for figure in paper.figures:
         if figure.number:
             yield figure.number, figure.what, (f"{figure.name}.png",), ""
-    for left in paper.left:
-        yield left.number, left.what, (), left.why
+    for entry in paper.not_shown:
+        yield entry.number, entry.what, (), entry.why
 
 
 def _order(item: Item) -> tuple[bool, int]:

@@ -21,8 +21,8 @@ __all__ = [
     "Draw",
     "Figure",
     "Gain",
-    "Left",
     "Method",
+    "NotShown",
     "Paper",
     "Range",
     "Row",
@@ -197,7 +197,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Left:
+class NotShown:
     """A table or figure of a paper that a simulation cannot show, and why."""
 
     number: str
@@ -221,7 +221,7 @@ class Paper:
     methods : tuple of Method
     tables : tuple of Table
     figures : tuple of Figure
-    left : tuple of Left
+    not_shown : tuple of NotShown
         Together with tables and figures all that the paper has.
     notes : tuple of str
         What the reader has to know of the comparison.
@@ -237,7 +237,7 @@ class Paper:
     methods: tuple[Method, ...]
     tables: tuple[Table, ...]
     figures: tuple[Figure, ...] = ()
-    left: tuple[Left, ...] = ()
+    not_shown: tuple[NotShown, ...] = ()
     notes: tuple[str, ...] = ()
     variants: Mapping[str, tuple[str, Callable[[Scenario], Scenario]]] = field(default_factory=dict)
 

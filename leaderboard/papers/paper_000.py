@@ -8,8 +8,8 @@ from simnav.leaderboard.papers.paper import (
     VELOCITY,
     Figure,
     Gain,
-    Left,
     Method,
+    NotShown,
     Paper,
     Table,
     Value,
@@ -247,11 +247,11 @@ PAPER = Paper(
         Figure("Figure 11", "Distribution of the position error", "distribution", _SCENARIO, _ALL[1:], part="b"),
         Figure("", "A bias of 25 m for 100 s", "spread", _BIAS, _RIVALS, {"Horizontal error [m]": "horizontal"}),
     ),
-    left=(
-        Left("Table 1", "Methods compared in words", "no figures in it"),
-        Left("Table 2", "Instruments", "settings, not results: coastal-voyage has them, and says which are ours"),
-        Left("Figure 1", "A factor graph", "a drawing of the method"),
-        Left("Figure 2", "The algorithm", "a drawing of the method"),
+    not_shown=(
+        NotShown("Table 1", "Methods compared in words", "no figures in it"),
+        NotShown("Table 2", "Instruments", "settings, not results: coastal-voyage has them, and says which are ours"),
+        NotShown("Figure 1", "A factor graph", "a drawing of the method"),
+        NotShown("Figure 2", "The algorithm", "a drawing of the method"),
     ),
     notes=(
         "The paper's figures are of one sea trial that is not public; ours are of a simulated voyage of the same "

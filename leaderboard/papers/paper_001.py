@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.papers.paper import POSITION, Figure, Gain, Left, Method, Paper, Row, Table, Value
+from simnav.leaderboard.papers.paper import POSITION, Figure, Gain, Method, NotShown, Paper, Row, Table, Value
 
 __all__ = ["PAPER"]
 
@@ -192,10 +192,10 @@ PAPER = Paper(
             ("EKF", "FGO", "Huber-FGO", "IAE filter", "IAE-FGO-Fix", "IAE-FGO"),
         ),
     ),
-    left=(
-        Left("Table 1", "The simulated IMU", "settings, not results: gnss-noise-step has them"),
-        Left("Figure 2", "The vehicle and its instruments", "a photograph"),
-        Left("Figure 3", "The road test's surroundings", "a photograph"),
+    not_shown=(
+        NotShown("Table 1", "The simulated IMU", "settings, not results: gnss-noise-step has them"),
+        NotShown("Figure 2", "The vehicle and its instruments", "a photograph"),
+        NotShown("Figure 3", "The road test's surroundings", "a photograph"),
     ),
     notes=(
         "The road test's data are not public. car-road is another real drive (KITTI) whose noise changes twice: its "

@@ -7,8 +7,8 @@ from simnav.leaderboard.papers.paper import (
     HORIZONTAL_VELOCITY,
     Figure,
     Gain,
-    Left,
     Method,
+    NotShown,
     Paper,
     Row,
     Table,
@@ -231,20 +231,20 @@ PAPER = Paper(
             {"Horizontal error [m]": "horizontal"},
         ),
     ),
-    left=(
-        Left("Table 1", "The three motions", "settings, and missing from the text at hand: the scenarios say ours"),
-        Left("Table 2", "Instruments", "settings, and missing from the text at hand: the scenarios say ours"),
-        Left("Figure 1", "The factor graph", "a drawing of the method"),
+    not_shown=(
+        NotShown("Table 1", "The three motions", "settings, and missing from the text at hand: the scenarios say ours"),
+        NotShown("Table 2", "Instruments", "settings, and missing from the text at hand: the scenarios say ours"),
+        NotShown("Figure 1", "The factor graph", "a drawing of the method"),
         *(
-            Left(
+            NotShown(
                 f"Figure {k}",
                 "A figure of section 3, the neuro-fuzzy network",
                 "section 3 is missing from the text at hand",
             )
             for k in (2, 3, 4)
         ),
-        Left("Figure 8", "The ship", "a photograph"),
-        Left(
+        NotShown("Figure 8", "The ship", "a photograph"),
+        NotShown(
             "Figure 12",
             "Share of the processor",
             "it says how a solver's threads fill one machine, not what the method needs: "

@@ -8,8 +8,8 @@ from simnav.leaderboard.papers.paper import (
     VELOCITY,
     Figure,
     Gain,
-    Left,
     Method,
+    NotShown,
     Paper,
     Row,
     Table,
@@ -184,10 +184,10 @@ PAPER = Paper(
             {"Horizontal error [m]": "horizontal", "Velocity error [m/s]": "velocity"},
         ),
     ),
-    left=(
-        Left("Table 1", "Instruments", "settings, not results: uuv-surface has them"),
-        Left("Figure 1", "The algorithm", "a drawing of the method"),
-        Left("Figure 2", "The vehicle", "a photograph"),
+    not_shown=(
+        NotShown("Table 1", "Instruments", "settings, not results: uuv-surface has them"),
+        NotShown("Figure 1", "The algorithm", "a drawing of the method"),
+        NotShown("Figure 2", "The vehicle", "a photograph"),
     ),
     notes=(
         "The paper's filters are compared on one recorded run; its raw data are not used here.",

@@ -10,8 +10,8 @@ from simnav.leaderboard.papers.paper import (
     VELOCITY,
     Figure,
     Gain,
-    Left,
     Method,
+    NotShown,
     Paper,
     Row,
     Table,
@@ -165,11 +165,11 @@ PAPER = Paper(
             {"Horizontal error [m]": "horizontal", "Velocity error [m/s]": "velocity"},
         ),
     ),
-    left=(
-        Left("Table 1", "Messages at the nodes of the graph", "formulas, not results"),
-        Left("Figure 1", "The instruments of an AUV", "a drawing"),
+    not_shown=(
+        NotShown("Table 1", "Messages at the nodes of the graph", "formulas, not results"),
+        NotShown("Figure 1", "The instruments of an AUV", "a drawing"),
         *(
-            Left(f"Figure {k}", what, "a drawing of the method")
+            NotShown(f"Figure {k}", what, "a drawing of the method")
             for k, what in (
                 (2, "The factor graph"),
                 (3, "The simplified factor graph"),

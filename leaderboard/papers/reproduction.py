@@ -209,8 +209,8 @@ def reproduce(
         ids[name] = scenario.id
         found = {r.label: r for m in methods if (r := stands_for[m]) is not None}
         if found:
-            told = None if progress is None else _told(progress, name)
-            run_campaign([scenario], list(found.values()), seeds, folder, workers=workers, progress=told)
+            named = None if progress is None else _named(progress, name)
+            run_campaign([scenario], list(found.values()), seeds, folder, workers=workers, progress=named)
             loaded = load(folder, series=bool(paper.figures))
             results += [r for r in loaded if r.scenario == scenario.id and r.estimator in found and r.seed in seeds]
     by: dict[tuple[str, str], list[Result]] = {}
@@ -221,7 +221,7 @@ def reproduce(
     return Reproduction(paper, seeds, findings, stands_for, results)
 
 
-def _told(progress: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:
+def _named(progress: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:
     return lambda p: progress(name, p)
 
 

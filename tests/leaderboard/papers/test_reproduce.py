@@ -26,7 +26,7 @@ from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.figures import ERRORS
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.page import find as find_pages
-from simnav.leaderboard.papers.paper import Figure, Gain, Left, Method, Paper, Table, Value
+from simnav.leaderboard.papers.paper import Figure, Gain, Method, NotShown, Paper, Table, Value
 from simnav.leaderboard.papers.report import paper_tables, summary, write_csv
 from simnav.leaderboard.papers.reproduction import Reproduction, find, find_method
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
@@ -420,7 +420,7 @@ def tiny(tmp_path, monkeypatch):
             Figure("Figure 6", "Gain", "gains", where, ("Wrong", "Right"), {"Gain [%]": "horizontal_rmse"}),
             Figure("", "Distribution", "distribution", where, ("Right",)),
         ),
-        left=(Left("Figure 7", "The pond", "a photograph"),),
+        not_shown=(NotShown("Figure 7", "The pond", "a photograph"),),
         notes=("One note.",),
     )
     monkeypatch.setattr("simnav.leaderboard.papers.paper.load", lambda key: paper)
