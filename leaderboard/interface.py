@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.ranking import Ranking
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.results.result import Result
+    from simnav.recording import Recording
 
 __all__ = [
     "EstimatorLike",
@@ -47,6 +48,7 @@ __all__ = [
     "make",
     "quick_estimators",
     "rank",
+    "record",
     "reproduce",
     "results_of",
     "run",
@@ -80,6 +82,29 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     'gnss-only'
     """
     return one_request(estimator, parameters).make()
+
+
+def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
+    """Run a scenario to its end: measurements, labels and truth.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+    seed : int
+
+    Raises
+    ------
+    ValueError
+        If there is no such scenario, or its log is absent or cannot be used.
+
+    Examples
+    --------
+    >>> len(record("harbour-multipath", seed=1).data.truth) > 100
+    True
+    """
+    from simnav.source import record
+
+    return record(scenario_of(scenario), seed)
 
 
 def check(estimator: EstimatorLike, **parameters: Any) -> Report:

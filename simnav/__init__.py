@@ -27,13 +27,14 @@ if TYPE_CHECKING:
         evaluate,
         make,
         rank,
+        record,
         reproduce,
         run,
     )
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
     from simnav.scoring import score
-    from simnav.source import open_source, record
+    from simnav.source import open_source
     from simnav.trial import Trial, run_trial
     from simnav.types import (
         COMPONENTS,
@@ -99,7 +100,7 @@ _HOMES = {
     "recording": ("Recording",),
     "scenario": ("Scenario", "load"),
     "scoring": ("score",),
-    "source": ("open_source", "record"),
+    "source": ("open_source",),
     "trial": ("Trial", "run_trial"),
     "types": (
         "COMPONENTS",
@@ -124,6 +125,7 @@ _HOMES = {
         "evaluate",
         "make",
         "rank",
+        "record",
         "reproduce",
         "run",
     ),

@@ -92,7 +92,7 @@ def call_list() -> Any:
 
 
 def call_simulate() -> Any:
-    recording = simnav.record(simnav.load("pond.toml"), 4)
+    recording = simnav.record("pond.toml", 4)
     recording.save(Path("mine.npz"))
     theirs = Recording.load(Path("theirs.npz"))
     for name, stream in recording.data.aids.items():
@@ -289,6 +289,7 @@ def test_what_cannot_be_done_is_one_sentence(call: Callable[[], Any], says: str)
 def test_a_scenario_is_taken_as_it_is(here: Path) -> None:
     scenario = simnav.load("pond.toml")
     assert scenario_of(scenario) is scenario
+    assert len(simnav.record(scenario).data.truth) == len(simnav.record("pond.toml", seed=0).data.truth) == 30
     assert scenario_of(here / "pond.toml") == scenario
 
 
