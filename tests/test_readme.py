@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav.check import check
+from simnav.contract_check import check
 from simnav.estimator import make
 from simnav.scenario import load
 
@@ -63,6 +63,13 @@ def test_environment_is_made():
     namespace: dict = {}
     exec(next(b for b in BLOCKS["python"] if "gymnasium.make" in b), namespace)
     assert namespace["env"].observation_space.contains(namespace["observation"])
+
+
+def test_calls_from_python(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    exec(next(b for b in BLOCKS["python"] if "simnav.evaluate" in b), {})
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.strip().endswith("of 2")
 
 
 def test_links_lead_somewhere():

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.check import check
+from simnav.contract_check import check
 from simnav.estimator import describe, make, names
 
 PAGE = Path(__file__).parents[2] / "docs" / "estimators.md"

@@ -9,7 +9,7 @@ import pytest
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from simnav.check import check
+from simnav.contract_check import check
 from simnav.estimator import UnsuitableScenario, make, names
 from simnav.estimators.dead_reckoning import DeadReckoning
 from simnav.estimators.filterpy_adapter import FilterpyEstimator

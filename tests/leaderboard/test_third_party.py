@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from simnav.estimator import make
-from simnav.leaderboard import cli
-from simnav.leaderboard.charts import run_figure
-from simnav.leaderboard.csv_export import write
+from simnav.leaderboard.cli.application import app
+from simnav.leaderboard.figures.run_figure import run_figure
+from simnav.leaderboard.results.recording_export import write_csv
 from simnav.scenario import load
 from simnav.source import record
 from simnav.trial import run_trial
@@ -23,13 +23,13 @@ def recording(plugins):
 
 
 def call(*words, code: int = 0):
-    result = CliRunner().invoke(cli.app, [str(w) for w in words])
+    result = CliRunner().invoke(app, [str(w) for w in words])
     assert result.exit_code == code, (result.exit_code, result.stdout, result.stderr)
     return result
 
 
 def test_csv_has_the_names_and_the_units_of_its_components(recording, tmp_path):
-    assert tmp_path / "transponder.csv" in write(recording, tmp_path)
+    assert tmp_path / "transponder.csv" in write_csv(recording, tmp_path)
     lines = (tmp_path / "transponder.csv").read_text().splitlines()
     assert lines[0] == "time_s,range_m,bearing_deg,faults"
     rows = np.genfromtxt(lines[1:], delimiter=",")

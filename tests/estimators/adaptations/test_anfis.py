@@ -207,11 +207,11 @@ def test_the_target_is_the_variance_that_the_fixes_had():
 
 def test_seeds_of_training_and_validation_are_never_scored():
     """Campaigns, papers and bounds count from zero, by hundreds at most."""
-    from simnav.leaderboard import cli
-    from simnav.leaderboard.reproduce import PAPERS
-    from simnav.leaderboard.reproduce.paper import load as load_paper
+    from simnav.leaderboard.campaign.campaign import QUICK_RUNS, RUNS
+    from simnav.leaderboard.papers import PAPERS
+    from simnav.leaderboard.papers.paper import load as load_paper
 
-    scored = max(cli._RUNS, cli._QUICK_RUNS, *(load_paper(key).full for key in PAPERS))
+    scored = max(RUNS, QUICK_RUNS, *(load_paper(key).full for key in PAPERS))
     for features in FEATURES:
         record_ = Parameters.load(shipped(features)).record
         (first, last), (check, end) = record_["training_seeds"], record_["validation_seeds"]

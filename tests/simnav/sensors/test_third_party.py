@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from simnav.check import check, contract_recording
+from simnav.contract_check import check, contract_recording
 from simnav.earth import displace, relative_position
 from simnav.environment import NavigationEnv
 from simnav.kinds import Component, Kind

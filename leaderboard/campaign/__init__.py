@@ -1,0 +1,1 @@
+"""Running estimators: one attempt in isolation, campaigns of many, and the keys of what they give."""

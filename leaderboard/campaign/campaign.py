@@ -1,0 +1,375 @@
+"""Monte Carlo campaigns: scenarios x estimators x seeds, on several processes, safe to kill.
+
+The unit of work is a run (scenario, seed): it is recorded once, and every estimator is run on that
+recording, each in isolation. A result is on disk before the next estimator starts; a campaign that is
+started again does what is missing. Runs are taken seed by seed, all scenarios in turn, so that a
+campaign that was stopped early is still balanced.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.util
+import os
+import re
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simnav.estimator import EstimatorError, find
+from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
+from simnav.leaderboard.campaign.isolation import isolate
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.session_class import carry, is_session
+from simnav.leaderboard.campaign.worker import Entrant, Unit, run_unit
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+if TYPE_CHECKING:
+    from simnav.scenario import Scenario
+
+__all__ = ["CampaignError", "Progress", "Summary", "run_campaign", "time_limit"]
+
+#: Seeds of a campaign and of a quick one, by default.
+RUNS, QUICK_RUNS = 50, 3
+#: Memory that an estimator may take, by default [bytes].
+MEMORY = 2 << 30
+
+_IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
+_RESTARTS = 3  # of the workers, where one died
+
+
+class CampaignError(RuntimeError):
+    """A campaign that cannot go on; the message is one sentence."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a campaign is.
+
+    Attributes
+    ----------
+    stage : str
+        ``compile`` (kernels) or ``run`` (results).
+    done, total : int
+        Results that are there already count as done.
+    failed : int
+        Of those computed now.
+    elapsed : float
+        [s] since the stage began.
+    left : float or None
+        Time left [s]; None as long as nobody knows.
+    note : str
+        The kernel or run that was finished last.
+    """
+
+    stage: str
+    done: int
+    total: int
+    failed: int = 0
+    elapsed: float = 0.0
+    left: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a campaign did.
+
+    Attributes
+    ----------
+    folder : Path
+    total : int
+        Results that were asked for.
+    skipped : int
+        Of these, those that were there already.
+    statuses : mapping of str to int
+        How many of those computed now have which status.
+    seconds : float
+    """
+
+    folder: Path
+    total: int
+    skipped: int
+    statuses: Mapping[str, int]
+    seconds: float
+
+    @property
+    def computed(self) -> int:
+        """Results computed now."""
+        return sum(self.statuses.values())
+
+    @property
+    def failed(self) -> int:
+        """Results computed now that are failures (an unsuitable scenario is none)."""
+        return self.computed - self.statuses.get("ok", 0) - self.statuses.get("unsuitable", 0)
+
+
+def time_limit(scenario: Scenario) -> float:
+    """Default time that an estimator may take for a run [s]: a fifth of real time, at least a minute."""
+    return max(60.0, 0.2 * scenario.duration)
+
+
+def run_campaign(
+    scenarios: Sequence[Scenario],
+    estimators: Sequence[EstimatorRequest],
+    seeds: Iterable[int],
+    folder: str | os.PathLike[str],
+    *,
+    workers: int = 2,
+    timeout: float | None = None,
+    memory: int = MEMORY,
+    progress: Callable[[Progress], None] | None = None,
+    backend: str = "loky",
+    scheduler: str | None = None,
+) -> Summary:
+    """Run estimators on scenarios and seeds, and store the results.
+
+    Results that the folder has already are not computed again; those of estimators, scenarios or
+    versions that are not part of this campaign stay in it.
+
+    Parameters
+    ----------
+    scenarios, estimators, seeds
+    folder : path
+        Of the results; made if it is not there.
+    workers : int
+        Processes.
+    timeout : float, optional
+        Wall-clock time that an estimator may take for a run [s]; default: `time_limit`.
+    memory : int
+        Memory that an estimator may take beyond the recording [bytes].
+    progress : callable, optional
+        Called with a `Progress` now and then.
+    backend : {"loky", "dask"}
+        Processes of this machine, or a Dask cluster (extra ``distributed``), whose workers must see
+        the folder under the same path.
+    scheduler : str, optional
+        Address of the Dask scheduler; default: a cluster on this machine.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    RequestError
+        On a request that makes no sense: one sentence; nothing was run.
+    CampaignError
+        If workers die again and again; what is there stays valid.
+    StoreError
+        If the folder cannot be used, or the disk is full. What is there stays valid.
+    KeyboardInterrupt
+        By the user; all finished results are on disk.
+    """
+    started = time.monotonic()
+    report = progress or (lambda p: None)
+    seeds = list(dict.fromkeys(seeds))
+    if workers < 1:
+        raise RequestError(f"workers = {workers}: at least one is wanted")
+    if timeout is not None and not timeout > 0.0:
+        raise RequestError(f"timeout = {timeout:g} s should be greater than 0")
+    if memory < 16 << 20:
+        raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
+    for seed in seeds:
+        if not 0 <= seed < 2**63:
+            raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
+    _unique("scenario", [s.id for s in scenarios])
+    _unique("estimator", [e.label for e in estimators])
+    if backend not in ("loky", "dask"):
+        raise RequestError(f"backend = {backend!r} is unknown; there are 'loky' and 'dask'")
+    if backend == "dask" and importlib.util.find_spec("distributed") is None:
+        raise RequestError("backend = 'dask' needs the extra 'distributed': pip install 'simnav[distributed]'")
+
+    path = store.create(Path(folder).resolve())
+    there = {key for key, status in store.keys(path).items() if status != "no-recording"}
+    entrants = [_resolve(request) for request in estimators]
+    simulator = simulator_version()
+    recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
+    variants = {
+        s.id: {e.label: _variant(e, recordings[s.id]) for e in entrants} for s in scenarios
+    }  # scenario -> label -> variant
+    current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
+    store.select(path, current)
+
+    units: list[Unit] = []
+    for seed in seeds:
+        for scenario in scenarios:
+            keyed = ((e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants)
+            missing = tuple((e, key) for e, key in keyed if key not in there)
+            if missing:
+                limit = time_limit(scenario) if timeout is None else timeout
+                units.append(
+                    Unit(scenario, seed, missing, recordings[scenario.id], simulator, path, limit, memory, os.getpid())
+                )
+    total = len(seeds) * len(scenarios) * len(entrants)
+    skipped = total - sum(len(u.entrants) for u in units)
+    statuses: Counter[str] = Counter()
+    if units:
+        _compile(report)
+        run_started = time.monotonic()
+        weight, left = 0.0, sum(u.weight for u in units)
+        report(Progress("run", skipped, total))
+        with contextlib.closing(_outcomes(units, workers, backend, scheduler)) as outcomes:
+            for unit, outcome in outcomes:
+                statuses.update(outcome)
+                weight, left = weight + unit.weight, left - unit.weight
+                elapsed = time.monotonic() - run_started
+                failed = Summary(path, total, skipped, statuses, 0.0).failed
+                done = skipped + statuses.total()
+                note = f"{unit.scenario.id}, seed {unit.seed}"
+                report(Progress("run", done, total, failed, elapsed, elapsed / weight * left, note))
+        store.select(path, current)  # another campaign in the same folder may have had the last word
+        store.compact(path)
+    else:
+        report(Progress("run", total, total))
+    return Summary(path, total, skipped, dict(statuses), time.monotonic() - started)
+
+
+def _unique(what: str, labels: list[str]) -> None:
+    if not labels:
+        raise RequestError(f"no {what} was asked for")
+    twice = [label for label, count in Counter(labels).items() if count > 1]
+    if twice:
+        hint = "; give each its own label" if what == "estimator" else ""
+        raise RequestError(f"the {what} {twice[0]!r} was asked for twice{hint}")
+
+
+def _variant(entrant: Entrant, recording: str) -> str:
+    # Of a file only the name of the class counts, not the folder: its sources have a digest.
+    return variant(recording, entrant.label, os.path.basename(entrant.name), entrant.parameters, entrant.source)
+
+
+# --- before the run -----------------------------------------------------------------------------------
+
+
+def _resolve(request: EstimatorRequest) -> Entrant:
+    """Find an estimator and look at it, in isolation: importing a file runs it."""
+    name, code = request.name, b""
+    file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
+    if file:
+        name = f"{Path(file[1]).resolve()}{file[2] or ''}"
+    else:
+        _import_estimators()
+        with mistakes(EstimatorError):
+            cls = request.cls or find(name)
+        if request.cls is not None or is_session(cls.__module__):
+            code = carry(cls)
+    entrant = Entrant(name, dict(request.parameters), request.label, False, "", code)
+    outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=MEMORY)
+    if outcome.status != "ok":
+        reason = re.sub(r"^(Estimator|Request)Error: ", "", outcome.reason)
+        raise RequestError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
+    reference, source = outcome.value
+    return replace(entrant, reference=reference, source=source)
+
+
+def _describe(entrant: Entrant) -> tuple[bool, str]:
+    """In the isolated process: whether it is a reference, and the digest of its sources."""
+    cls = type(entrant.make())
+    return cls.reference, estimator_source(cls)
+
+
+def _import_estimators() -> None:
+    """Our own estimators, imported once here, so that forked processes need not do it."""
+    with contextlib.suppress(ImportError):
+        importlib.import_module("simnav.estimators")
+
+
+def _compile(report: Callable[[Progress], None]) -> None:
+    """Compile what is not in the cache, before several workers would do it at once."""
+    from simnav.warmup import warmup
+
+    started = time.monotonic()
+
+    def compiled(done: int, total: int, name: str) -> None:
+        report(Progress("compile", done, total, elapsed=time.monotonic() - started, note=name))
+
+    warmup(compiled, load=False)
+
+
+# --- spreading the work -------------------------------------------------------------------------------
+
+
+def _outcomes(
+    units: list[Unit], workers: int, backend: str, scheduler: str | None
+) -> Generator[tuple[Unit, Counter[str]], None, None]:
+    """Run the units and yield what became of them, in the order in which they end."""
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    left = dict(enumerate(units))
+    for _ in range(1 + _RESTARTS):
+        if not left:
+            return
+        try:
+            for index, outcome in _parallel(left, workers, backend, scheduler):
+                yield left.pop(index), outcome
+            return
+        except BrokenProcessPool:
+            there = store.keys(units[0].folder)  # some of it was finished, and could not be told any more
+            for index, unit in list(left.items()):
+                finished = tuple(entrant for entrant in unit.entrants if entrant[1] in there)
+                if finished:
+                    yield replace(unit, entrants=finished), Counter(there[key] for _, key in finished)
+                    left[index] = replace(unit, entrants=tuple(e for e in unit.entrants if e not in finished))
+                    if not left[index].entrants:
+                        del left[index]
+    raise CampaignError(
+        f"worker processes died {1 + _RESTARTS} times, as they do when the machine has no memory left; what is done is "
+        "on disk, so try again with fewer workers"
+    )
+
+
+def _parallel(
+    units: Mapping[int, Unit], workers: int, backend: str, scheduler: str | None
+) -> Iterator[tuple[int, Counter[str]]]:
+    from joblib import Parallel, delayed, parallel_config
+
+    with contextlib.ExitStack() as stack:
+        if backend == "dask":
+            distributed = importlib.import_module("distributed")  # an extra: there or not
+            options = {"address": scheduler} if scheduler else {"n_workers": workers, "threads_per_worker": 1}
+            client = distributed.Client(**options)
+            stack.enter_context(client)
+            stack.enter_context(parallel_config(backend="dask", n_jobs=-1))
+        else:
+            # A folder that holds a random.py must not be searched by a worker that starts in it.
+            stack.enter_context(_environment(PYTHONSAFEPATH="1"))
+            stack.enter_context(parallel_config(backend="loky", n_jobs=workers, inner_max_num_threads=1))
+            if workers > 1:
+                stack.callback(_stop_workers)
+        # Joblib's advice to whoever stops early, or whose worker was replaced, is not for the user.
+        stack.enter_context(warnings.catch_warnings())
+        for message in (".*tasks which were still being processed.*", "A worker stopped while some jobs.*"):
+            warnings.filterwarnings("ignore", message, UserWarning)
+        parallel = Parallel(return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
+        outcomes = parallel(delayed(run_unit)(index, unit) for index, unit in list(units.items()))
+        stack.callback(outcomes.close)
+        yield from outcomes
+
+
+def _stop_workers() -> None:
+    from joblib.externals.loky import reusable_executor
+
+    executor = reusable_executor._executor
+    if executor is not None:
+        executor.shutdown(wait=True, kill_workers=True)
+
+
+@contextlib.contextmanager
+def _environment(**values: str) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -1,0 +1,228 @@
+"""An estimator that was asked for: a class, a name or a file, with parameters."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from simnav.estimator import Estimator, make, register
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["EstimatorLike", "EstimatorRequest", "enlist", "kebab", "request", "requests", "split_estimators"]
+
+
+@dataclass(frozen=True)
+class EstimatorRequest:
+    """An estimator that takes part.
+
+    Attributes
+    ----------
+    name : str
+        Registered name, ``my.py`` or ``my.py:MyFilter``.
+    parameters : mapping
+        Keyword arguments of its constructor.
+    label : str
+        What tables call it; default: name and parameters.
+    cls : type or None
+        The class itself, where it was given as such: workers are sent it, for they may not find it by its name.
+    """
+
+    name: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    label: str = ""
+    cls: type[Estimator] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.label:
+            settings = ",".join(f"{k}={v}" for k, v in self.parameters.items())
+            plain = re.sub(r"\.py(?=$|:\w+$)", "", os.path.basename(self.name))
+            object.__setattr__(self, "label", f"{plain}({settings})" if settings else plain)
+
+    def make(self) -> Estimator:
+        """An instance; `simnav.estimator.EstimatorError` as of `simnav.estimator.make`."""
+        if self.cls is not None:
+            enlist(self.cls)
+        return make(self.name, **self.parameters)
+
+
+#: A name, a name with parameters (``ekf:gate=3``), a file (``my.py``, ``my.py:MyFilter``), a class, or one of these
+#: with a mapping of parameters.
+EstimatorLike: TypeAlias = (
+    "str | Path | type[Estimator] | EstimatorRequest | tuple[str | Path | type[Estimator], Mapping[str, Any]]"
+)
+
+
+def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -> EstimatorRequest:
+    """What was given, as a request.
+
+    Parameters
+    ----------
+    given : str, Path, type, EstimatorRequest or pair
+    parameters : mapping, optional
+        That are added, unless they are given already.
+
+    Raises
+    ------
+    RequestError
+        If it is no estimator, or several; one sentence.
+
+    Examples
+    --------
+    >>> request("ekf:gate=3,tau=10").label
+    'ekf(gate=3,tau=10)'
+    >>> request(("ekf", {"gate": 3.0})).parameters
+    {'gate': 3.0}
+    """
+    if isinstance(given, tuple):
+        given, own = given
+        return request(given, {**(parameters or {}), **own})
+    if isinstance(given, EstimatorRequest):
+        if not parameters:
+            return given
+        return EstimatorRequest(given.name, {**parameters, **given.parameters}, cls=given.cls)
+    if isinstance(given, type):
+        with mistakes():
+            name = enlist(given)
+        if given.__module__.startswith("simnav_file_"):  # `simnav.estimator.find` has imported it by its path
+            return EstimatorRequest(f"{inspect.getfile(given)}:{given.__name__}", dict(parameters or {}))
+        return EstimatorRequest(name, dict(parameters or {}), cls=given)
+    if not isinstance(given, (str, Path)):
+        raise RequestError(f"{given!r} is no estimator; a class, a name or a file is wanted")
+    found = split_estimators([str(given)])
+    if len(found) != 1:
+        raise RequestError(f"{str(given)!r} names {len(found)} estimators where one is wanted")
+    ((name, own),) = found
+    return EstimatorRequest(name, {**(parameters or {}), **own})
+
+
+def requests(
+    given: EstimatorLike | Iterable[EstimatorLike] | None, parameters: Mapping[str, Any] | None = None
+) -> list[EstimatorRequest]:
+    """All that were asked for, each label once; all registered ones where none was.
+
+    Parameters
+    ----------
+    given : estimators
+        A text may name several, separated by commas.
+    parameters : mapping, optional
+        Of several estimators each gets those that it has.
+
+    Raises
+    ------
+    RequestError
+        On an unknown estimator or parameter, or a value that does not fit. Files are not imported here: whoever runs
+        them does so, in a process of its own.
+    """
+    from simnav.estimator import names
+
+    items = _items(given)
+    if not items:
+        items = [EstimatorRequest(name) for name in names()]
+    common, unused = dict(parameters or {}), set(parameters or ())
+    made: dict[str, EstimatorRequest] = {}
+    for item in items:
+        with mistakes():
+            mine = common if len(items) == 1 or not common else _known(item, common)
+            unused -= set(mine)
+            found = request(item, mine)
+            if ".py" not in found.name:
+                found.make()  # so that a mistake shows now, not in a worker
+        made.setdefault(found.label, found)
+    if unused:
+        raise RequestError(f"{min(unused)}: none of the estimators has this parameter; 'simnav list estimators' shows "
+                           "what they have")  # fmt: skip
+    return list(made.values())
+
+
+def _items(given: EstimatorLike | Iterable[EstimatorLike] | None) -> list[EstimatorLike]:
+    """One by one; what is separated by commas is taken apart."""
+    if given is None:
+        return []
+    single = isinstance(given, (str, Path, type, EstimatorRequest)) or (
+        isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], Mapping)
+    )
+    items: Sequence[Any] = [given] if single else list(given)  # type: ignore[arg-type]
+    found: list[EstimatorLike] = []
+    texts: list[str] = []
+    for item in items:
+        if isinstance(item, (str, Path)):
+            texts.append(str(item))
+        else:
+            found += _split(texts)
+            found.append(item)
+            texts = []
+    return found + _split(texts)
+
+
+def _split(texts: list[str]) -> list[EstimatorLike]:
+    return [EstimatorRequest(name, values) for name, values in split_estimators(texts)]
+
+
+def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of the parameters that an estimator has."""
+    from simnav.estimator import describe
+
+    known = {p.name for p in describe(request(item).name).parameters}
+    return {k: v for k, v in parameters.items() if k in known}
+
+
+def enlist(cls: type[Estimator]) -> str:
+    """Register a class that was given as such, under its own name where it has none; returns the name.
+
+    Raises
+    ------
+    simnav.estimator.EstimatorError
+        If it is no estimator or its name is taken by another.
+    """
+    if not issubclass(cls, Estimator):
+        raise RequestError(f"{cls.__name__} is no estimator: it does not derive from simnav.Estimator")
+    if inspect.isabstract(cls):
+        lacks = ", ".join(sorted(cls.__abstractmethods__))
+        raise RequestError(f"{cls.__name__} is no complete estimator: it lacks {lacks}")
+    return register(vars(cls).get("name") or kebab(cls.__name__))(cls).name
+
+
+def kebab(name: str) -> str:
+    """A name in lower case with hyphens.
+
+    >>> kebab("SlowFilter2")
+    'slow-filter2'
+    """
+    return re.sub(r"[^a-z0-9]+", "-", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()).strip("-")
+
+
+def split_estimators(given: Iterable[str] | None) -> list[tuple[str, dict[str, str]]]:
+    """Names or files with their parameters: ``name:key=value,key=value``, separated by commas.
+
+    >>> split_estimators(["ekf:gate=3,tau=10,dead-reckoning", "my.py:Mine:gain=0.5"])
+    [('ekf', {'gate': '3', 'tau': '10'}), ('dead-reckoning', {}), ('my.py:Mine', {'gain': '0.5'})]
+
+    Raises
+    ------
+    RequestError
+        Where a parameter follows no name.
+    """
+    found: list[tuple[str, dict[str, str]]] = []
+    for text in given or ():
+        open_for_more = False  # the item before has parameters, so that "key=value" is one more of them
+        for part in filter(None, (p.strip() for p in text.split(","))):
+            whole = re.fullmatch(r"(?P<name>.+?):(?P<key>\w+)=(?P<value>.*)", part)
+            more = re.fullmatch(r"(?P<key>\w+)=(?P<value>.*)", part)
+            if whole:
+                found.append((whole["name"], {whole["key"]: whole["value"]}))
+            elif more and open_for_more:
+                found[-1][1][more["key"]] = more["value"]
+            elif more:
+                raise RequestError(f"{part!r} is no estimator; parameters follow a name: 'ekf:{part}'")
+            else:
+                found.append((part, {}))
+            open_for_more = bool(found[-1][1])
+    return found

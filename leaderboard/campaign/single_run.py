@@ -1,0 +1,148 @@
+"""One run: several estimators over one recording, in this process."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.frame import frame
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from simnav.recording import Recording
+    from simnav.scenario import Scenario
+    from simnav.trial import Trial
+
+__all__ = ["EstimatorRun", "RunReport", "record", "run_once"]
+
+
+@dataclass(frozen=True, eq=False)
+class EstimatorRun:
+    """What one estimator did.
+
+    Attributes
+    ----------
+    estimator : str
+        Label.
+    parameters : mapping
+    reference : bool
+        Told the truth.
+    status, reason : str
+        As in `simnav.trial`.
+    seconds : float
+        Wall-clock time of the whole run [s].
+    scores : mapping of str to float
+        As in `simnav.scoring.SCORES`.
+    trial : Trial
+        Its estimates.
+    """
+
+    estimator: str
+    parameters: Mapping[str, Any]
+    reference: bool
+    status: str
+    reason: str
+    seconds: float
+    scores: Mapping[str, float]
+    trial: Trial
+
+
+@dataclass(frozen=True, eq=False)
+class RunReport:
+    """One run of several estimators.
+
+    Attributes
+    ----------
+    recording : Recording
+        What they were given, and the truth.
+    simulation_seconds : float
+        Wall-clock time of making it [s].
+    estimators : tuple of EstimatorRun
+        In the order in which they were asked for.
+    """
+
+    recording: Recording
+    simulation_seconds: float
+    estimators: tuple[EstimatorRun, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav run --json`` prints, but for the figure."""
+        from simnav.scoring import SCORES
+
+        fields = ("estimator", "parameters", "reference", "status", "reason", "seconds", "scores")
+        return {
+            "scenario": self.recording.scenario,
+            "seed": self.recording.seed,
+            "duration": self.recording.duration,
+            "note": self.recording.note,
+            "simulation_seconds": self.simulation_seconds,
+            "estimators": [{name: getattr(e, name) for name in fields} for e in self.estimators],
+            "scores": {name: {"title": s.title, "unit": s.unit, "better": s.better} for name, s in SCORES.items()},
+        }
+
+    def to_frame(self) -> Any:
+        """A row an estimator, a column a score (SI units, radians); see `simnav.leaderboard.results.frame.frame`."""
+        from simnav.scoring import SCORES
+
+        head = ("estimator", "reference", "status", "reason", "seconds")
+        return frame([
+            {**{name: getattr(e, name) for name in head}, **{s: e.scores.get(s, float("nan")) for s in SCORES}}
+            for e in self.estimators
+        ])  # fmt: skip
+
+    def plot(self) -> Figure:
+        """Tracks, errors with the bounds that were claimed, diagnostics.
+
+        Raises
+        ------
+        RequestError
+            If no estimator gave anything.
+        """
+        from simnav.leaderboard.figures.run_figure import run_figure
+
+        trials = [(e.estimator, e.trial) for e in self.estimators]
+        if not any(len(trial) for _, trial in trials):
+            raise RequestError("there is nothing to draw: no estimator gave an estimate")
+        return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference])
+
+
+def record(scenario: Scenario, seed: int) -> Recording:
+    """The recording of a run; RequestError where a log's files are not there or cannot be used."""
+    from simnav.source import record
+
+    with mistakes(ValueError, FileNotFoundError):
+        return record(scenario, seed)
+
+
+def run_once(
+    scenario: Scenario,
+    requests: Sequence[EstimatorRequest],
+    seed: int = 0,
+    progress: Callable[..., None] | None = None,
+) -> RunReport:
+    """Run estimators over one recording; see `simnav.leaderboard.interface.run`."""
+    from simnav.scoring import score
+    from simnav.trial import run_trial
+
+    with mistakes(ValueError):
+        estimators = [request.make() for request in requests]
+    started = time.perf_counter()
+    recording = record(scenario, seed)
+    simulated = time.perf_counter() - started
+    report = progress or (lambda *_, **__: None)
+    runs = []
+    for k, (request, estimator) in enumerate(zip(requests, estimators, strict=True)):
+        report(k, len(requests), note=request.label)
+        started = time.perf_counter()
+        trial = run_trial(estimator, recording)
+        seconds = time.perf_counter() - started
+        scores = score(trial, recording) if len(trial) else {}
+        runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status, trial.reason,
+                                 seconds, scores, trial))  # fmt: skip
+    report(len(requests), len(requests))
+    return RunReport(recording, simulated, tuple(runs))

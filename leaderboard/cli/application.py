@@ -1,0 +1,103 @@
+"""The `simnav` command.
+
+Each command imports what it needs when it runs, so that ``simnav list`` answers at once. Results go to
+standard output, everything else to standard error; exit code 2 is a user's mistake, 1 a failure.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simnav.leaderboard.cli import (
+    bound,
+    campaign,
+    check,
+    evaluate,
+    leaderboard,
+    list_,
+    new_estimator,
+    reproduce,
+    run,
+    simulate,
+    train,
+    warmup,
+)
+from simnav.leaderboard.cli.console import USER, Output
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="simnav",
+    help="The open benchmark for marine integrated navigation: simulate, estimate, score, rank.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"simnav {version('simnav')}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+    plugin: Annotated[
+        list[Path] | None,
+        typer.Option(help="Python file that registers instruments or faults of others; may be given several times."),
+    ] = None,
+) -> None:
+    """The open benchmark for marine integrated navigation: simulate, estimate, score, rank."""
+    if plugin:
+        from simnav.plugins import PluginError, load_plugin
+
+        for path in plugin:
+            try:
+                load_plugin(path)
+            except PluginError as error:
+                raise typer.BadParameter(str(error), param_hint="--plugin") from None
+
+
+for _module in (list_, run, simulate, check, new_estimator, evaluate, campaign, leaderboard, warmup, bound, reproduce):
+    app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
+train.register(app)
+
+
+def _leave_out_working_directory() -> None:
+    """A folder ``estimators/`` or ``scenarios/`` where the user stands must not hide the project's own.
+
+    Console scripts do not search the working directory, but ``python -m`` and an empty entry of PYTHONPATH
+    do. The project's own tree, where the command may be started from, stays.
+    """
+    home = Path(__file__).resolve().parents[2]
+    here = Path.cwd()
+    if here != home:
+        sys.path[:] = [p for p in sys.path if p and not (os.path.isabs(p) and Path(p) == here and p != str(home))]
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    _leave_out_working_directory()
+    try:
+        code = app(standalone_mode=False, prog_name="simnav")
+    except Exception as error:  # of the parser: an unknown command or option, a value of the wrong type
+        if not hasattr(error, "format_message"):
+            raise
+        text = " ".join(error.format_message().split())
+        Output().note(f"simnav: {text}" if text else "simnav: see simnav --help")
+        sys.exit(USER)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(code if isinstance(code, int) else 0)

@@ -1,0 +1,63 @@
+"""``simnav campaign``: scenarios x estimators x seeds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simnav.leaderboard.cli.console import FAILED, session
+from simnav.leaderboard.cli.options import (
+    Debug,
+    Estimators,
+    FirstSeed,
+    Json,
+    MemoryLimit,
+    Scenarios,
+    Set,
+    TimeLimit,
+    Workers,
+    campaign_progress,
+    parameters,
+)
+
+__all__ = ["command"]
+
+
+def command(
+    scenario: Scenarios = None,
+    estimator: Estimators = None,
+    runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 3]")] = None,
+    seed: FirstSeed = 0,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("results"),
+    quick: Annotated[bool, typer.Option("--quick", help="Within minutes: 3 seeds, nothing long or slow.")] = False,
+    set_: Set = None,
+    workers: Workers = 2,
+    time_limit: TimeLimit = None,
+    memory_limit: MemoryLimit = 2048,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Run scenarios x estimators x seeds; started again, it goes on where it was."""
+    with session(json, debug) as out:
+        from simnav.leaderboard import interface
+        from simnav.leaderboard.ranking import tables
+        from simnav.leaderboard.ranking.failures import failure_table
+        from simnav.leaderboard.ranking.ranking_table import ranking_table
+
+        chosen = interface.scenarios_of(scenario, quick=quick, note=out.remark)
+        if quick and not estimator:
+            estimator = interface.quick_estimators(out.remark)
+        with out.progress("starting") as bar:
+            report = interface.campaign(
+                chosen, estimator, runs=runs, seed=seed, output=output, quick=quick, parameters=parameters(set_),
+                workers=workers, time_limit=time_limit, memory_limit=memory_limit, progress=campaign_progress(bar),
+            )  # fmt: skip
+        summary = report.summary
+        out.document(report.to_dict())
+        out.print(ranking_table(report.ranking, report.results), *failure_table(report.results))
+        out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
+                  f"{tables.duration(summary.seconds)})",
+                  f"next:    simnav leaderboard {summary.folder}")  # fmt: skip
+        out.code = 0 if any(r.status == "ok" for r in report.results) else FAILED

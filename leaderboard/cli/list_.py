@@ -1,0 +1,160 @@
+"""``simnav list``: scenarios, estimators, kinds of instruments and kinds of faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from simnav.leaderboard.cli.console import session
+from simnav.leaderboard.cli.options import Debug, Json
+from simnav.leaderboard.ranking import tables
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from simnav.spec import Spec
+
+__all__ = ["command", "estimators", "faults", "instruments", "scenarios"]
+
+
+class Topic(StrEnum):
+    """What is listed."""
+
+    SCENARIOS = "scenarios"
+    ESTIMATORS = "estimators"
+    INSTRUMENTS = "instruments"
+    FAULTS = "faults"
+
+
+def command(
+    topic: Annotated[Topic | None, typer.Argument(help="What to list; without it, scenarios and estimators.")] = None,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+    with session(json, debug) as out:
+        found: dict[str, Any] = {}
+        if topic in (None, Topic.SCENARIOS):
+            found["scenarios"] = scenarios()
+            out.print(_scenario_table(found["scenarios"]))
+        if topic in (None, Topic.ESTIMATORS):
+            found["estimators"] = estimators()
+            out.print(_estimator_table(found["estimators"]))
+        if topic in (Topic.INSTRUMENTS, Topic.FAULTS):
+            found[topic] = instruments() if topic is Topic.INSTRUMENTS else faults()
+            out.print(_kind_table(topic.value.capitalize(), found[topic]))
+        out.document(found)
+
+
+@dataclass(frozen=True)
+class ScenarioItem:
+    """A scenario; the fields are the keys of the JSON document."""
+
+    name: str
+    id: str
+    title: str
+    duration: float
+    tags: tuple[str, ...]
+    gymnasium: str
+    file: str
+
+
+@dataclass(frozen=True)
+class EstimatorItem:
+    """An estimator; ``parameters`` maps a name to its default."""
+
+    name: str
+    aliases: tuple[str, ...]
+    summary: str
+    reference: bool
+    parameters: Mapping[str, object]
+    file: str
+    line: int
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a scenario file."""
+
+    required: bool
+    description: str
+
+
+@dataclass(frozen=True)
+class KindItem:
+    """A kind of instrument or fault, with its keys in a scenario file."""
+
+    kind: str
+    summary: str
+    keys: Mapping[str, Key]
+
+
+def scenarios() -> list[ScenarioItem]:
+    """Every scenario of every pack."""
+    from simnav.catalogue import headers
+
+    return [
+        ScenarioItem(h.name, h.id, h.title, h.duration, h.tags, f"simnav:{h.gym_id}", str(h.path)) for h in headers()
+    ]
+
+
+def estimators() -> list[EstimatorItem]:
+    """Every registered estimator."""
+    from simnav.estimator import describe, names
+
+    return [
+        EstimatorItem(d.name, d.aliases, d.summary, d.reference,
+                      {p.name: None if p.required else p.default for p in d.parameters}, d.file, d.line)
+        for d in map(describe, names())
+    ]  # fmt: skip
+
+
+def instruments() -> list[KindItem]:
+    """Every kind of instrument."""
+    from simnav import sensors
+
+    imu = _kind(sensors.ImuSpec, "angular rate and specific force")
+    return [imu, *(_kind(spec, spec.definition.quantity) for spec in sensors.instrument_specs())]
+
+
+def faults() -> list[KindItem]:
+    """Every kind of fault."""
+    from simnav import sensors
+
+    return [_kind(spec, "") for spec in sensors.fault_specs()]
+
+
+def _name(spec: type[Spec]) -> str:
+    field = spec.model_fields.get("kind")
+    return str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
+
+
+def _kind(spec: type[Spec], fallback: str) -> KindItem:
+    keys = {
+        key: Key(info.is_required(), info.description or "")
+        for key, (name, info) in spec.toml_keys().items()
+        if name != "kind"
+    }
+    return KindItem(_name(spec), (spec.__doc__ or fallback).strip().splitlines()[0], keys)
+
+
+def _scenario_table(found: list[ScenarioItem]) -> Table:
+    rows = [[e.name, f"v{e.id.rpartition('-v')[2]}", tables.duration(e.duration), e.title, ", ".join(e.tags)]
+            for e in found]  # fmt: skip
+    return tables.table("Scenarios", ["name", "version", "duration", "title", "tags"], rows, numeric=["duration"])
+
+
+def _estimator_table(found: list[EstimatorItem]) -> Table:
+    rows = [[e.name + (" *" if e.reference else ""), e.summary, tables.parameters(e.parameters)] for e in found]
+    dim = [i for i, e in enumerate(found) if e.reference]
+    caption = "* reference: it is told the truth, and is not ranked" if dim else None
+    return tables.table("Estimators", ["name", "what it is", "parameters"], rows, dim=dim, caption=caption)
+
+
+def _kind_table(title: str, found: list[KindItem]) -> Table:
+    rows = [[e.kind, e.summary, ", ".join(k + ("!" if v.required else "") for k, v in e.keys.items())] for e in found]
+    return tables.table(title, ["kind", "what it is", "keys in TOML (! required)"], rows)

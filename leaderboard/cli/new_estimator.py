@@ -1,0 +1,70 @@
+"""``simnav new-estimator``: a small estimator that works, to start from."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simnav.leaderboard.cli.console import session
+from simnav.leaderboard.cli.options import Debug, Json, absolute
+from simnav.leaderboard.results.errors import RequestError
+
+__all__ = ["command", "write_estimator"]
+
+_TEMPLATE = Path(__file__).parent / "estimator.py.jinja"
+
+
+def command(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the estimator, like my-filter.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [my_filter.py]")] = None,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Write a small estimator that works, to start from."""
+    with session(json, debug) as out:
+        kebab, path = write_estimator(name, output)
+        out.document({"name": kebab, "file": str(path)})
+        out.print(f"written: {path}", f"next:    simnav check {path.name}")
+
+
+def write_estimator(name: str, output: Path | None = None) -> tuple[str, Path]:
+    """Write a new estimator's file, never over an existing one; returns its registered name and the path.
+
+    Raises
+    ------
+    RequestError
+        If the name or the file will not do.
+    """
+    from jinja2 import Environment
+
+    from simnav.catalogue import headers
+    from simnav.estimator import names
+    from simnav.leaderboard.campaign.request import kebab as to_kebab
+
+    kebab = to_kebab(name)
+    if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", kebab) or keyword.iskeyword(kebab):
+        raise RequestError(f"{name!r} is no name for an estimator; it should be words like 'my-filter'")
+    if kebab in names():
+        raise RequestError(f"there is an estimator {kebab!r} already; choose another name")
+    path = absolute(output or Path(kebab.replace("-", "_") + ".py"))
+    if path.suffix != ".py":
+        raise RequestError(f"--output {output}: the file should end in .py")
+    scenarios = [h.name for h in headers()]
+    text = Environment(keep_trailing_newline=True).from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
+        name=kebab,
+        class_name="".join(part.capitalize() for part in kebab.split("-")),
+        file=path.name,
+        scenario=next((s for s in scenarios if "open" in s), scenarios[0] if scenarios else "open-sea"),
+    )  # fmt: skip
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise RequestError(f"{path} exists; choose another name, or --output") from None
+    except FileNotFoundError:
+        raise RequestError(f"there is no folder {path.parent}") from None
+    return kebab, path

@@ -1,0 +1,90 @@
+"""Options that several commands have, and what is typed made into what a call takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simnav.leaderboard.results.errors import RequestError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simnav.leaderboard.campaign.campaign import Progress
+    from simnav.leaderboard.cli.console import ProgressBar
+
+__all__ = [
+    "Debug",
+    "Estimators",
+    "FirstSeed",
+    "Json",
+    "MemoryLimit",
+    "ScenarioName",
+    "Scenarios",
+    "Seed",
+    "Set",
+    "TimeLimit",
+    "Workers",
+    "absolute",
+    "campaign_progress",
+    "parameters",
+]
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, versioned id, or path of a TOML file.")]
+Scenarios = Annotated[
+    list[str] | None, typer.Option("--scenario", "-s", help="Names or TOML files, separated by commas. [all]")
+]
+Estimators = Annotated[
+    list[str] | None,
+    typer.Option("--estimator", "-e", help="Names or files, separated by commas; 'ekf:gate=3' sets a parameter. [all]"),
+]
+Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the run.")]
+FirstSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the first run; the others count up.")]
+Workers = Annotated[int, typer.Option(min=1, help="Processes.")]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        "--time-limit", min=0.1, help="Seconds an estimator may take a run. [a fifth of real time, at least 60]"
+    ),
+]
+MemoryLimit = Annotated[
+    int, typer.Option("--memory-limit", min=16, help="MiB an estimator may take beyond the recording.")
+]
+
+_STAGES = {"compile": "compiling kernels", "run": "running"}
+
+
+def parameters(given: Sequence[str] | None) -> dict[str, str]:
+    """The values of ``--set``.
+
+    >>> parameters(["gate=3", "tau = 10"])
+    {'gate': '3', 'tau': '10'}
+    """
+    values = {}
+    for text in given or ():
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip().isidentifier():
+            raise RequestError(f"--set {text}: it should be name=value, like --set gate=3")
+        values[name.strip()] = value.strip()
+    return values
+
+
+def absolute(path: Path | str) -> Path:
+    """The absolute form of a path, for messages."""
+    return Path(path).expanduser().resolve()
+
+
+def campaign_progress(bar: ProgressBar) -> Callable[[Progress], None]:
+    """What shows a campaign's progress on a bar."""
+
+    def show(p: Progress) -> None:
+        bar.begin(_STAGES.get(p.stage, p.stage))
+        bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
+
+    return show

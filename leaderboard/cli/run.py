@@ -1,0 +1,90 @@
+"""``simnav run``: estimators once over one scenario."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simnav.leaderboard.cli.console import FAILED, USER, session
+from simnav.leaderboard.cli.options import Debug, Estimators, Json, ScenarioName, Seed, Set, absolute, parameters
+from simnav.leaderboard.results.errors import RequestError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from simnav.leaderboard.campaign.single_run import RunReport
+
+__all__ = ["command"]
+
+
+def command(
+    scenario: ScenarioName,
+    estimator: Estimators = None,
+    seed: Seed = 0,
+    plot: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
+    set_: Set = None,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Run estimators once over one scenario and score them."""
+    with session(json, debug) as out:
+        from simnav.leaderboard import interface
+
+        if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
+            raise RequestError(f"--plot {plot}: the file should end in .png, .svg or .pdf")
+        if plot is not None and not plot.expanduser().resolve().parent.is_dir():
+            raise RequestError(f"--plot {plot}: there is no folder {plot.parent}")
+        chosen = interface.scenario_of(scenario)
+        with out.progress(f"{chosen.id}, seed {seed}") as progress:
+            report = interface.run(chosen, estimator, seed=seed, parameters=parameters(set_), progress=progress)
+        drawn = None
+        if plot is not None and any(len(e.trial) for e in report.estimators):
+            from simnav.leaderboard.figures.plots import save
+
+            drawn = save(report.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
+        out.document({**report.to_dict(), "plot": None if drawn is None else str(drawn)})
+        out.print(_table(report))
+        for e in report.estimators:
+            if e.status != "ok":
+                out.note(f"simnav: {e.estimator}: {e.status}: {e.reason}")
+        if drawn is not None:
+            out.print(f"figure: {drawn}")
+        if any(e.trial.failed for e in report.estimators):
+            out.code = FAILED
+        elif all(e.status == "unsuitable" for e in report.estimators):
+            out.code = USER
+
+
+def _table(report: RunReport) -> Table:
+    """Scores of the estimators, the best horizontal RMSE first."""
+    from simnav.leaderboard.ranking import tables
+
+    def order(k: int) -> tuple[bool, float]:
+        value = report.estimators[k].scores.get("horizontal_rmse", math.inf)
+        return report.estimators[k].status != "ok", value if math.isfinite(value) else math.inf
+
+    ordered = [report.estimators[k] for k in sorted(range(len(report.estimators)), key=order)]
+    plain = ("horizontal_rmse", "r95", "horizontal_max", "vertical_rmse", "velocity_horizontal_rmse")
+    cells = [
+        [e.estimator + (" *" if e.reference else ""), e.status, *(tables.number(e.scores.get(s)) for s in plain),
+         tables.number(math.degrees(e.scores.get("heading_rmse", math.nan))),
+         tables.number(e.scores.get("nees_horizontal")), tables.percent(e.scores.get("coverage_95")),
+         tables.duration(e.scores.get("update_median"))]
+        for e in ordered
+    ]  # fmt: skip
+    columns = ["estimator", "status", "horizontal RMSE [m]", "R95 [m]", "max [m]", "vertical RMSE [m]",
+               "velocity RMSE [m/s]", "heading RMSE [deg]", "NEES/dof", "95 % coverage", "per epoch"]  # fmt: skip
+    recording = report.recording
+    note = f"; {recording.note}" if recording.note else ""
+    reference = [i for i, e in enumerate(ordered) if e.reference]
+    return tables.table(
+        f"{recording.scenario}, seed {recording.seed}, {tables.duration(recording.duration)}{note}",
+        columns,
+        cells,
+        numeric=columns[2:],
+        dim=reference,
+        caption="* reference: it is told the truth" if reference else None,
+    )

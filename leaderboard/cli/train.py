@@ -1,0 +1,149 @@
+"""``simnav train``: learns the parameters of a trained estimator anew."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from simnav.leaderboard.cli.console import Output, session
+from simnav.leaderboard.cli.options import Debug, Json, absolute
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+if TYPE_CHECKING:
+    from simnav.estimators.adaptations.anfis_file import Parameters
+    from simnav.estimators.adaptations.hybrid_learning import Learned
+
+__all__ = ["register", "run"]
+
+#: Passes that the table shows.
+_ROWS = 12
+#: Seeds of the validation: half as many as of the training, at least this.
+_LEAST_VALIDATION = 2
+
+
+class _Features(StrEnum):
+    """As `simnav.estimators.adaptations.anfis_file.FEATURES`, which the command does not import before it runs."""
+
+    INNOVATION = "innovation"
+    MOTION = "motion"
+    RECENT = "recent"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application."""
+    train = typer.Typer(no_args_is_help=True, help="Learn the parameters of an estimator anew.")
+    train.callback()(_root)
+    train.command("anfis")(_command)
+    app.add_typer(train, name="train")
+
+
+def _root() -> None:
+    """Learn the parameters of an estimator anew."""
+
+
+def _command(
+    features: Annotated[_Features, typer.Option(help="Inputs of the network; see docs/anfis.md.")] = (
+        _Features.INNOVATION
+    ),
+    seeds: Annotated[
+        int, typer.Option("--seeds", "-n", min=1, help="Seeds of the training voyages; none of them is ever scored.")
+    ] = 3,
+    passes: Annotated[int, typer.Option(min=1, help="Most passes over the data.")] = 200,
+    output: Annotated[
+        Path | None, typer.Option("--output", "--out", "-o", help="Parameter file. [anfis_FEATURES.json]")
+    ] = None,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Train the network of anfis-fgo (a reconstruction of paper 002), and draw what it has learnt."""
+    with session(json, debug) as out:
+        run(out, features.value, seeds, passes, output)
+
+
+def run(out: Output, features: str, seeds: int, passes: int, output: Path | None) -> None:
+    """Gather, learn, and write the parameter file with two figures beside it."""
+    from simnav.estimators.adaptations.anfis_training import (
+        FIRST_TRAINING_SEED,
+        FIRST_VALIDATION_SEED,
+        gather,
+        scenarios,
+        train,
+    )
+    from simnav.leaderboard.campaign.fingerprint import simulator_version
+    from simnav.leaderboard.figures import training as training_figures
+
+    path = absolute(output or Path(f"anfis_{features}.json"))
+    if path.suffix != ".json":
+        raise RequestError(f"--output {path}: the file should end in .json")
+    if not path.parent.is_dir():
+        raise RequestError(f"--output {path}: there is no folder {path.parent}")
+    first = {"training": FIRST_TRAINING_SEED, "validation": FIRST_VALIDATION_SEED}
+    count = {"training": seeds, "validation": max(seeds // 2, _LEAST_VALIDATION)}
+    data = {}
+    with out.progress("gathering") as progress:
+        for kind, start in first.items():
+            progress.begin(f"{kind} voyages")
+            total = count[kind] * len(scenarios())
+            data[kind] = gather(range(start, start + count[kind]), partial(progress, total=total))
+        progress.begin("learning")
+        parameters, learned = train(
+            features, data["training"], data["validation"], passes,
+            lambda k, error, check: progress(k + 1, passes, f"RMSE {error:.4f}, validation {check:.4f}"),
+        )  # fmt: skip
+    command = f"simnav train anfis --features {features} --seeds {seeds}" + (
+        f" --passes {passes}" if passes != 200 else ""
+    )
+    record: dict[str, Any] = {
+        "command": command,
+        "simulator": simulator_version(),
+        "training_seeds": [first["training"], first["training"] + seeds - 1],
+        "validation_seeds": [first["validation"], first["validation"] + count["validation"] - 1],
+        "fixes": len(data["training"].outputs),
+    }
+    parameters.record.update(record)
+    with mistakes(OSError):
+        parameters.save(path)
+        figures = training_figures.write(parameters, learned, path)
+    _show(out, parameters, learned, path, figures)
+
+
+def _show(out: Output, parameters: Parameters, learned: Learned, path: Path, figures: list[Path]) -> None:
+    record = parameters.record
+    out.document(
+        {
+            **record,
+            "features": parameters.features,
+            "training": learned.training,
+            "validation": learned.validation,
+            "file": str(path),
+            "figures": [str(p) for p in figures],
+        }
+    )
+    last = len(learned.training) - 1
+    shown = {learned.best, *np.unique(np.linspace(0, last, min(_ROWS, last + 1)).astype(int)).tolist()}
+    out.print(
+        tables.table(
+            f"ANFIS (reconstruction of paper 002), features {parameters.features!r}: "
+            "RMSE of ln(variance / datasheet's)",
+            ["pass", "training", "validation", ""],
+            [
+                [str(k + 1), f"{learned.training[k]:.4f}", f"{learned.validation[k]:.4f}",
+                 "kept" if k == learned.best else ""]
+                for k in sorted(shown)
+            ],
+            numeric=("pass", "training", "validation"),
+        )
+    )  # fmt: skip
+    out.print(
+        f"{record['fixes']} fixes; a constant has {record['validation_of_constant']:.4f} in validation",
+        f"seeds: training {record['training_seeds']}, validation {record['validation_seeds']}; none is ever scored",
+        f"parameters: {path}",
+        *(f"figure:     {p}" for p in figures),
+        f"use:        anfis-fgo:features={parameters.features},file={path}",
+    )

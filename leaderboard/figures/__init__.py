@@ -1,0 +1,1 @@
+"""Figures: from arrays, recordings and trials to matplotlib, in one style."""

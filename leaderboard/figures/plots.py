@@ -1,0 +1,632 @@
+"""Figures of the site and of ``simnav run --plot``: from plain arrays to matplotlib figures.
+
+Every estimator keeps one colour and line style in all figures (`Style`); the palette can be told
+apart with any colour vision. SVG files follow the reader's light or dark setting in a browser and
+are ordinary light figures everywhere else. Nothing here knows results, campaigns or scenarios.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.leaderboard.results.files import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "Band",
+    "Curve",
+    "Dot",
+    "Style",
+    "Track",
+    "dots",
+    "error_cdf",
+    "error_over_time",
+    "figure",
+    "legend_below",
+    "plain_log_ticks",
+    "run_chart",
+    "save",
+    "shade",
+    "styled",
+    "time_unit",
+    "trajectory",
+]
+
+Array = NDArray[np.float64]
+
+# Light and dark form of each colour: Okabe and Ito (2008) without yellow, and two of Tol's "muted" set.
+PALETTE: tuple[tuple[str, str], ...] = (
+    ("#0072b2", "#4aa8e0"),
+    ("#d55e00", "#f08a45"),
+    ("#009e73", "#2fc79c"),
+    ("#cc79a7", "#e39fc4"),
+    ("#56b4e9", "#8fd0f5"),
+    ("#e69f00", "#f5bd45"),
+    ("#882255", "#c9679b"),
+    ("#999933", "#dddd92"),
+)
+_LINES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
+_MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
+INK, GREY, GRID, SHADE, PAPER = "#1b2430", "#66707d", "#dfe3e8", "#eceff3", "#fefefe"
+_DARK = {INK: "#e8ebef", GREY: "#9aa5b1", GRID: "#343c46", SHADE: "#262d36", PAPER: "#161b21"}
+TRUTH = INK
+_LEGEND = 15.0  # characters of a legend that fit into an inch
+_POINTS = 300  # of a curve over time: more cannot be seen
+#: What an axis of all estimators shows ends at this multiple of their median.
+FAR_OFF = 20.0
+
+_RC: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.facecolor": "none",
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "text.color": INK,
+    "text.parse_math": False,  # names of estimators are not TeX
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "lines.solid_capstyle": "round",
+    "figure.facecolor": "none",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "simnav",
+    "path.simplify_threshold": 0.5,
+}
+
+
+class Style:
+    """Colour, line style and marker of every estimator of a set of results.
+
+    Parameters
+    ----------
+    labels : iterable of str
+        All estimators, in the order in which they are shown.
+    references : iterable of str
+        Those that are told the truth: grey.
+    """
+
+    def __init__(self, labels: Iterable[str], references: Iterable[str] = ()):
+        self._references = list(dict.fromkeys(references))
+        shown = [label for label in dict.fromkeys(labels) if label not in self._references]
+        self._index = {label: i for i, label in enumerate(shown)}
+
+    def _of(self, label: str) -> int:
+        return self._index.setdefault(label, len(self._index))
+
+    def colour(self, label: str, dark: bool = False) -> str:
+        """Hex colour on a light (or dark) ground."""
+        if label in self._references:
+            return _DARK[GREY] if dark else GREY
+        return PALETTE[self._of(label) % len(PALETTE)][dark]
+
+    def line(self, label: str) -> Any:
+        """Matplotlib line style: changes once the colours are used up."""
+        if label in self._references:
+            return _LINES[1 + self._references.index(label) % (len(_LINES) - 1)]
+        return _LINES[self._of(label) // len(PALETTE) % len(_LINES)]
+
+    def marker(self, label: str) -> str:
+        """Matplotlib marker."""
+        if label in self._references:
+            return "d"
+        return _MARKERS[self._of(label) % len(_MARKERS)]
+
+    def order(self, label: str) -> int:
+        """Place in the order in which estimators are shown, references last."""
+        return 10**6 if label in self._references else self._of(label)
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """An error over time of many runs.
+
+    Attributes
+    ----------
+    label : str
+        Estimator.
+    time : (n,) array
+        [s].
+    values : (runs, n) array
+        NaN where a run has none.
+    """
+
+    label: str
+    time: Array
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One error over time, with the three-sigma bound that was claimed for it.
+
+    Attributes
+    ----------
+    label : str
+    time, values : (n,) array
+    bound : (n,) array or None
+    """
+
+    label: str
+    time: Array
+    values: Array
+    bound: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A horizontal track: east and north [m], relative to a common origin."""
+
+    label: str
+    east: Array
+    north: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Dot:
+    """A figure with its interval and the runs behind it.
+
+    Attributes
+    ----------
+    label : str
+    value, low, high : float
+    runs : sequence of float
+    hollow : bool
+        Reference rows.
+    note : str
+        Beside the label, e.g. how many runs failed.
+    """
+
+    label: str
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+    runs: Sequence[float] = field(default_factory=tuple)
+    hollow: bool = False
+    note: str = ""
+
+
+def figure(width: float, height: float) -> Figure:
+    """An empty figure in the house style; ``width`` and ``height`` in inches."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_RC):
+        return Figure(figsize=(width, height), layout="constrained")
+
+
+def styled() -> Any:
+    """The house style, for the time of a ``with`` block."""
+    import matplotlib as mpl
+
+    return mpl.rc_context(_RC)
+
+
+def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dpi: int = 160) -> list[Path]:
+    """Write a figure, atomically, once for each format.
+
+    Parameters
+    ----------
+    fig : matplotlib.figure.Figure
+    path : Path
+        Its suffix is replaced by the format's.
+    formats : sequence of str
+    dpi : int
+        Of pixel formats.
+
+    Returns
+    -------
+    list of Path
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    written = []
+    with styled():
+        FigureCanvasAgg(fig)
+        layout = fig.get_layout_engine()
+        if layout is not None:
+            layout.execute(fig)
+            fig.set_layout_engine("none")  # laid out once: all formats look the same, and come quicker
+        for kind in formats:
+            # The canvases' own methods: Figure.savefig draws everything twice. No date, so that the same results
+            # give the same file.
+            buffer = io.BytesIO()
+            fig.set_facecolor("none" if kind == "svg" else "white")
+            if kind == "svg":
+                FigureCanvasSVG(fig).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
+            elif kind == "pdf":
+                FigureCanvasPdf(fig).print_pdf(buffer, metadata={"CreationDate": None})  # type: ignore[no-untyped-call]
+            else:
+                fig.set_dpi(dpi)
+                FigureCanvasAgg(fig).print_png(buffer, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
+            content = buffer.getvalue()
+            if kind == "svg":
+                content = _follow_theme(content.decode()).encode()
+            target = path.with_suffix(f".{kind}")
+            written.append(write_whole(target, content))
+    return written
+
+
+def _follow_theme(svg: str) -> str:
+    """Add rules by which a browser shows the figure in dark colours where the reader prefers dark."""
+    rules = []
+    for light, dark in [*_DARK.items(), *PALETTE]:
+        for name in ("fill", "stroke"):
+            rules.append(f'[style*="{name}: {light}"]{{{name}:{dark}!important}}')
+    css = "<style>@media (prefers-color-scheme:dark){" + "".join(rules) + "}</style>"
+    head, tag, rest = svg.partition("<defs>")
+    return head + css + tag + rest
+
+
+# ------------------------------------------------------------------------------------------------
+# Figures of the site
+
+
+def trajectory(
+    truth: Track,
+    tracks: Sequence[Track],
+    style: Style,
+    *,
+    fixes: Mapping[str, Track] | None = None,
+    title: str = "",
+) -> Figure:
+    """Chart of one run: truth, fixes and estimates. The frame is the truth's; what diverges leaves it."""
+    with styled():
+        width, height = _frame(truth)
+        fig = figure(7.2, min(max(5.4 * height / width, 3.0), 7.5))
+        _chart(fig.add_subplot(), truth, tracks, style, fixes or {}, title)
+    return fig
+
+
+def _frame(truth: Track) -> tuple[float, float]:
+    """Width and height [m] of a chart around the truth, with a margin, never thinner than 1 : 2.5."""
+    sides = [1.16 * float(np.ptp(a)) for a in (truth.east, truth.north)]
+    least = max(0.4 * max(sides), 1.0)
+    return max(sides[0], least), max(sides[1], least)
+
+
+def _chart(
+    ax: Axes, truth: Track, tracks: Sequence[Track], style: Style, fixes: Mapping[str, Track], title: str
+) -> None:
+    span = max(np.ptp(truth.east), np.ptp(truth.north), 1.0)
+    unit, factor = ("km", 1e-3) if span > 3000.0 else ("m", 1.0)
+    for (name, fix), marker in zip(fixes.items(), ".+x1234", strict=False):
+        ax.plot(
+            fix.east * factor, fix.north * factor, marker, ms=2.5, mew=0.6, color=GREY, alpha=0.6, label=name, zorder=1
+        )
+    ax.plot(truth.east * factor, truth.north * factor, color=TRUTH, lw=2.6, alpha=0.9, label="truth", zorder=2)
+    for t in tracks:
+        ax.plot(
+            t.east * factor,
+            t.north * factor,
+            color=style.colour(t.label),
+            ls=style.line(t.label),
+            lw=1.3,
+            label=t.label,
+            zorder=3,
+        )
+    ax.plot(truth.east[0] * factor, truth.north[0] * factor, "o", ms=6, mfc=PAPER, mec=INK, zorder=4, label="start")
+    ax.plot(truth.east[-1] * factor, truth.north[-1] * factor, "s", ms=6, mfc=INK, mec=INK, zorder=4, label="end")
+    centre = [0.5 * (np.min(a) + np.max(a)) * factor for a in (truth.east, truth.north)]
+    half = [0.5 * side * factor for side in _frame(truth)]
+    ax.set_xlim(centre[0] - half[0], centre[0] + half[0])
+    ax.set_ylim(centre[1] - half[1], centre[1] + half[1])
+    ax.set_aspect("equal", adjustable="box")
+    ax.set(xlabel=f"East [{unit}]", ylabel=f"North [{unit}]", title=title)
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+
+
+def error_over_time(
+    panels: Mapping[str, Sequence[Band]],
+    style: Style,
+    *,
+    outages: Sequence[tuple[float, float, str]] = (),
+    title: str = "",
+) -> Figure:
+    """Median error over the runs, and the band between their 5th and 95th percentile.
+
+    Parameters
+    ----------
+    panels : mapping of str to sequence of Band
+        Label of the vertical axis, with its unit -> one band for each estimator.
+    style : Style
+    outages : sequence of (start, end, name)
+        Shaded [s].
+    title : str
+    """
+    with styled():
+        fig = figure(7.6, 1.0 + 2.15 * len(panels))
+        axes = np.atleast_1d(fig.subplots(len(panels), 1, sharex=True))
+        longest = max((float(b.time[-1]) for bands in panels.values() for b in bands if len(b.time)), default=1.0)
+        unit, factor = time_unit(longest)
+        for ax, (label, bands) in zip(axes, panels.items(), strict=True):
+            shade(ax, outages, factor, named=ax is axes[0])
+            floor = math.inf
+            for band in sorted(bands, key=lambda b: style.order(b.label), reverse=True):
+                every = max(1, -(-len(band.time) // _POINTS))
+                low, middle, high = _percentiles(band.values[:, ::every], (5.0, 50.0, 95.0))
+                colour, t = style.colour(band.label), band.time[::every] * factor
+                if len(band.values) > 1:
+                    ax.fill_between(t, low, high, color=colour, alpha=0.13, lw=0)
+                ax.plot(t, middle, color=colour, ls=style.line(band.label), label=band.label)
+                shown = middle[np.isfinite(middle) & (middle > 0.0)]
+                if len(shown):
+                    floor = min(floor, float(np.percentile(shown, 2.0)))
+            _log_scale(ax, floor)
+            ax.set(ylabel=label, xlim=(0.0, longest * factor))
+        axes[0].set_title(title)
+        axes[-1].set_xlabel(f"Time [{unit}]")
+        legend_below(fig, axes[0], style)
+    return fig
+
+
+def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "") -> Figure:
+    """Share of all epochs of all runs whose error is below x; ``label`` names x, with its unit."""
+    with styled():
+        fig = figure(7.0, 3.8)
+        ax = fig.add_subplot()
+        low, high = math.inf, 0.0
+        for band in bands:
+            x = np.sort(band.values[np.isfinite(band.values)])
+            if not len(x):
+                continue
+            share = (np.arange(len(x)) + 1.0) / len(x)
+            pick = np.unique(np.linspace(0, len(x) - 1, min(len(x), 400)).astype(int))
+            ax.plot(
+                np.maximum(x[pick], 1e-9),
+                100.0 * share[pick],
+                color=style.colour(band.label),
+                ls=style.line(band.label),
+                label=band.label,
+            )
+            low, high = min(low, float(np.percentile(x, 2.0))), max(high, float(x[-1]))
+        for level in (50, 95):
+            ax.axhline(level, color=GREY, lw=0.7, ls=(0, (2, 2)), zorder=0.5)
+            ax.annotate(
+                f"{level} %",
+                (0.01, level),
+                xycoords=("axes fraction", "data"),
+                ha="left",
+                va="bottom",
+                fontsize=7.5,
+                color=GREY,
+            )
+        ax.set_xscale("log")
+        if high > 0.0 and math.isfinite(low):
+            ax.set_xlim(max(low, 1e-6 * high) * 0.8, high * 1.15)
+        plain_log_ticks(ax.xaxis)
+        ax.set(xlabel=label, ylabel="Share of epochs [%]", ylim=(0.0, 101.0), title=title)
+        ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    return fig
+
+
+def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log: bool = True) -> Figure:
+    """One line an estimator: the runs as faint points, the figure with its interval in front.
+
+    What is more than `FAR_OFF` times the median estimator stands at the edge, as a number.
+    """
+    values = [r.value for r in rows if math.isfinite(r.value) and r.value > 0.0]
+    limit = FAR_OFF * float(np.median(values)) if values else math.inf
+    with styled():
+        fig = figure(7.6, 0.9 + 0.25 * max(len(rows), 1))
+        ax = fig.add_subplot()
+        for y, row in enumerate(rows):
+            colour = style.colour(row.label)
+            runs = np.asarray([r for r in row.runs if math.isfinite(r)])
+            if len(runs):
+                offset = 0.16 * np.cos(np.arange(len(runs)) * 2.399963)  # spread without a random draw
+                ax.plot(runs, y + offset, ".", ms=4, mew=0, color=colour, alpha=0.35, zorder=2)
+            if not math.isfinite(row.value):
+                continue
+            if row.value > limit:
+                number = f"{row.value:.{0 if row.value >= 100.0 else 1}f} \N{RIGHTWARDS ARROW}"
+                ax.annotate(
+                    number, (1.0, y), xycoords=ax.get_yaxis_transform(), color=colour, fontsize="small", ha="right",
+                    va="center",
+                )  # fmt: skip
+                continue
+            if math.isfinite(row.low) and math.isfinite(row.high):
+                ax.plot([row.low, row.high], [y, y], color=colour, lw=1.6, marker="|", ms=6.0, zorder=3)
+            ax.plot(row.value, y, style.marker(row.label), ms=4.5, mew=1.0, mec=colour,
+                    mfc=PAPER if row.hollow else colour, zorder=4)  # fmt: skip
+        if log and any(math.isfinite(r.value) and r.value > 0 for r in rows):
+            ax.set_xscale("log")
+            plain_log_ticks(ax.xaxis)
+        ax.set_xlim(right=min(ax.get_xlim()[1], limit))
+        names = [f"{r.label}  {r.note}".rstrip() for r in rows]
+        ax.set_yticks(range(len(rows)), names)
+        ax.set_ylim(len(rows) - 0.4, -0.6)
+        ax.grid(axis="y", visible=False)
+        ax.tick_params(axis="y", length=0)
+        ax.spines["left"].set_visible(False)
+        ax.set(xlabel=label, title=title)
+    return fig
+
+
+# ------------------------------------------------------------------------------------------------
+# Figure of one run
+
+
+def run_chart(
+    truth: Track,
+    tracks: Sequence[Track],
+    errors: Mapping[str, Sequence[Curve]],
+    style: Style,
+    *,
+    fixes: Mapping[str, Track] | None = None,
+    outages: Sequence[tuple[float, float, str]] = (),
+    diagnostics: Mapping[str, Sequence[Curve]] | None = None,
+    title: str = "",
+) -> Figure:
+    """Chart beside the errors over time with their claimed three-sigma bounds; below both, diagnostics in two columns.
+
+    Parameters
+    ----------
+    truth : Track
+    tracks : sequence of Track
+    errors : mapping of str to sequence of Curve
+        Label of the vertical axis, with its unit -> one curve for each estimator.
+    style : Style
+    fixes : mapping of str to Track, optional
+        Instrument -> its position fixes.
+    outages : sequence of (start, end, name)
+        Shaded [s].
+    diagnostics : mapping of str to sequence of Curve, optional
+        Label of the vertical axis -> curves.
+    title : str
+    """
+    below = diagnostics or {}
+    top, rows = max(len(errors), 1), -(-len(below) // 2)
+    with styled():
+        fig = figure(13.0, max(5.0, 1.0 + 1.45 * (top + rows)))
+        grid = fig.add_gridspec(top + rows, 2, width_ratios=(1.0, 1.15))
+        _chart(fig.add_subplot(grid[:top, 0]), truth, tracks, style, fixes or {}, title)
+        chart = fig.axes[0]
+        chart.set_anchor("N")
+        chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, borderaxespad=0.0)
+        longest = max((float(c.time[-1]) for cs in errors.values() for c in cs if len(c.time)), default=1.0)
+        unit, factor = time_unit(longest)
+        first: Axes | None = None
+        places = [(row, 1) for row in range(len(errors))] + [(top + k // 2, k % 2) for k in range(len(below))]
+        lowest = {column: row for row, column in places}
+        for (row, column), (label, curves) in zip(places, [*errors.items(), *below.items()]):
+            ax = fig.add_subplot(grid[row, column], sharex=first)
+            first = first or ax
+            shade(ax, outages, factor, named=row == 0)
+            for c in curves:
+                colour = style.colour(c.label)
+                ax.plot(c.time * factor, c.values, color=colour, ls=style.line(c.label), lw=1.1, label=c.label)
+                if c.bound is not None:
+                    for sign in (1.0, -1.0):
+                        ax.plot(c.time * factor, sign * c.bound, color=colour, lw=0.8, ls=(0, (3, 2)), alpha=0.75)
+            if label in errors:
+                _frame_errors(ax, curves)
+                ax.axhline(0.0, color=GREY, lw=0.6, zorder=0.5)
+            ax.set(ylabel=label, xlim=(0.0, longest * factor))
+            ax.tick_params(labelbottom=row == lowest[column])
+            if row == lowest[column]:
+                ax.set_xlabel(f"Time [{unit}]")
+        if first is not None:
+            claimed = any(c.bound is not None for curves in errors.values() for c in curves)
+            first.set_title("Error; dashed: claimed ±3σ" if claimed else "Error")
+    return fig
+
+
+def _frame_errors(ax: Axes, curves: Sequence[Curve]) -> None:
+    """One estimator that diverges must not flatten the others: beyond 30 x the best, it leaves the frame."""
+    spans = [float(np.nanmax(np.abs(c.values))) for c in curves if np.isfinite(c.values).any()]
+    bounds = [
+        float(np.nanpercentile(c.bound, 95)) for c in curves if c.bound is not None and np.isfinite(c.bound).any()
+    ]
+    if not spans:
+        return
+    limit = max(s for s in spans if s <= 30.0 * max(min(spans), 1e-12))
+    limit = max([limit, *(b for b in bounds if b <= 3.0 * limit)])
+    if limit > 0.0:
+        ax.set_ylim(-1.08 * limit, 1.08 * limit)
+
+
+# ------------------------------------------------------------------------------------------------
+
+
+def time_unit(longest: float) -> tuple[str, float]:
+    """Unit that suits a time axis up to ``longest`` [s], and the factor to it."""
+    if longest > 3.0 * 3600.0:
+        return "h", 1.0 / 3600.0
+    return ("min", 1.0 / 60.0) if longest > 600.0 else ("s", 1.0)
+
+
+def _percentiles(values: Array, levels: Sequence[float]) -> Array:
+    """Over the runs, (levels, n); NaN where fewer than half of the runs have a value."""
+    finite = np.isfinite(values)
+    if finite.all():
+        return np.asarray(np.percentile(values, levels, axis=0))
+    present = finite.sum(axis=0)
+    result = np.full((len(levels), values.shape[1]), np.nan)
+    enough = present >= max(1.0, 0.5 * len(values))
+    if enough.any():
+        result[:, enough] = np.nanpercentile(np.where(finite, values, np.nan)[:, enough], levels, axis=0)
+    return result
+
+
+def shade(ax: Axes, outages: Sequence[tuple[float, float, str]], factor: float, *, named: bool) -> None:
+    """Shade outages (start, end [s], name), and name them at the top."""
+    last = -math.inf
+    for start, end, name in sorted(outages):
+        ax.axvspan(start * factor, end * factor, color=SHADE, lw=0, zorder=0)
+        if named and name and start >= last:
+            ax.annotate(name, (start * factor, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2),
+                        textcoords="offset points", ha="left", va="top", fontsize=7.0, color=GREY)  # fmt: skip
+            last = end
+
+
+def _log_scale(ax: Axes, floor: float) -> None:
+    ax.set_yscale("log")
+    if math.isfinite(floor) and floor > 0.0:
+        ax.set_ylim(bottom=0.5 * floor)
+    plain_log_ticks(ax.yaxis)
+
+
+def plain_log_ticks(axis: Any) -> None:
+    """Powers of ten as 0.1, 1, 10, 100, 1k; more ticks where the range is short."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    low, high = sorted(axis.get_view_interval())
+    decades = math.log10(high / low) if low > 0.0 else 9.0
+
+    def text(value: float, _: int) -> str:
+        if value >= 1e6 or value < 1e-4:
+            return f"1e{round(math.log10(value))}" if value > 0 else ""
+        return f"{value / 1e3:g}k" if value >= 1e4 else f"{value:g}"
+
+    subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0, 3.0) if decades < 3.2 else (1.0,)
+    axis.set_major_locator(LogLocator(base=10.0, subs=subs, numticks=12))
+    axis.set_major_formatter(FuncFormatter(text))
+    axis.set_minor_locator(NullLocator())
+
+
+def legend_below(fig: Figure, ax: Axes, style: Style | None = None) -> None:
+    """One legend for all panels, from one of them: in the order of the style, or without one the last drawn first."""
+    handles, labels = ax.get_legend_handles_labels()
+    if not handles:
+        return
+    columns = max(1, int(_LEGEND * fig.get_figwidth() / (max(map(len, labels)) + 7)))  # as many as fit side by side
+    pairs = list(zip(labels, handles, strict=True))[::-1]
+    if style is not None:
+        pairs.sort(key=lambda pair: style.order(pair[0]))
+    fig.legend(
+        [handle for _, handle in pairs],
+        [label for label, _ in pairs],
+        loc="outside lower center",
+        ncols=min(len(labels), columns, 5),
+    )

@@ -1,0 +1,137 @@
+"""From recordings and trials to what `simnav.leaderboard.figures.plots` draws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simnav.earth import relative_position
+from simnav.leaderboard.figures.plots import Curve, Style, Track, run_chart
+from simnav.scoring import errors
+from simnav.sensors.faults import effect_of
+from simnav.types import KINDS, Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from simnav.recording import Recording
+    from simnav.trial import Trial
+
+__all__ = ["fixes", "outage_spans", "relative_track", "run_figure", "true_track"]
+
+_AXES = (
+    ("North error [m]", 0, 1.0),
+    ("East error [m]", 1, 1.0),
+    ("Down error [m]", 2, 1.0),
+    ("Heading error [deg]", 8, np.degrees(1.0)),
+)
+_MOST_DIAGNOSTICS = 10
+
+
+def _origin(recording: Recording) -> Array:
+    origin = recording.initial_truth.position[0]
+    return np.where(np.isfinite(origin), origin, recording.start.position)
+
+
+def _track(label: str, position: Array, origin: Array) -> Track:
+    ned = relative_position(position, origin)
+    return Track(label, ned[:, 1], ned[:, 0])
+
+
+def relative_track(label: str, position: Array, recording: Recording) -> Track:
+    """Track of positions (n, 3) of a run, from its start; the height does not matter."""
+    flat = position.copy()
+    flat[:, 2] = 0.0
+    return _track(label, flat, _origin(recording))
+
+
+def true_track(recording: Recording) -> Track:
+    """Track of the truth, or of a log's reference, from the start."""
+    states = np.vstack([recording.initial_truth.position, recording.data.truth.position])
+    return _track("truth", states[np.isfinite(states[:, :2]).all(axis=1)], _origin(recording))
+
+
+def fixes(recording: Recording, most: int = 1500) -> dict[str, Track]:
+    """Position fixes as delivered, by instrument, thinned to ``most``."""
+    found = {}
+    for stream in recording.data.aids.values():
+        if KINDS[stream.kind].role == "fix" and len(stream):
+            value = stream.value[:: max(1, len(stream) // most)]
+            if value.shape[1] == 2:  # a horizontal fix
+                value = np.column_stack([value, np.zeros(len(value))])
+            found[f"{stream.name} fixes"] = _track(stream.name, value, _origin(recording))
+    return found
+
+
+def outage_spans(recording: Recording, most: int = 12) -> list[tuple[float, float, str]]:
+    """Start, end [s] and name of the run's outages; none where there are too many to tell apart."""
+    spans: dict[tuple[float, float], list[str]] = {}
+    for fault in recording.faults:
+        if effect_of(fault.kind) == "missing":
+            spans.setdefault((fault.start, min(fault.end, recording.duration)), []).extend(fault.instruments)
+    if len(spans) > most:
+        return []
+    return [(a, b, f"no {', '.join(dict.fromkeys(names))}") for (a, b), names in sorted(spans.items()) if a < b]
+
+
+def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], references: Sequence[str] = ()) -> Figure:
+    """The figure of ``simnav run --plot``.
+
+    Parameters
+    ----------
+    recording : Recording
+    trials : sequence of (label, Trial)
+        Those without any epoch are left out.
+    references : sequence of str
+        Labels of those that are told the truth.
+    """
+    shown = [(label, trial, errors(trial, recording)) for label, trial in trials if len(trial)]
+    style = Style((label for label, _, _ in shown), references)
+    panels: dict[str, list[Curve]] = {}
+    for title, column, factor in _AXES:
+        curves = []
+        for label, trial, error in shown:
+            e = error[:, column]
+            if not np.isfinite(e).any():
+                continue
+            bound = None
+            if trial.covariance is not None:
+                variance = np.where(np.isfinite(e), trial.covariance[:, column, column], np.nan)
+                bound = 3.0 * factor * np.sqrt(np.maximum(variance, 0.0))
+            curves.append(Curve(label, trial.time, factor * e, bound))
+        if curves:
+            panels[title] = curves
+    tracks = []
+    for label, trial, _ in shown:
+        tracks.append(relative_track(label, np.where(trial.estimated[:, :3], trial.position, np.nan), recording))
+    note = f", {recording.note}" if recording.note else ""
+    return run_chart(
+        true_track(recording),
+        tracks,
+        panels,
+        style,
+        fixes=fixes(recording),
+        outages=outage_spans(recording),
+        diagnostics=_diagnostics(shown),
+        title=f"{recording.scenario}, seed {recording.seed}{note}",
+    )
+
+
+def _diagnostics(shown: Sequence[tuple[str, Trial, Array]]) -> dict[str, list[Curve]]:
+    """The diagnostics that most estimators give, one panel each; of an array, its mean over the components.
+
+    Where not all can be shown, those of an instrument or of the motion go before counters.
+    """
+    found: dict[str, list[Curve]] = {}
+    for label, trial, _ in shown:
+        for name, values in trial.diagnostics.items():
+            v = np.asarray(values, dtype=np.float64).reshape(len(trial), -1)
+            if v.shape[1] and np.isfinite(v).any():
+                count = np.isfinite(v).sum(axis=1)
+                mean = np.where(count > 0, np.nansum(v, axis=1) / np.maximum(count, 1), np.nan)
+                if np.nanmax(mean) == np.nanmin(mean):
+                    continue  # it says nothing over time
+                found.setdefault(name.replace("_", " "), []).append(Curve(label, trial.time, mean))
+    return dict(sorted(found.items(), key=lambda item: (-len(item[1]), "." not in item[0]))[:_MOST_DIAGNOSTICS])

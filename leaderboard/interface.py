@@ -1,0 +1,478 @@
+"""Everything that the `simnav` command does, as Python calls: `import simnav` gives them under their own names.
+
+An **estimator** is a class, a registered name, a file (``my.py``, ``my.py:MyFilter``), any of these with parameters
+(``"ekf:gate=3"``, ``(MyFilter, {"gain": 0.5})``); several are a list, or a text with commas. A **scenario** is a
+`simnav.scenario.Scenario`, a name or a TOML file. What comes back is typed, and has ``to_dict()`` (what the command
+prints with ``--json``), ``to_frame()`` (a ``pandas.DataFrame`` where pandas is installed, otherwise a
+``pyarrow.Table``) and ``plot()`` (a matplotlib ``Figure``).
+
+What cannot be done raises `RequestError`, a `ValueError` whose message is one sentence.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, requests
+from simnav.leaderboard.campaign.request import request as one_request
+from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
+from simnav.scenario import Scenario
+
+if TYPE_CHECKING:
+    from simnav.contract_check import Report
+    from simnav.estimator import Estimator
+    from simnav.leaderboard.campaign.campaign import Progress, Summary
+    from simnav.leaderboard.campaign.single_run import RunReport
+    from simnav.leaderboard.papers.reproduction import Reproduction
+    from simnav.leaderboard.ranking.bounds import BoundReport
+    from simnav.leaderboard.ranking.ranking import Ranking
+    from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
+    from simnav.leaderboard.results.result import Result
+    from simnav.recording import Recording
+
+__all__ = [
+    "EstimatorLike",
+    "Estimators",
+    "RequestError",
+    "ScenarioLike",
+    "Scenarios",
+    "bound",
+    "campaign",
+    "check",
+    "evaluate",
+    "make",
+    "quick_estimators",
+    "rank",
+    "record",
+    "reproduce",
+    "results_of",
+    "run",
+    "scenario_of",
+    "scenarios_of",
+]
+
+ScenarioLike: TypeAlias = "str | Path | Scenario"
+Scenarios: TypeAlias = "ScenarioLike | Iterable[ScenarioLike] | None"
+Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
+CampaignProgress: TypeAlias = "Callable[[Progress], None] | None"
+
+
+def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
+    """Make an estimator.
+
+    Parameters
+    ----------
+    estimator : str, Path, type or pair
+    **parameters
+        Of its constructor; texts are converted as on the command line.
+
+    Raises
+    ------
+    ValueError
+        On an unknown estimator or parameter, or a value that does not fit: one sentence.
+
+    Examples
+    --------
+    >>> make("gnss-only").name
+    'gnss-only'
+    """
+    return one_request(estimator, parameters).make()
+
+
+def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
+    """Run a scenario to its end: measurements, labels and truth.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+    seed : int
+
+    Raises
+    ------
+    ValueError
+        If there is no such scenario, or its log is absent or cannot be used.
+
+    Examples
+    --------
+    >>> len(record("harbour-multipath", seed=1).data.truth) > 100
+    True
+    """
+    from simnav.source import record
+
+    return record(scenario_of(scenario), seed)
+
+
+def check(estimator: EstimatorLike, **parameters: Any) -> Report:
+    """Test an estimator against the contract: causality, shapes, units, determinism, missing instruments.
+
+    Parameters
+    ----------
+    estimator, **parameters
+        As for `make`.
+
+    Returns
+    -------
+    simnav.contract_check.Report
+
+    Raises
+    ------
+    ValueError
+        If there is no such estimator, or it cannot be made.
+    """
+    from simnav.contract_check import check
+
+    return check(one_request(estimator, parameters).make)
+
+
+def run(
+    scenario: ScenarioLike,
+    estimators: Estimators = None,
+    *,
+    seed: int = 0,
+    parameters: Mapping[str, Any] | None = None,
+    progress: Callable[..., None] | None = None,
+) -> RunReport:
+    """Run estimators once over one scenario, in this process, and score them.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+    estimators : estimators, optional
+        Default: all registered ones.
+    seed : int
+    parameters : mapping, optional
+        Of the estimators; of several each gets those that it has.
+    progress : callable, optional
+        Called with how many of how many estimators are done, and ``note=`` the label of the next.
+
+    Returns
+    -------
+    RunReport
+        With the recording and all trials.
+    """
+    from simnav.leaderboard.campaign.single_run import run_once
+
+    return run_once(scenario_of(scenario), requests(estimators, parameters), seed, progress)
+
+
+def evaluate(
+    estimators: Estimators,
+    scenarios: Scenarios,
+    *,
+    runs: int = 20,
+    seed: int = 0,
+    against: Estimators = None,
+    parameters: Mapping[str, Any] | None = None,
+    workers: int = 2,
+    time_limit: float | None = None,
+    memory_limit: float = 2048.0,
+    results: str | os.PathLike[str] | None = None,
+    progress: CampaignProgress = None,
+) -> EvaluationReport:
+    """Run estimators beside the baselines on the same seeds, and say where they stand.
+
+    Parameters
+    ----------
+    estimators : estimators
+        Those in question.
+    scenarios : scenarios
+    runs : int
+        Seeds a scenario.
+    seed : int
+        The first; the others count up.
+    against : estimators, optional
+        Baselines; default: all registered ones.
+    parameters : mapping, optional
+        Of those in question.
+    workers : int
+        Processes.
+    time_limit : float, optional
+        That an estimator may take for a run [s]; default: a fifth of real time, at least a minute.
+    memory_limit : float
+        That an estimator may take beyond the recording [MiB].
+    results : path, optional
+        Folder to keep the results in; default: they are thrown away.
+    progress : callable, optional
+        Called with a `simnav.leaderboard.campaign.campaign.Progress` now and then.
+
+    Returns
+    -------
+    EvaluationReport
+    """
+    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.reports import EvaluationReport
+    from simnav.leaderboard.ranking.runs import group
+    from simnav.leaderboard.ranking.standing import standing
+
+    mine = requests(estimators, parameters)
+    labels = [r.label for r in mine]
+    everyone = [*mine, *(r for r in requests(against) if r.label not in labels)]
+    chosen, seeds = scenarios_of(scenarios), range(seed, seed + runs)
+    with _folder(results) as folder:
+        _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress)
+        found = results_of(folder)
+    wanted, known = {s.id for s in chosen}, {r.label for r in everyone}
+    found = [r for r in found if r.scenario in wanted and r.estimator in known and r.seed in seeds]
+    by_scenario = group(found)
+    return EvaluationReport(
+        found,
+        rank(found),
+        tuple(labels),
+        tuple(s.id for s in chosen),
+        seeds,
+        tuple(standing(by, label, s) for label in labels for s, by in by_scenario.items()),
+        None if results is None else folder,
+    )
+
+
+def campaign(
+    scenarios: Scenarios = None,
+    estimators: Estimators = None,
+    *,
+    runs: int | None = None,
+    seed: int = 0,
+    output: str | os.PathLike[str] = "results",
+    quick: bool = False,
+    parameters: Mapping[str, Any] | None = None,
+    workers: int = 2,
+    time_limit: float | None = None,
+    memory_limit: float = 2048.0,
+    progress: CampaignProgress = None,
+) -> CampaignReport:
+    """Run scenarios x estimators x seeds; started again, it goes on where it was.
+
+    Parameters
+    ----------
+    scenarios, estimators, optional
+        Default: all.
+    runs : int, optional
+        Seeds a scenario; default: 50, or 3 where it is quick.
+    output : path
+        Folder of the results.
+    quick : bool
+        Of what was not asked for by name, leave out what is long or slow.
+    seed, parameters, workers, time_limit, memory_limit, progress
+        As for `evaluate`.
+
+    Returns
+    -------
+    CampaignReport
+        Of all that is in the folder.
+    """
+    from simnav.leaderboard.campaign.campaign import QUICK_RUNS, RUNS
+    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.reports import CampaignReport
+
+    seeds = range(seed, seed + (runs or (QUICK_RUNS if quick else RUNS)))
+    if quick and estimators is None:
+        estimators = quick_estimators()
+    chosen, folder = scenarios_of(scenarios, quick=quick), _absolute(output)
+    summary = _run(chosen, requests(estimators, parameters), seeds, folder, workers, time_limit, memory_limit, progress)
+    results = results_of(folder)
+    return CampaignReport(results, rank(results), summary)
+
+
+def rank(results: str | os.PathLike[str] | Iterable[Result], *, score: str = "horizontal_rmse") -> Ranking:
+    """Rank estimators by their results.
+
+    Parameters
+    ----------
+    results : path or iterable of Result
+        Folder that a campaign wrote, or results themselves.
+    score : str
+        Key of `simnav.scoring.SCORES`, one that is better when lower.
+
+    Returns
+    -------
+    Ranking
+    """
+    from simnav.leaderboard.ranking.ranking import rank
+
+    return rank(results_of(results) if isinstance(results, (str, os.PathLike)) else results, score=score)
+
+
+def bound(
+    scenario: ScenarioLike,
+    *,
+    runs: int = 12,
+    smoothed: bool = False,
+    progress: Callable[..., None] | None = None,
+) -> BoundReport:
+    """The posterior Cramer-Rao bound of a simulated scenario: no estimator can be better.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+    runs : int
+        Seeds over which it is averaged.
+    smoothed : bool
+        The bound of smoothed output; default: of output in real time.
+    progress : callable, optional
+        Called with how many of how many kinds are done, and ``note=`` the next.
+
+    Returns
+    -------
+    BoundReport
+    """
+    from simnav.leaderboard.ranking.bounds import bounds_of
+
+    return bounds_of(scenario_of(scenario), runs, smoothed, progress)
+
+
+def reproduce(
+    paper: str,
+    *,
+    runs: int | None = None,
+    methods: Sequence[str] = (),
+    output: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    progress: Callable[[str, Progress], None] | None = None,
+) -> Reproduction:
+    """Run a paper's comparison again: ours beside theirs, row by row.
+
+    Parameters
+    ----------
+    paper : str
+        One of `simnav.leaderboard.papers.PAPERS`.
+    runs : int, optional
+        Seeds a scenario; default: few, so that it ends within minutes.
+    methods : sequence of str
+        Only what is about these methods of the paper.
+    output : path, optional
+        Folder; default: ``reproduced/PAPER``. Its folder ``results`` keeps the results: started again, it goes on.
+    workers : int
+        Processes.
+    progress : callable, optional
+        Called with the name of the scenario and the campaign's progress.
+
+    Returns
+    -------
+    Reproduction
+    """
+    from simnav.leaderboard.papers import paper as papers
+    from simnav.leaderboard.papers.reproduction import reproduce
+    from simnav.leaderboard.results.store import StoreError
+
+    with mistakes(ValueError):
+        chosen = papers.load(paper)
+        if methods:
+            chosen = chosen.only(methods)
+    folder = _absolute(output or Path("reproduced") / paper)
+    with mistakes(StoreError):
+        return reproduce(chosen, runs or chosen.runs, folder / "results", workers=workers, progress=progress)
+
+
+# -- what is given -----------------------------------------------------------------------------------------
+
+
+def scenario_of(given: ScenarioLike) -> Scenario:
+    """A scenario itself, or by name, id or path."""
+    from simnav.scenario import load
+
+    if isinstance(given, Scenario):
+        return given
+    with mistakes():
+        return load(given)
+
+
+def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str], None] | None = None) -> list[Scenario]:
+    """The scenarios that were asked for; where none was, all of the catalogue but logs whose files are not here.
+
+    Parameters
+    ----------
+    given : scenarios
+        A text may name several, separated by commas.
+    quick : bool
+        Of the catalogue, leave out those that are tagged ``long``.
+    note : callable, optional
+        Called with a sentence on what is left out; default: a warning.
+    """
+    from simnav.scenario import names
+
+    items = [] if given is None else [given] if isinstance(given, (str, Path, Scenario)) else list(given)
+    asked: list[ScenarioLike] = []
+    for item in items:
+        asked += [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]
+    found = []
+    for item in dict.fromkeys(asked or names()) if all(isinstance(i, str) for i in asked) else asked:
+        chosen = scenario_of(item)
+        if quick and not asked and "long" in chosen.tags:
+            continue
+        if chosen.log is not None:
+            from simnav.source import open_source
+
+            try:
+                open_source(chosen, 0)
+            except (ValueError, OSError) as error:
+                if asked:
+                    raise RequestError(sentence(error)) from error
+                _note(note, f"{chosen.name} is left out: {sentence(error)}")
+                continue
+        found.append(chosen)
+    if not found:
+        raise RequestError("there is no scenario to run")
+    return found
+
+
+def quick_estimators(note: Callable[[str], None] | None = None) -> list[str]:
+    """All registered estimators but the slow ones."""
+    from simnav.estimator import describe, names
+
+    slow = [name for name in names() if describe(name).slow]
+    if slow:
+        _note(note, f"left out of a quick campaign, for their cost: {', '.join(slow)} (-e names them)")
+    return [name for name in names() if name not in slow]
+
+
+def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[Result]:
+    """The current results of a folder; ``series`` are what figures need."""
+    from simnav.leaderboard.results.store import StoreError, load
+
+    path = _absolute(folder)
+    with mistakes(StoreError):
+        results = load(path, series=series)
+    if not results:
+        raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
+    return results
+
+
+def _note(note: Callable[[str], None] | None, text: str) -> None:
+    import warnings
+
+    if note is not None:
+        note(text)
+    else:
+        warnings.warn(text, stacklevel=3)
+
+
+def _absolute(path: str | os.PathLike[str]) -> Path:
+    return Path(path).expanduser().resolve()
+
+
+@contextlib.contextmanager
+def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
+    if keep is not None:
+        yield _absolute(keep)
+        return
+    with tempfile.TemporaryDirectory(prefix="simnav-evaluate-") as name:
+        yield Path(name) / "results"
+
+
+def _run(
+    scenarios: Sequence[Scenario], everyone: Sequence[EstimatorRequest], seeds: range, folder: Path, workers: int,
+    time_limit: float | None, memory_limit: float, progress: CampaignProgress,
+) -> Summary:  # fmt: skip
+    from simnav.leaderboard.campaign.campaign import run_campaign
+    from simnav.leaderboard.results.store import StoreError, create
+
+    with mistakes(StoreError):
+        create(folder)
+    return run_campaign(
+        scenarios, everyone, seeds, folder, workers=workers, timeout=time_limit,
+        memory=int(memory_limit * 2**20), progress=progress,
+    )  # fmt: skip

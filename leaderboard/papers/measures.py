@@ -1,0 +1,57 @@
+"""What is compared: the named scores in the units of the papers, and what a run cost."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from simnav.scoring import SCORES
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["Measure", "measure", "value_of"]
+
+_UNITS = {"rad": ("deg", 180.0 / math.pi), "s": ("s", 1.0)}
+
+
+class Measure(NamedTuple):
+    """Title, unit as the papers have it, and the factor from SI to it."""
+
+    title: str
+    unit: str
+    factor: float
+
+
+_OWN = {
+    "position_rmse": Measure("Position RMSE (3-D)", "m", 1.0),
+    "update_mean": Measure("Time per epoch", "ms", 1e3),
+    "peak_memory": Measure("Peak memory", "MB", 1e-6),
+}
+
+
+def measure(name: str) -> Measure:
+    """What a measure is.
+
+    Raises
+    ------
+    KeyError
+        If there is none of that name.
+    """
+    if name in _OWN:
+        return _OWN[name]
+    info = SCORES[name]
+    unit, factor = _UNITS.get(info.unit, (info.unit, 1.0))
+    return Measure(info.title, unit, factor)
+
+
+def value_of(result: Result, name: str) -> float:
+    """A measure of a result, in its unit; NaN where it does not apply."""
+    s = result.scores
+    if name == "position_rmse":
+        value = math.hypot(s.get("horizontal_rmse", math.nan), s.get("vertical_rmse", math.nan))
+    elif name == "peak_memory":
+        value = float(result.peak_memory)
+    else:
+        value = s.get(name, math.nan)
+    return value * measure(name).factor

@@ -1,0 +1,308 @@
+"""What is known of a paper: the methods that it compares, their figures, what follows from them, and what it draws."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from typing import Literal
+
+from simnav.leaderboard.papers import PAPERS
+from simnav.scenario import Scenario
+from simnav.scenario import load as load_scenario
+
+__all__ = [
+    "ATTITUDE",
+    "HORIZONTAL",
+    "HORIZONTAL_VELOCITY",
+    "POSITION",
+    "VELOCITY",
+    "Draw",
+    "Figure",
+    "Gain",
+    "Method",
+    "NotShown",
+    "Paper",
+    "Range",
+    "Row",
+    "Rule",
+    "Table",
+    "Value",
+    "load",
+]
+
+#: A figure, or the two ends of what a paper gives as a range.
+Range = float | tuple[float, float]
+
+#: ``equal``: ours should be the paper's; ``at-most``, ``at-least``: the paper's is a bound; ``beside``: the two are not
+#: of the same thing, and are shown without a verdict.
+Rule = Literal["equal", "at-most", "at-least", "beside"]
+
+#: Of one run: ``track``, ``run`` (series over time). Of all runs: ``spread`` (series again), ``bars``, ``gains``,
+#: ``distribution``.
+Draw = Literal["track", "run", "spread", "bars", "gains", "distribution"]
+
+
+# Panels of figures of one run.
+_NORTH_EAST = {"North error [m]": "north", "East error [m]": "east"}
+_NORTH_EAST_VELOCITY = {"North velocity error [m/s]": "velocity_north", "East velocity error [m/s]": "velocity_east"}
+POSITION: Mapping[str, str] = {**_NORTH_EAST, "Down error [m]": "down"}
+HORIZONTAL: Mapping[str, str] = _NORTH_EAST
+VELOCITY: Mapping[str, str] = {**_NORTH_EAST_VELOCITY, "Down velocity error [m/s]": "velocity_down"}
+HORIZONTAL_VELOCITY: Mapping[str, str] = _NORTH_EAST_VELOCITY
+ATTITUDE: Mapping[str, str] = {
+    "Tilt about north [deg]": "tilt_north",
+    "Tilt about east [deg]": "tilt_east",
+    "Heading error [deg]": "heading",
+}
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of a paper, and the registered estimators that can stand for it.
+
+    Attributes
+    ----------
+    name : str
+        As the paper calls it.
+    rows : tuple of str
+        Estimators as typed on the command line (``adkf:factor=two-segment``), the best first: the first that is
+        registered is taken.
+    smoothed : bool
+        Its output is the smoothed trajectory: that is what figures of one run show.
+    """
+
+    name: str
+    rows: tuple[str, ...]
+    smoothed: bool = False
+
+
+@dataclass(frozen=True)
+class Value:
+    """One figure of a method.
+
+    Attributes
+    ----------
+    scenario, method : str
+        A scenario of the catalogue, or one of the paper's variants; a name of the paper's methods.
+    score : str
+        Name of a measure (`simnav.leaderboard.papers.measures`).
+    paper : float, pair of float or None
+        In the measure's unit; None where the paper has no figure: ours is shown all the same.
+    rule : str
+    derived : bool
+        The paper does not print the figure, but it follows from others that it prints, or is read from its prose.
+    lower, higher : str
+        Why ours is lower, or higher, than the paper's: a sentence, shown only where it is so.
+    """
+
+    scenario: str
+    method: str
+    score: str
+    paper: Range | None = None
+    rule: Rule = "equal"
+    derived: bool = False
+    lower: str = ""
+    higher: str = ""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A claim that one method is better than another.
+
+    Attributes
+    ----------
+    scenario, method, than, score
+        As for `Value`.
+    paper : float
+        By what fraction the score of ``method`` is below that of ``than``; negative where it is above.
+    than_score : str
+        Where the other is scored by another measure (filtered against smoothed).
+    derived : bool
+    lower, higher : str
+        Why our gain is smaller, or larger.
+    """
+
+    scenario: str
+    method: str
+    than: str
+    score: str
+    paper: float
+    than_score: str = ""
+    derived: bool = False
+    lower: str = ""
+    higher: str = ""
+
+
+Row = Value | Gain
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows that belong together.
+
+    Attributes
+    ----------
+    title : str
+    rows : tuple of Row
+    number : str
+        Of the paper's table or figure that they answer (``Table 3``); empty where they answer its prose.
+    """
+
+    title: str
+    rows: tuple[Row, ...]
+    number: str = ""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a paper, drawn from our runs.
+
+    Attributes
+    ----------
+    number : str
+        ``Figure 4``; empty for one that the paper does not have.
+    what : str
+        Its title.
+    draw : str
+        How (see `Draw`).
+    scenario : str
+    methods : tuple of str
+        For ``gains`` the first is the one that is compared with each of the others.
+    series : mapping of str to str
+        Label of each panel, with its unit -> what is in it. ``run``: an error
+        (`simnav.leaderboard.papers.figures.ERRORS`) or a diagnostic (``weight.gnss``; a ``sigma_...`` gets the true
+        one beside it). ``spread``: a series of the results (`simnav.scoring.series`). ``bars``, ``gains``: a measure.
+    part : str
+        Tells several figures of the same number apart.
+    """
+
+    number: str
+    what: str
+    draw: Draw
+    scenario: str
+    methods: tuple[str, ...]
+    series: Mapping[str, str] = field(default_factory=dict)
+    part: str = ""
+
+    @property
+    def name(self) -> str:
+        """Of the file, without its ending.
+
+        >>> Figure("Figure 5", "Errors", "run", "ship-turn", (), part="CTM").name
+        'figure-5-ctm'
+        """
+        return re.sub(r"[^a-z0-9]+", "-", f"{self.number or self.what} {self.part}".lower()).strip("-")
+
+
+@dataclass(frozen=True)
+class NotShown:
+    """A table or figure of a paper that a simulation cannot show, and why."""
+
+    number: str
+    what: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper.
+
+    Attributes
+    ----------
+    key : str
+        ``000`` to ``004``.
+    title, citation : str
+    runs : int
+        Seeds a scenario, so that it ends within a few minutes.
+    full : int
+        As many as the paper has, or as settle the rows.
+    methods : tuple of Method
+    tables : tuple of Table
+    figures : tuple of Figure
+    not_shown : tuple of NotShown
+        Together with tables and figures all that the paper has.
+    notes : tuple of str
+        What the reader has to know of the comparison.
+    variants : mapping of str to (str, callable)
+        Other readings of a scenario: name -> scenario of the catalogue, and what makes the variant of it.
+    """
+
+    key: str
+    title: str
+    citation: str
+    runs: int
+    full: int
+    methods: tuple[Method, ...]
+    tables: tuple[Table, ...]
+    figures: tuple[Figure, ...] = ()
+    not_shown: tuple[NotShown, ...] = ()
+    notes: tuple[str, ...] = ()
+    variants: Mapping[str, tuple[str, Callable[[Scenario], Scenario]]] = field(default_factory=dict)
+
+    def rows(self) -> Iterator[Row]:
+        """All rows of all tables."""
+        for table in self.tables:
+            yield from table.rows
+
+    def method(self, name: str) -> Method:
+        """The method of that name."""
+        return next(m for m in self.methods if m.name == name)
+
+    def only(self, names: Collection[str]) -> Paper:
+        """The part of it that is about these methods and no others: what is costly can be left out of a long run.
+
+        Raises
+        ------
+        ValueError
+            If there is no such method, or no row is left; one sentence.
+        """
+        known = [m.name for m in self.methods]
+        for name in names:
+            if name not in known:
+                raise ValueError(f"paper {self.key} has no method {name!r}; it has {', '.join(known)}")
+
+        def about(row: Row) -> bool:
+            return row.method in names and (not isinstance(row, Gain) or row.than in names)
+
+        tables = tuple(replace(t, rows=rows) for t in self.tables if (rows := tuple(filter(about, t.rows))))
+        if not tables:
+            raise ValueError(f"paper {self.key} has no row that is about {' and '.join(names)} alone")
+        figures = tuple(f for f in self.figures if set(f.methods) <= set(names))
+        methods = tuple(m for m in self.methods if m.name in names)
+        return replace(self, methods=methods, tables=tables, figures=figures)
+
+    def scenario(self, name: str) -> Scenario:
+        """A scenario of the catalogue, or a variant of one."""
+        if name in self.variants:
+            base, change = self.variants[name]
+            return change(load_scenario(base)).model_copy(update={"name": name})
+        return load_scenario(name)
+
+    def participants(self) -> dict[str, list[str]]:
+        """Scenario -> methods that its rows and figures are about, in the paper's order."""
+        wanted: dict[str, set[str]] = {}
+        for row in self.rows():
+            wanted.setdefault(row.scenario, set()).add(row.method)
+            if isinstance(row, Gain):
+                wanted[row.scenario].add(row.than)
+        for figure in self.figures:
+            if figure.draw not in ("run", "track"):  # those are of one run, which is made for them
+                wanted.setdefault(figure.scenario, set()).update(figure.methods)
+        return {s: [m.name for m in self.methods if m.name in names] for s, names in wanted.items()}
+
+
+def load(key: str) -> Paper:
+    """The paper of that key.
+
+    Raises
+    ------
+    ValueError
+        If there is none; one sentence.
+    """
+    if key not in PAPERS:
+        raise ValueError(f"there is no paper {key!r}; there are {', '.join(PAPERS)}")
+    paper = import_module(f"simnav.leaderboard.papers.paper_{key}").PAPER
+    assert isinstance(paper, Paper)
+    return paper

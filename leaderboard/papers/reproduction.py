@@ -1,0 +1,283 @@
+"""From a paper to filled rows: its methods found, run on the same seeds, and judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.papers.comparison import Verdict, judge, judge_gain
+from simnav.leaderboard.papers.measures import measure, value_of
+from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row
+from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
+from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.frame import frame
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+    from simnav.leaderboard.campaign.campaign import Progress
+    from simnav.leaderboard.campaign.request import EstimatorRequest
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["Finding", "Reproduction", "find", "find_method", "reproduce"]
+
+_UNEXPLAINED = "not explained"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A row of a paper with our figures.
+
+    Attributes
+    ----------
+    table : str
+    row : Value or Gain
+    ours : Interval or None
+        In the unit of the measure; for a `Gain` the ratio. None where there is nothing.
+    verdict : str
+        ``agrees``, ``differs``, ``undecided``; ``ours`` where the paper has no figure, or none to judge by; ``absent``
+        where a method is not registered; ``failed`` or ``unsuitable``.
+    why : str
+        A sentence, or empty where the row agrees.
+    estimators : tuple of str
+        Labels of those that stand for the row's methods.
+    failed : int
+        Runs that failed.
+    """
+
+    table: str
+    row: Row
+    ours: Interval | None
+    verdict: str
+    why: str = ""
+    estimators: tuple[str, ...] = ()
+    failed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """A paper's comparison, run again.
+
+    Attributes
+    ----------
+    paper : Paper
+    seeds : sequence of int
+    findings : list of Finding
+    stands_for : dict of str to EstimatorRequest or None
+        Method -> who stands for it.
+    results : list of Result
+    """
+
+    paper: Paper
+    seeds: Sequence[int]
+    findings: list[Finding]
+    stands_for: dict[str, EstimatorRequest | None]
+    results: list[Result]
+
+    def count(self, verdict: str) -> int:
+        """Rows with a verdict."""
+        return sum(f.verdict == verdict for f in self.findings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "paper": self.paper.key,
+            "title": self.paper.title,
+            "citation": self.paper.citation,
+            "notes": list(self.paper.notes),
+            "runs": len(self.seeds),
+            "seeds": list(self.seeds),
+            "methods": {name: None if r is None else r.label for name, r in self.stands_for.items()},
+            "rows": [_row_dict(f) for f in self.findings],
+        }
+
+    def to_frame(self) -> Any:
+        """A row of the paper's tables a row; see `simnav.leaderboard.results.frame.frame`."""
+        rows = [_row_dict(f) for f in self.findings]
+        texts = [{k: " / ".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()} for row in rows]
+        return frame([{**row, "paper": None if row["paper"] is None else str(row["paper"])} for row in texts])
+
+    def plot(self, number: str = "") -> matplotlib.figure.Figure:
+        """One of the paper's figures from our runs.
+
+        Parameters
+        ----------
+        number : str
+            ``Figure 4``; default: the first that there is something to draw of.
+
+        Raises
+        ------
+        RequestError
+            If there is none; one sentence.
+        """
+        from simnav.leaderboard.papers.figures import draw
+
+        for entry in self.paper.figures:
+            if number in ("", entry.number) and (fig := draw(self, entry)) is not None:
+                return fig
+        known = ", ".join(dict.fromkeys(f.number for f in self.paper.figures if f.number))
+        raise RequestError(f"there is nothing to draw of {number or 'this paper'}; it has {known or 'no figures'}")
+
+
+def _row_dict(f: Finding) -> dict[str, Any]:
+    m = measure(f.row.score)
+    gain = isinstance(f.row, Gain)
+    paper: Any = f.row.paper
+    ours = None if f.ours is None else [f.ours.value, f.ours.low, f.ours.high]
+    if gain and ours is not None:  # a ratio of 0.7 is a gain of 30 %; a low ratio is a large gain
+        ours = [1.0 - ours[0], 1.0 - ours[2], 1.0 - ours[1]]
+    return {
+        "table": f.table,
+        "scenario": f.row.scenario,
+        "method": f.row.method,
+        "than": f.row.than if isinstance(f.row, Gain) else None,
+        "estimators": list(f.estimators),
+        "score": f.row.score,
+        "title": m.title,
+        "unit": "gain" if gain else m.unit,
+        "paper": list(paper) if isinstance(paper, tuple) else paper,
+        "rule": "gain" if isinstance(f.row, Gain) else f.row.rule,
+        "derived": f.row.derived,
+        "ours": None if ours is None else ours[0],
+        "low": None if ours is None else ours[1],
+        "high": None if ours is None else ours[2],
+        "runs": 0 if f.ours is None else f.ours.runs,
+        "failed": f.failed,
+        "verdict": f.verdict,
+        "why": f.why,
+    }
+
+
+def find_method(method: Method) -> EstimatorRequest | None:
+    """The registered estimator that stands for a method; None where there is none yet."""
+    from simnav.estimator import EstimatorError, make, names
+    from simnav.leaderboard.campaign.request import EstimatorRequest, split_estimators
+
+    known = set(names())
+    for text in method.rows:
+        name, parameters = split_estimators([text])[0]
+        if name not in known and ".py" not in name:
+            continue
+        try:
+            make(name, **parameters)
+        except EstimatorError:  # it has no such parameter: the next will do
+            continue
+        return EstimatorRequest(name, parameters)
+    return None
+
+
+def reproduce(
+    paper: Paper,
+    runs: int,
+    folder: Path,
+    *,
+    workers: int = 2,
+    progress: Callable[[str, Progress], None] | None = None,
+) -> Reproduction:
+    """Run a paper's comparison.
+
+    Parameters
+    ----------
+    paper : Paper
+    runs : int
+        Seeds a scenario, from 0 on.
+    folder : Path
+        Of the results: what is there already is not run again.
+    workers : int
+    progress : callable, optional
+        Called with the name of the scenario and the campaign's progress.
+
+    Returns
+    -------
+    Reproduction
+
+    Raises
+    ------
+    simnav.leaderboard.campaign.campaign.CampaignError, simnav.leaderboard.results.store.StoreError
+        As `simnav.leaderboard.campaign.campaign.run_campaign`.
+    """
+    from simnav.leaderboard.campaign.campaign import run_campaign
+    from simnav.leaderboard.results.store import load
+
+    stands_for = {m.name: find_method(m) for m in paper.methods}
+    seeds, ids, results = range(runs), {}, []
+    for name, methods in paper.participants().items():
+        scenario = paper.scenario(name)
+        ids[name] = scenario.id
+        found = {r.label: r for m in methods if (r := stands_for[m]) is not None}
+        if found:
+            named = None if progress is None else _named(progress, name)
+            run_campaign([scenario], list(found.values()), seeds, folder, workers=workers, progress=named)
+            loaded = load(folder, series=bool(paper.figures))
+            results += [r for r in loaded if r.scenario == scenario.id and r.estimator in found and r.seed in seeds]
+    by: dict[tuple[str, str], list[Result]] = {}
+    for result in results:
+        by.setdefault((result.scenario, result.estimator), []).append(result)
+    labels = {name: r.label for name, r in stands_for.items() if r is not None}
+    findings = [find(table.title, row, ids[row.scenario], labels, by) for table in paper.tables for row in table.rows]
+    return Reproduction(paper, seeds, findings, stands_for, results)
+
+
+def _named(progress: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:
+    return lambda p: progress(name, p)
+
+
+def find(
+    table: str,
+    row: Row,
+    scenario: str,
+    labels: Mapping[str, str],
+    results: Mapping[tuple[str, str], Sequence[Result]],
+) -> Finding:
+    """Fill one row.
+
+    Parameters
+    ----------
+    table : str
+    row : Row
+    scenario : str
+        Versioned id.
+    labels : mapping of str to str
+        Method -> estimator, of those that are there.
+    results : mapping of (scenario, estimator) to results
+    """
+    methods = [row.method, *([row.than] if isinstance(row, Gain) else [])]
+    missing = [m for m in methods if m not in labels]
+    if missing:
+        return Finding(table, row, None, "absent", f"not there yet: {', '.join(missing)}")
+    names = tuple(labels[m] for m in methods)
+    all_runs = [results.get((scenario, name), ()) for name in names]
+    for name, runs in zip(names, all_runs, strict=True):
+        if not any(r.status == "ok" for r in runs):
+            reasons = [f"{name}: {r.reason}" for r in runs] or [f"{name}: no run"]
+            unsuitable = bool(runs) and not any(r.tried for r in runs)
+            return Finding(table, row, None, "unsuitable" if unsuitable else "failed", reasons[0], names, len(runs))
+    failures = [sum(r.status != "ok" for r in runs) for runs in all_runs]
+    failed = sum(failures)
+    scores = [row.score, (row.than_score or row.score) if isinstance(row, Gain) else row.score]
+    values = [
+        {r.seed: value_of(r, score) for r in runs if r.status == "ok"}
+        for runs, score in zip(all_runs, scores, strict=False)
+    ]
+    if isinstance(row, Gain):
+        ours = mean_ratio(values[0], values[1])
+        verdict = judge_gain(ours, 1.0 - row.paper)
+        # The side is the ratio's: a higher ratio is a smaller gain.
+        why = {-1: row.higher, 1: row.lower}
+    else:
+        ours = mean(values[0].values())
+        if math.isnan(ours.value):
+            return Finding(table, row, None, "unsuitable", f"{names[0]} does not give it", names, failed)
+        if row.paper is None or row.rule == "beside":
+            return Finding(table, row, ours, "ours", "", names, failed)
+        verdict = judge(ours, row.paper, row.rule)
+        why = {-1: row.lower, 1: row.higher}
+    if failures[0] or (failed and isinstance(row, Gain)):  # a run that failed is worse than any figure
+        verdict = Verdict("differs", 1 if failures[0] else -1)
+    sentence = ""
+    if verdict.word == "differs":
+        sentence = why[verdict.side] or _UNEXPLAINED
+    return Finding(table, row, ours, verdict.word, sentence, names, failed)

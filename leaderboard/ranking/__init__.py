@@ -1,0 +1,1 @@
+"""What results say: statistics, runs of one estimator condensed, the ranking and its table."""

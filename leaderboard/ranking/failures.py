@@ -1,0 +1,37 @@
+"""Runs that failed: how many of each kind, and a table with the first reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.ranking import tables
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["failure_table", "failures"]
+
+
+def failures(results: Sequence[Result]) -> dict[str, int]:
+    """How many results have which status, but for those that are ok or do not suit."""
+    found: dict[str, int] = {}
+    for r in _failed(results):
+        found[r.status] = found.get(r.status, 0) + 1
+    return found
+
+
+def failure_table(results: Sequence[Result]) -> list[Table]:
+    """A table with a line for each estimator, scenario and status that failed; none where nothing did."""
+    found: dict[tuple[str, str, str], list[Result]] = {}
+    for r in _failed(results):
+        found.setdefault((r.estimator, r.scenario, r.status), []).append(r)
+    rows = [[*key, len(failed), failed[0].reason] for key, failed in found.items()]
+    columns = ["estimator", "scenario", "status", "runs", "reason of the first"]
+    return [tables.table("Failures", columns, rows, numeric=["runs"])] if rows else []
+
+
+def _failed(results: Sequence[Result]) -> list[Result]:
+    return [r for r in results if r.status not in ("ok", "unsuitable")]

@@ -1,0 +1,108 @@
+"""What campaigns and evaluations give: results with their ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.ranking.failures import failures
+from simnav.leaderboard.ranking.ranking import Ranking
+from simnav.leaderboard.ranking.standing import Standing
+from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from simnav.leaderboard.campaign.campaign import Summary
+
+__all__ = ["CampaignReport", "EvaluationReport"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Report:
+    """Results with their ranking.
+
+    Attributes
+    ----------
+    results : sequence of Result
+    ranking : Ranking
+        Of these results.
+    """
+
+    results: Sequence[Result]
+    ranking: Ranking
+
+    def to_frame(self) -> Any:
+        """A row a run, a column a score (SI units, radians); see `simnav.leaderboard.results.frame.frame`."""
+        from simnav.leaderboard.results.export import table
+
+        return frame(table(self.results).to_pylist())
+
+    def plot(self) -> Figure:
+        """The ranking with its intervals."""
+        return self.ranking.plot()
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignReport(_Report):
+    """A campaign and all that is in its folder.
+
+    Attributes
+    ----------
+    summary : Summary
+        What this campaign did.
+    """
+
+    summary: Summary
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav campaign --json`` prints."""
+        return {
+            "results": str(self.summary.folder),
+            "seconds": self.summary.seconds,
+            "asked": self.summary.total,
+            "computed": self.summary.computed,
+            "runs": len(self.results),
+            "failed": failures(self.results),
+            "ranking": self.ranking.to_dict(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluationReport(_Report):
+    """Where estimators stand among others.
+
+    Attributes
+    ----------
+    estimators : tuple of str
+        Labels of those in question.
+    scenarios : tuple of str
+        Versioned ids.
+    seeds : sequence of int
+    standings : tuple of Standing
+        One for each estimator in question and scenario.
+    folder : Path or None
+        Of the results, where they were kept.
+    """
+
+    estimators: tuple[str, ...]
+    scenarios: tuple[str, ...]
+    seeds: Sequence[int]
+    standings: tuple[Standing, ...]
+    folder: Path | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav evaluate --json`` prints."""
+        return {
+            "estimator": self.estimators[0],
+            "estimators": list(self.estimators),
+            "scenarios": list(self.scenarios),
+            "seeds": list(self.seeds),
+            "ranking": self.ranking.to_dict(),
+            "comparisons": plain(self.standings),
+            "results": None if self.folder is None else str(self.folder),
+        }

@@ -1,0 +1,182 @@
+"""All runs of one estimator on one scenario, condensed: what ranking, pages and figures read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simnav.leaderboard.figures.plots import Array, Band, Track
+from simnav.leaderboard.ranking.statistics import Interval, median
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["MIN_AVAILABILITY", "Run", "Runs", "group", "tracks"]
+
+#: Least share of the epochs with a position in a run that does not count as failed.
+MIN_AVAILABILITY = 0.95
+
+Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
+
+
+class Runs:
+    """All runs of one estimator on one scenario.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        At least one.
+    ranked : str
+        Key of `simnav.scoring.SCORES` that the ranking is by; it decides which runs are `completed`.
+
+    Attributes
+    ----------
+    scenario, estimator : str
+    reference : bool
+    results : list of Result
+        In order of seed.
+
+    Raises
+    ------
+    ValueError
+        If there are two results for one run.
+    """
+
+    def __init__(self, results: Sequence[Result], ranked: str = "horizontal_rmse"):
+        self.results = sorted(results, key=_run)
+        self.scenario, self.estimator, self.ranked = results[0].scenario, results[0].estimator, ranked
+        self.reference = any(r.reference for r in results)
+        for a, b in pairwise(self.results):
+            if _run(a) == _run(b):
+                what = f"two results of {self.estimator!r} on {self.scenario} for seed {a.seed}"
+                raise ValueError(f"{what}; keep one of them")
+
+    @cached_property
+    def tried(self) -> list[Result]:
+        """Those for which the scenario suits the estimator."""
+        return [r for r in self.results if r.tried]
+
+    @cached_property
+    def good(self) -> list[Result]:
+        """Those that ended well."""
+        return [r for r in self.tried if r.status == "ok"]
+
+    @property
+    def failed(self) -> int:
+        """Number of failures."""
+        return len(self.tried) - len(self.good)
+
+    @property
+    def peak_memory(self) -> int:
+        """Largest of all runs [bytes]."""
+        return max((int(r.peak_memory) for r in self.tried), default=0)
+
+    def scores(self, name: str) -> list[float]:
+        """One score of the runs that ended well; NaN where it does not apply."""
+        return [float(r.scores.get(name, math.nan)) for r in self.good]
+
+    def score(self, name: str) -> Interval:
+        """Median of a score over the runs that ended well."""
+        return median(self.scores(name))
+
+    def numbers(self, name: str) -> Array:
+        """A score over all runs, those that failed included as far as they went; only where it is finite."""
+        x = np.array([r.scores.get(name, math.nan) for r in self.tried], dtype=np.float64)
+        return x[np.isfinite(x)]
+
+    # -- as the ranking counts them ------------------------------------------------------------------
+
+    def status(self, result: Result) -> str:
+        """Status of a run in the ranking: "incomplete" where too little came out of a run that ended well."""
+        if result.status != "ok":
+            return result.status
+        sparse = self.ranked == "horizontal_rmse" and not result.scores.get("availability", 1.0) >= MIN_AVAILABILITY
+        return "incomplete" if sparse or not math.isfinite(self._value(result)) else "ok"
+
+    @cached_property
+    def statuses(self) -> dict[str, int]:
+        """How many runs have which `status`."""
+        found = [self.status(r) for r in self.tried]
+        return {s: found.count(s) for s in sorted(set(found))}
+
+    @cached_property
+    def completed(self) -> dict[Run, float]:
+        """The ranked score of the runs that are ok in the ranking."""
+        return {_run(r): self._value(r) for r in self.tried if self.status(r) == "ok"}
+
+    def unsuitable(self) -> str:
+        """Why the ranking has no score here, or nothing."""
+        if not self.tried:
+            return min(r.reason or r.status for r in self.results)
+        if len(self.good) == len(self.tried) and not any(math.isfinite(self._value(r)) for r in self.good):
+            return f"has no {self.ranked}"
+        return ""
+
+    def _value(self, result: Result) -> float:
+        return float(result.scores.get(self.ranked, math.nan))
+
+    # -- curves --------------------------------------------------------------------------------------
+
+    def band(self, name: str, factor: float = 1.0) -> Band | None:
+        """Magnitude of an error over time, a row a run, on the time axis of the longest run; None without any."""
+        found = [(r.series["time"], np.abs(r.series[name])) for r in self.good if _has(r, name)]
+        if not found:
+            return None
+        time = max((t for t, _ in found), key=lambda t: float(t[-1])).astype(np.float64)
+        rows = [np.interp(time, t, v, right=np.nan) if len(t) != len(time) or not np.array_equal(t, time) else v
+                for t, v in found]  # fmt: skip
+        return Band(self.estimator, time, factor * np.asarray(rows, dtype=np.float64))
+
+    def quantiles(self) -> Band | None:
+        """Quantiles of the horizontal error, a row a run: their pooled distribution is that of all epochs."""
+        rows = [r.series["quantiles"] for r in self.good if _has(r, "quantiles")]
+        if not rows:
+            return None
+        values = np.asarray(rows, dtype=np.float64)
+        return Band(self.estimator, np.arange(values.shape[1], dtype=np.float64), values)
+
+    def at(self, seed: int) -> Result | None:
+        """The run with a seed, if it ended well."""
+        return next((r for r in self.good if r.seed == seed), None)
+
+
+def _run(result: Result) -> Run:
+    return result.seed, result.note
+
+
+def _has(result: Result, name: str) -> bool:
+    values = result.series.get(name)
+    return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
+
+
+def group(results: Iterable[Result], ranked: str = "horizontal_rmse") -> dict[str, dict[str, Runs]]:
+    """Scenario -> estimator -> runs, both in the order in which they come."""
+    lists: dict[str, dict[str, list[Result]]] = {}
+    for r in results:
+        lists.setdefault(r.scenario, {}).setdefault(r.estimator, []).append(r)
+    return {s: {e: Runs(found, ranked) for e, found in by.items()} for s, by in lists.items()}
+
+
+def tracks(runs: Iterable[Runs], seed: int) -> tuple[Track | None, list[Track]]:
+    """Truth and estimates of one seed, from the series; (None, []) where no run of it has a track."""
+    truth: Array | None = None
+    estimates = []
+    for r in runs:
+        result = r.at(seed)
+        if result is None or not _has(result, "truth_north"):
+            continue
+        s = {k: np.asarray(v, dtype=np.float64) for k, v in result.series.items()}
+        known = np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"])
+        this = np.column_stack([s["truth_east"][known], s["truth_north"][known]])
+        if truth is None or len(this) > len(truth):
+            truth = this
+        if _has(result, "estimate_north"):
+            estimates.append(Track(r.estimator, s["estimate_east"], s["estimate_north"]))
+    if truth is None or not len(truth):
+        return None, []
+    return Track("truth", truth[:, 0], truth[:, 1]), estimates

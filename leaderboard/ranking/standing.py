@@ -1,0 +1,133 @@
+"""Where one estimator stands among others on a scenario, paired by seed."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.statistics import compare
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from simnav.leaderboard.ranking.runs import Runs
+
+__all__ = ["Standing", "StandingRow", "standing", "standing_table"]
+
+
+@dataclass(frozen=True)
+class StandingRow:
+    """One of the estimators, and how the one in question compares with it.
+
+    Attributes
+    ----------
+    estimator : str
+    reference : bool
+    runs, failed : int
+    horizontal_rmse, low, high : float
+        Median over the runs that ended well, with its 95 % interval [m].
+    ratio, ratio_low, ratio_high : float or None
+        Geometric mean of the ratio of the error in question to this one's over the same seeds, with its interval;
+        None for the estimator in question, and where no seed is common.
+    better : float or None
+        Share of the seeds on which the estimator in question has the smaller error.
+    p_value : float or None
+        Of the paired test.
+    """
+
+    estimator: str
+    reference: bool
+    runs: int
+    failed: int
+    horizontal_rmse: float
+    low: float
+    high: float
+    ratio: float | None = None
+    ratio_low: float | None = None
+    ratio_high: float | None = None
+    better: float | None = None
+    p_value: float | None = None
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where an estimator stands on a scenario.
+
+    Attributes
+    ----------
+    scenario, estimator : str
+    place : int or None
+        By the median error among those that are no references; None where the scenario does not suit it.
+    of : int
+        How many there are.
+    rows : tuple of StandingRow
+        The smallest error first.
+    """
+
+    scenario: str
+    estimator: str
+    place: int | None
+    of: int
+    rows: tuple[StandingRow, ...]
+
+
+def standing(by: Mapping[str, Runs], mine: str, scenario: str) -> Standing:
+    """How one estimator compares with each of the others on a scenario, on the horizontal RMSE.
+
+    Parameters
+    ----------
+    by : mapping of str to Runs
+        Label -> runs on the scenario.
+    mine : str
+        Label of the estimator in question.
+    scenario : str
+        Versioned id.
+    """
+    found = (_row(runs, by.get(mine)) for runs in by.values() if runs.tried)
+    rows = sorted(found, key=lambda r: math.inf if math.isnan(r.horizontal_rmse) else r.horizontal_rmse)
+    ranked = [r.estimator for r in rows if not r.reference]
+    place = ranked.index(mine) + 1 if mine in ranked else None
+    return Standing(scenario, mine, place, len(ranked), tuple(rows))
+
+
+def _row(runs: Runs, mine: Runs | None) -> StandingRow:
+    score = runs.score("horizontal_rmse")
+    figures = (runs.estimator, runs.reference, len(runs.tried), runs.failed, score.value, score.low, score.high)
+    if mine is not None and runs is not mine and mine.tried:
+        with contextlib.suppress(ValueError):  # no seed in common, or errors of zero
+            c = compare(_errors(mine), _errors(runs))
+            return StandingRow(*figures, c.ratio, math.exp(c.low), math.exp(c.high), c.better, c.p_value)
+    return StandingRow(*figures)
+
+
+def _errors(runs: Runs) -> dict[object, float]:
+    """Horizontal RMSE by seed [m]; infinite where the run failed."""
+    return {r.seed: r.scores.get("horizontal_rmse", math.nan) if r.status == "ok" else math.inf for r in runs.tried}
+
+
+def standing_table(stand: Standing) -> Table:
+    """The table of a standing for the terminal."""
+    rows = []
+    for r in stand.rows:
+        better = "" if r.better is None else tables.percent(r.better)
+        ratio = "" if r.ratio is None else tables.interval(r.ratio, r.ratio_low, r.ratio_high)
+        p = "" if r.p_value is None else ("< 0.001" if r.p_value < 0.001 else f"{r.p_value:.3f}")
+        rows.append([r.estimator + (" *" if r.reference else ""), f"{r.failed} of {r.runs}",
+                     tables.interval(r.horizontal_rmse, r.low, r.high), ratio, better, p])  # fmt: skip
+    mine = stand.estimator
+    columns = ["estimator", "failed", "horizontal RMSE [m]", f"{mine} / it", f"{mine} better in", "p"]
+    place = f"is {stand.place} of {stand.of}" if stand.place else "does not suit it"
+    return tables.table(
+        f"{stand.scenario}: {mine} {place}",
+        columns,
+        rows,
+        numeric=columns[1:],
+        dim=[i for i, r in enumerate(stand.rows) if r.reference],
+        strong=[i for i, r in enumerate(stand.rows) if r.estimator == mine],
+        caption="Median over the seeds with its 95 % interval. Ratio: geometric mean over the same seeds; below 1 "
+        "the estimator is better. p: Wilcoxon signed-rank test. * reference: told the truth.",
+    )

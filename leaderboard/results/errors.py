@@ -1,0 +1,37 @@
+"""What was asked for cannot be done: one class of error, and exceptions as sentences."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+__all__ = ["RequestError", "mistakes", "sentence"]
+
+
+class RequestError(ValueError):
+    """What the user asked for cannot be done; the message is one sentence that says what would be right."""
+
+
+@contextlib.contextmanager
+def mistakes(*kinds: type[Exception]) -> Iterator[None]:
+    """Turn exceptions of the given kinds (by default those of wrong input) into `RequestError`."""
+    expected = kinds or (ValueError, LookupError, TypeError, OSError, SyntaxError, ImportError, AttributeError)
+    try:
+        yield
+    except RequestError:
+        raise
+    except expected as error:
+        raise RequestError(sentence(error)) from error
+
+
+def sentence(error: BaseException) -> str:
+    """The message of an exception on one line."""
+    if isinstance(error, KeyError) and error.args:
+        text = str(error.args[0])  # str(KeyError) is the repr of its message
+    elif isinstance(error, OSError) and error.strerror:
+        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    elif isinstance(error, SyntaxError) and error.filename:
+        text = f"{error.filename}, line {error.lineno}: {error.msg}"
+    else:
+        text = str(error)
+    return " ".join(text.split()) or type(error).__name__

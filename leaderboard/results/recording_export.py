@@ -1,0 +1,78 @@
+"""A recording for other programs: one file (npz), or a folder of CSV files.
+
+A folder has one file for the truth, one for the IMU, and one for each aiding instrument. Columns end in their unit;
+angles are in degrees. Nothing is rounded: a file read back holds the same numbers, up to the conversion from radians.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.formats import writes
+from simnav.spec import UNITS
+from simnav.types import KINDS, Array
+
+if TYPE_CHECKING:
+    from simnav.recording import Recording
+
+__all__ = ["write_csv", "write_npz"]
+
+#: Columns of the truth and of the IMU, with their units.
+_TRUTH = {
+    **dict.fromkeys(("latitude", "longitude"), "deg"),
+    "height": "m",
+    **dict.fromkeys(("velocity_north", "velocity_east", "velocity_down"), "m_s"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "deg"),
+}
+_IMU_UNITS = (("angular_rate", "deg_s"), ("specific_force", "m_s2"))
+_IMU = {f"{name}_{axis}": unit for name, unit in _IMU_UNITS for axis in "xyz"}
+
+
+@writes("recording", "npz")
+def write_npz(recording: Recording, path: Path) -> list[Path]:
+    """The whole recording, which `simnav.recording.Recording.load` reads."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    recording.save(path)
+    return [path]
+
+
+@writes("recording", "csv")
+def write_csv(recording: Recording, path: Path) -> list[Path]:
+    """A folder with ``truth.csv``, ``imu.csv`` and one ``<instrument>.csv`` each."""
+    path.mkdir(parents=True, exist_ok=True)
+    truth, imu = recording.data.truth, recording.data.imu
+    states = np.hstack([truth.position, truth.velocity, truth.attitude])
+    written = [_table(path / "truth.csv", truth.time, _TRUTH, states)]
+    if imu is not None:
+        samples = np.hstack([imu.angular_rate, imu.specific_force])
+        written.append(_table(path / "imu.csv", imu.time, _IMU, samples))
+    for stream in recording.data.aids.values():
+        file = path / f"{stream.name}.csv"
+        units = {c.name: c.unit for c in KINDS[stream.kind].components}
+        written.append(_table(file, stream.time, units, stream.value, stream.faults))
+    return written
+
+
+def _table(
+    path: Path, time: Array, units: Mapping[str, str], values: Array, faults: NDArray[np.uint32] | None = None
+) -> Path:
+    """Write the columns, of the given names and units."""
+    # Degrees as NumPy has them: 180 / pi, where a division by pi / 180 may differ in the last digit.
+    scale = np.array([np.degrees(1.0) if u in ("deg", "deg_s") else 1.0 / UNITS[u] for u in units.values()])
+    header = ["time_s", *(f"{name}_{unit}" for name, unit in units.items())]
+    columns = [time[:, None], values * scale]
+    formats = ["%.17g"] * (1 + len(units))
+    if faults is not None:
+        header.append("faults")  # bit mask of the faults that touched the measurement
+        columns.append(np.asarray(faults, dtype=np.float64)[:, None])
+        formats.append("%d")
+    text = io.StringIO()
+    np.savetxt(text, np.hstack(columns), fmt=formats, delimiter=",", header=",".join(header), comments="")
+    return write_whole(path, text.getvalue())

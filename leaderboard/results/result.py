@@ -1,0 +1,179 @@
+"""A result: what one estimator did in one run, and its form in a Parquet file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["BATCH", "FORMAT", "NO_TRIAL", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
+
+#: Version of the format of results.
+FORMAT = 1
+
+#: Results that are held in memory at a time where a file is streamed.
+BATCH = 256
+
+#: Statuses that say nothing about the estimator.
+NO_TRIAL = ("unsuitable", "no-recording")
+
+Series = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What one estimator did in one run.
+
+    Attributes
+    ----------
+    scenario : str
+        Versioned id.
+    seed : int
+    estimator : str
+        Label, unique in a campaign.
+    parameters : mapping
+        Those that were set.
+    reference : bool
+        True for rows that are told the truth; they are not ranked.
+    status, reason : str
+        As in `simnav.trial`, and ``timeout``, ``out-of-memory``, ``no-recording``.
+    scores : dict of str to float
+        As in `simnav.scoring.SCORES`.
+    series : dict of str to array
+        As from `simnav.scoring.series`, in single precision.
+    note : str
+        The recording's, e.g. which of several logs it is.
+    seconds : float
+        Wall-clock time of the estimator, start of its process included.
+    peak_memory : int
+        Taken by the estimator at most [bytes].
+    key : str
+        Digest of all that decides the result, and the seed.
+    recording : str
+        Digest of scenario and simulator: runs that share it and the seed share the recording.
+    simnav : str
+        Version and digest of the simulator.
+    """
+
+    scenario: str
+    seed: int
+    estimator: str
+    parameters: Mapping[str, Any]
+    reference: bool
+    status: str
+    reason: str
+    scores: dict[str, float]
+    series: dict[str, Series] = field(default_factory=dict)
+    note: str = ""
+    seconds: float = 0.0
+    peak_memory: int = 0
+    key: str = ""
+    recording: str = ""
+    simnav: str = ""
+
+    @property
+    def variant(self) -> str:
+        """The key without the seed."""
+        return self.key.rpartition("-")[0]
+
+    @property
+    def tried(self) -> bool:
+        """Whether the run says something about the estimator."""
+        return self.status not in NO_TRIAL
+
+
+def schema() -> pa.Schema:
+    """Columns of a file of results."""
+    import pyarrow as pa
+
+    series = pa.struct([("name", pa.string()), ("shape", pa.list_(pa.int64())), ("values", pa.list_(pa.float32()))])
+    return pa.schema(
+        [
+            ("key", pa.string()),
+            ("scenario", pa.string()),
+            ("seed", pa.int64()),
+            ("estimator", pa.string()),
+            ("parameters", pa.string()),
+            ("reference", pa.bool_()),
+            ("status", pa.string()),
+            ("reason", pa.string()),
+            ("scores", pa.map_(pa.string(), pa.float64())),
+            ("series", pa.list_(series)),
+            ("note", pa.string()),
+            ("seconds", pa.float64()),
+            ("peak_memory", pa.int64()),
+            ("recording", pa.string()),
+            ("simnav", pa.string()),
+        ],
+        metadata={"simnav_results": str(FORMAT)},
+    )
+
+
+def to_table(result: Result) -> pa.Table:
+    """A result as a table with one row."""
+    import pyarrow as pa
+
+    arrays = {name: np.asarray(a, dtype=np.float32) for name, a in result.series.items()}
+    row = {name: getattr(result, name) for name in schema().names}
+    row["parameters"] = json.dumps(dict(result.parameters), sort_keys=True, default=str)
+    row["scores"] = [(str(name), float(value)) for name, value in result.scores.items()]
+    row["series"] = [{"name": n, "shape": list(a.shape), "values": a.ravel()} for n, a in arrays.items()]
+    return pa.Table.from_pylist([row], schema=schema())
+
+
+def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
+    """The contents of a file, checked, a few hundred results at a time.
+
+    Raises
+    ------
+    pyarrow.ArrowException, ValueError, OSError
+        If it is damaged or not ours.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    with open(path, "rb") as source:
+        file = pq.ParquetFile(source, page_checksum_verification=True)
+        found = file.schema_arrow
+        if (found.metadata or {}).get(b"simnav_results") != str(FORMAT).encode() or found.names != schema().names:
+            raise ValueError("it was not written by this version of simnav")
+        for batch in file.iter_batches(batch_size=BATCH, columns=columns, use_threads=False):
+            yield pa.Table.from_batches([batch])
+
+
+def write_tables(file: BinaryIO, tables: Iterator[pa.Table]) -> None:
+    """Write a file of results, with check sums."""
+    import pyarrow.parquet as pq
+
+    with pq.ParquetWriter(file, schema(), compression="zstd", write_page_checksum=True) as writer:
+        for table in tables:
+            writer.write_table(table)
+
+
+def rows(table: pa.Table) -> Iterator[Result]:
+    """Results of a table; the column of series may be missing."""
+    series: list[dict[str, Series]] = [{} for _ in range(len(table))]
+    if "series" in table.column_names:
+        lists = table.column("series").combine_chunks()
+        first = lists.offsets.to_numpy()
+        items = lists.values
+        names, shapes = items.field("name").to_pylist(), items.field("shape").to_pylist()
+        edges = items.field("values").offsets.to_numpy()
+        values = items.field("values").values.to_numpy(zero_copy_only=False)
+        for i in range(len(table)):
+            series[i] = {
+                names[j]: values[edges[j] : edges[j + 1]].reshape(shapes[j]) for j in range(first[i], first[i + 1])
+            }
+        table = table.drop_columns(["series"])
+    for row, arrays in zip(table.to_pylist(), series, strict=True):
+        row["parameters"] = json.loads(row["parameters"])
+        row["scores"] = dict(row["scores"])
+        yield Result(**row, series=arrays)

@@ -1,0 +1,383 @@
+"""The result store: one file a result, written atomically; then compacted to Parquet.
+
+A results folder holds::
+
+    simnav-results.json      format of the folder, and which results are current
+    results/KEY.parquet      one result, fresh from a worker
+    compacted/part-*.parquet many results
+
+A result's key names everything that decides it (`simnav.leaderboard.campaign.fingerprint`), so a campaign that was
+killed goes on where it was. Whatever moment it was killed at: a file is either whole or not there
+(temporary name, fsync, rename), a result that is both loose and compacted counts once, and nothing
+is deleted before the file that replaces it is on disk.
+
+Results of an older scenario, simulator or estimator stay in the folder, but only those of the last
+campaign's versions are current and come back from `load`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+
+from simnav.leaderboard.results.result import BATCH, FORMAT, Result, batches, rows, schema, to_table, write_tables
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["FORMAT", "Result", "StoreError", "StoreWarning", "compact", "create", "keys", "load", "select", "write"]
+
+_MARKER = "simnav-results.json"
+_LOOSE, _COMPACTED = "results", "compacted"
+_MOST_PARTS = 16  # more are merged into one
+_STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
+
+
+T = TypeVar("T")
+
+
+class StoreError(RuntimeError):
+    """A results folder that cannot be used; the message is one sentence."""
+
+
+class StoreWarning(UserWarning):
+    """A file of a results folder was set aside, or results in it are not current."""
+
+
+# --- the folder -------------------------------------------------------------------------------------
+
+
+def create(folder: str | os.PathLike[str]) -> Path:
+    """Make a results folder, or check one that is there; return its path.
+
+    Raises
+    ------
+    StoreError
+        If the folder holds something else, or results of another format. It is left as it is.
+    """
+    path = Path(folder)
+    if _check(path):
+        return path
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        _write_marker(path, {})
+        for name in (_LOOSE, _COMPACTED):
+            (path / name).mkdir(exist_ok=True)
+    except OSError as error:
+        raise _failure(path, error) from None
+    return path
+
+
+def _check(path: Path) -> bool:
+    """Whether it is a results folder (True) or nothing yet (False)."""
+    if not path.exists():
+        return False
+    if not path.is_dir():
+        raise StoreError(f"{path} is a file; a folder of results is wanted")
+    marker = path / _MARKER
+    if not marker.exists():
+        if all(p.name.startswith(".") or p.name.startswith(_MARKER) for p in path.iterdir()) or (
+            (path / _LOOSE).is_dir() and (path / _COMPACTED).is_dir()
+        ):
+            return False
+        raise StoreError(f"{path} holds other files and no results of simnav; name an empty or a new folder")
+    content = _read_marker(path)
+    if content["format"] != FORMAT:
+        raise StoreError(
+            f"the results in {path} have format {content['format']} (simnav {content.get('simnav', 'unknown')}), this "
+            f"version reads format {FORMAT}: name another folder, or use the version that wrote them"
+        )
+    for name in (_LOOSE, _COMPACTED):
+        (path / name).mkdir(exist_ok=True)
+    return True
+
+
+def _opened(folder: str | os.PathLike[str]) -> Path:
+    path = Path(folder)
+    if not _check(path):
+        raise StoreError(f"there are no results in {path}; 'simnav campaign' makes some")
+    return path
+
+
+def _read_marker(path: Path) -> dict[str, Any]:
+    """The marker; one that is damaged is set aside, and nothing in the folder is current any more."""
+    marker = path / _MARKER
+    try:
+        content = json.loads(marker.read_bytes())
+        if not isinstance(content["format"], int) or not isinstance(content.setdefault("current", {}), dict):
+            raise ValueError("no format")
+        return dict(content)
+    except (ValueError, KeyError, TypeError) as error:
+        _set_aside(marker, error)
+        _write_marker(path, {})
+        return {"format": FORMAT, "current": {}}
+    except OSError as error:
+        raise StoreError(f"{marker} cannot be read: {error.strerror}") from None
+
+
+def _write_marker(path: Path, current: Mapping[str, Any]) -> None:
+    from importlib.metadata import version
+
+    content = {"format": FORMAT, "simnav": version("simnav"), "current": current}
+    with _atomic(path / _MARKER) as file:
+        file.write(json.dumps(content, indent=1, sort_keys=True).encode())
+
+
+def select(folder: str | os.PathLike[str], current: Mapping[str, tuple[str, Mapping[str, str]]]) -> None:
+    """Say which results are current.
+
+    Parameters
+    ----------
+    folder : path
+    current : mapping
+        Versioned id of a scenario -> (``Result.recording``, {label: ``Result.variant``}). Other estimators
+        of the scenario stay current if they were run on the same recordings.
+    """
+    path = _opened(folder)
+    before = _read_marker(path)["current"]
+    after = dict(before)
+    for scenario, (recording, variants) in current.items():
+        old = before.get(scenario, {})
+        kept = old.get("estimators", {}) if old.get("recording") == recording else {}
+        after[scenario] = {"recording": recording, "estimators": {**kept, **variants}}
+    if after != before:
+        _write_marker(path, after)
+
+
+# --- files --------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def _atomic(path: Path) -> Iterator[BinaryIO]:
+    """Write a file whole or not at all."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise _failure(path, error) from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a rename last through a power failure."""
+    if os.name == "posix":
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _failure(path: Path, error: OSError) -> StoreError:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return StoreError(
+            f"the disk is full: {path.name} could not be written in {path.parent}; all results before it are safe, "
+            "so make room and start the campaign again"
+        )
+    return StoreError(f"{path} cannot be written: {error.strerror or error}")
+
+
+def _set_aside(path: Path, error: Exception) -> None:
+    aside = path.with_name(path.name + ".broken")
+    count = 1
+    while aside.exists():
+        count += 1
+        aside = path.with_name(f"{path.name}.{count}.broken")
+    with contextlib.suppress(OSError):
+        path.rename(aside)
+    reason = " ".join(str(error).split()) or type(error).__name__
+    warnings.warn(f"{path} is not a whole file of results, set aside as {aside.name} ({reason})", StoreWarning, 3)
+
+
+def _files(path: Path) -> list[Path]:
+    """All files of results, those with many first."""
+    loose = sorted((path / _LOOSE).glob("*.parquet"))  # listed first: what is gone by now is in a part
+    return _parts(path) + loose
+
+
+def _parts(path: Path) -> list[Path]:
+    return sorted((path / _COMPACTED).glob("part-*.parquet"))
+
+
+def _scan(path: Path, columns: list[str] | None = None) -> Iterator[list[pa.Table]]:
+    """The contents of every whole file.
+
+    Raises
+    ------
+    FileNotFoundError
+        If another process compacts meanwhile.
+    """
+    files = _files(path)
+    for file in files:
+        with contextlib.suppress(_DamagedError):
+            yield list(_read(file, columns))
+    if not set(_parts(path)).issubset(files):
+        raise FileNotFoundError
+
+
+def _steadily(scan: Callable[[], T]) -> T:
+    """Repeat a scan until no other process compacts during it."""
+    while True:
+        with contextlib.suppress(FileNotFoundError):
+            return scan()
+
+
+def _sweep(path: Path) -> None:
+    """Delete temporary files that a killed process left."""
+    for temporary in [*path.glob(".*.tmp"), *(path / _LOOSE).glob(".*.tmp"), *(path / _COMPACTED).glob(".*.tmp")]:
+        with contextlib.suppress(OSError):
+            if time.time() - temporary.stat().st_mtime > _STALE:
+                temporary.unlink()
+
+
+class _DamagedError(Exception):
+    """The file is not whole; it was set aside, and what was read of it should be dropped."""
+
+
+def _read(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
+    """The contents of a file; one that is damaged is set aside, and `_DamagedError` raised."""
+    import pyarrow as pa
+
+    try:
+        yield from batches(path, columns)
+    except FileNotFoundError:
+        raise  # another process compacts: see `_steadily`
+    except (pa.ArrowException, ValueError, OSError, KeyError) as error:
+        if isinstance(error, PermissionError):
+            raise StoreError(f"{path} cannot be read: {error.strerror}") from None
+        _set_aside(path, error)
+        raise _DamagedError from None
+
+
+# --- what others call ---------------------------------------------------------------------------------
+
+
+def write(folder: str | os.PathLike[str], result: Result) -> None:
+    """Write one result, atomically.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written, e.g. because the disk is full; nothing is left behind.
+    """
+    table = to_table(result)
+    with _atomic(Path(folder) / _LOOSE / f"{result.key}.parquet") as file:
+        write_tables(file, iter([table]))
+
+
+def keys(folder: str | os.PathLike[str]) -> dict[str, str]:
+    """Key -> status of every result that is there and whole; damaged files are set aside."""
+    path = _opened(folder)
+    _sweep(path)
+
+    def scan() -> dict[str, str]:
+        found: dict[str, str] = {}
+        for tables in _scan(path):  # all columns: to know that the file is whole
+            for table in tables:
+                columns = (table.column(name).to_pylist() for name in ("key", "status"))
+                found = dict(zip(*columns, strict=True)) | found
+        return found
+
+    return _steadily(scan)
+
+
+def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]:
+    """The current results of a folder, each once, in order of scenario, estimator and seed.
+
+    Parameters
+    ----------
+    folder : path
+    series : bool
+        False leaves the series out, which is quicker.
+
+    Raises
+    ------
+    StoreError
+        If it is no folder of results, or one of another format.
+    """
+    path = _opened(folder)
+    current = _read_marker(path)["current"]
+    columns = None if series else [n for n in schema().names if n != "series"]
+    found: dict[str, Result] = {}
+    others: set[tuple[str, str]] = set()
+
+    def scan() -> None:
+        for tables in _scan(path, columns):
+            for result in (r for table in tables for r in rows(table)):
+                variant = current.get(result.scenario, {}).get("estimators", {}).get(result.estimator)
+                if variant == result.variant:
+                    found.setdefault(result.key, result)
+                elif variant is None:
+                    others.add((result.scenario, result.estimator))
+
+    _steadily(scan)
+    if others:
+        scenario, label = min(others)
+        more = f" (and {len(others) - 1} more)" if len(others) > 1 else ""
+        warnings.warn(
+            f"{path}: results of {label} on {scenario}{more} are left out, for the scenario or the simulator has "
+            "changed since; run the campaign again with them",
+            StoreWarning,
+            2,
+        )
+    return sorted(found.values(), key=lambda r: (r.scenario, r.estimator, r.seed))
+
+
+def compact(folder: str | os.PathLike[str]) -> None:
+    """Gather the files with one result into one with many; safe to kill and to run twice at once.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written; then all is as before.
+    """
+    path = _opened(folder)
+    files = _files(path)
+    parts = [f for f in files if f.parent.name == _COMPACTED]
+    loose = files[len(parts) :]
+    merged = [*(parts if len(parts) >= _MOST_PARTS else []), *loose]
+    if not merged:
+        return
+    done: list[Path] = []
+
+    def tables() -> Iterator[pa.Table]:
+        import pyarrow as pa
+
+        seen: set[str] = set()
+        pending: list[pa.Table] = []
+        for file in merged:
+            with contextlib.suppress(FileNotFoundError, _DamagedError):  # its whole pages are kept
+                for table in _read(file):
+                    fresh = [k not in seen for k in table.column("key").to_pylist()]
+                    seen.update(table.column("key").to_pylist())
+                    pending.append(table.filter(pa.array(fresh)))
+                done.append(file)
+            if sum(map(len, pending)) >= BATCH:
+                yield pa.concat_tables(pending).combine_chunks()
+                pending = []
+        if pending:
+            yield pa.concat_tables(pending).combine_chunks()
+
+    part = path / _COMPACTED / f"part-{uuid.uuid4().hex[:16]}.parquet"
+    with _atomic(part) as file:
+        write_tables(file, tables())
+    try:
+        for old in done:
+            old.unlink(missing_ok=True)
+    except OSError as error:
+        raise _failure(part, error) from None

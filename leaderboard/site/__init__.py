@@ -1,0 +1,1 @@
+"""The site: pages, their templates and their figures."""

@@ -1,0 +1,169 @@
+"""Estimators of a session: sent to workers, known by their source text."""
+
+from __future__ import annotations
+
+import linecache
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from simnav.leaderboard.campaign.session_class import carry, is_session, receive, source_text
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError
+
+POND = """
+name = "pond"
+version = 1
+title = "half a minute on a pond"
+duration_s = 30.0
+[start]
+latitude_deg = 54.0
+longitude_deg = 8.0
+speed_m_s = 2.0
+[[manoeuvre]]
+kind = "hold"
+duration_s = 30.0
+[instruments.gnss_position]
+sigma_m = [1.0, 1.0, 2.0]
+"""
+
+# A notebook: its cells are compiled one by one in __main__, with their lines where inspect finds them.
+NOTEBOOK = '''
+import linecache, sys, __main__
+
+def cell(number, text):
+    name = f"<cell {number}>"
+    linecache.cache[name] = (len(text), None, text.splitlines(True), name)
+    exec(compile(text, name, "exec"), vars(__main__))
+
+cell(1, """
+import numpy as np
+import simnav
+GAIN = @GAIN@
+
+def blend(old, new):
+    return old + GAIN * (new - old)
+""")
+cell(2, """
+class LastFix(simnav.Estimator):
+    'Keeps the last fix.'  # @NOTE@
+    def reset(self, start, instruments):
+        self.position = np.array(start.position)
+    def update(self, measurements):
+        for m in measurements:
+            self.position = blend(self.position, m.value)
+        return simnav.Estimate(measurements.time, self.position.copy())
+""")
+cell(3, """
+report = simnav.campaign("pond.toml", [LastFix, "gnss-only"], runs=2, output="out", workers=2)
+print(report.summary.computed, *sorted({(r.estimator, r.status) for r in report.results}))
+""")
+'''
+
+
+def notebook(folder: Path, gain: str = "1.0", note: str = "") -> str:
+    text = NOTEBOOK.replace("@GAIN@", gain).replace("@NOTE@", note)
+    (folder / "pond.toml").write_text(POND)
+    # From standard input: there is no file that a worker could import.
+    done = subprocess.run([sys.executable, "-"], input=text, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_a_class_of_a_notebook_takes_part_and_is_known_by_its_text(tmp_path: Path) -> None:
+    good = "('gnss-only', 'ok') ('last-fix', 'ok')"
+    assert notebook(tmp_path) == f"4 {good}"
+    assert notebook(tmp_path) == f"0 {good}"  # another session, the same text
+    assert notebook(tmp_path, gain="0.5") == f"2 {good}"  # a value that a function of the session uses
+    assert notebook(tmp_path, note="another text") == f"2 {good}"
+    rmse = {r.estimator: r.scores["horizontal_rmse"] for r in store.load(tmp_path / "out")}
+    assert 0.1 < rmse["last-fix"] < 10.0
+
+
+def module(name: str, text: str) -> Any:
+    """A module that was never a file, as of a session."""
+    made = ModuleType(name)
+    sys.modules[name] = made
+    source = textwrap.dedent(text)
+    linecache.cache[f"<{name}>"] = (len(source), None, source.splitlines(True), f"<{name}>")
+    exec(compile(source, f"<{name}>", "exec"), vars(made))
+    return made
+
+
+@pytest.fixture
+def session(request: pytest.FixtureRequest) -> Any:
+    def make(text: str) -> Any:
+        made = module("a_session", text)
+        request.addfinalizer(lambda: sys.modules.pop("a_session", None))
+        return made
+
+    return make
+
+
+def test_what_no_other_process_can_import() -> None:
+    assert is_session("__main__")
+    assert not is_session("simnav.estimators.ekf")
+    assert not is_session("json.decoder")
+    assert is_session("no_such_module")
+
+
+BASE = """
+FACTOR = 2
+
+def double(x):
+    return FACTOR * x
+
+class Mine:
+    @property
+    def two(self):
+        return double(1)
+
+    def other(self):
+        return 3
+"""
+
+
+def test_a_class_is_carried_with_what_it_uses(session: Any) -> None:
+    data = carry(session(BASE).Mine)
+    del sys.modules["a_session"]
+    assert receive(data)().two == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "differs"),
+    [
+        (("return 3", "return 4"), True),
+        (("FACTOR = 2", "FACTOR = 3"), True),
+        (("return FACTOR * x", "return x * FACTOR"), True),
+        (("FACTOR = 2", "FACTOR = 2\nUNUSED = 5"), False),
+        (("class Mine:", "\n\n\nclass Mine:"), False),
+    ],
+)
+def test_the_text_holds_the_class_and_what_it_uses(session: Any, change: tuple[str, str], differs: bool) -> None:
+    before = source_text(session(BASE).Mine)
+    assert "class Mine" in before
+    assert "def double" in before
+    after = source_text(session(BASE.replace(*change)).Mine)
+    assert (before != after) is differs
+
+
+def test_without_a_text_the_compiled_code_stands_for_it(session: Any) -> None:
+    def compiled(text: str) -> str:
+        made = session(text)
+        linecache.cache.pop("<a_session>")
+        return source_text(made.Mine)
+
+    assert compiled(BASE) == compiled(BASE)
+    assert compiled(BASE) != compiled(BASE.replace("return 3", "return 4"))
+    assert compiled(BASE) != compiled(BASE.replace("return FACTOR * x", "return FACTOR + x"))
+
+
+def test_what_cannot_be_sent_is_told(session: Any) -> None:
+    made = session(BASE.replace("FACTOR = 2", "import threading\nFACTOR = threading.Lock()"))
+    with pytest.raises(RequestError, match=r"Mine cannot be sent to a worker .* put it into a file"):
+        carry(made.Mine)

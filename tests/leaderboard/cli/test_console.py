@@ -1,0 +1,36 @@
+"""How the command talks: progress on a terminal and elsewhere."""
+
+from __future__ import annotations
+
+import io
+
+from rich.console import Console
+
+from simnav.leaderboard.cli.console import Output, ProgressBar
+
+
+def test_progress_without_a_terminal_says_how_long(capsys, monkeypatch):
+    monkeypatch.setattr(ProgressBar, "_PAUSE", 0.0)
+    with Output().progress("running") as progress:
+        progress(1, 4, left=75.0)
+        progress(4, 4)
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "running: 1/4" in said.err
+    assert "1:15 left" in said.err
+
+
+def test_progress_on_a_terminal_begins_each_stage_anew():
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=100)
+    with ProgressBar(console, "starting") as progress:
+        progress.begin("compiling")
+        progress(7, 16, "a kernel", 30.0)
+        progress._bar.refresh()
+        assert "7/16" in screen.getvalue()
+        assert "0:30" in screen.getvalue()
+        screen.truncate(0)
+        progress.begin("running")
+        progress._bar.refresh()
+    assert "running" in screen.getvalue()
+    assert "16" not in screen.getvalue()

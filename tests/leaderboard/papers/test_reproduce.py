@@ -1,0 +1,574 @@
+"""The papers' comparisons: the rule by closed form, rows by fake results, the command by a tiny paper."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import math
+import os
+import re
+from pathlib import Path
+
+import matplotlib.figure
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import simnav
+from simnav.leaderboard.cli import app
+from simnav.leaderboard.figures.panels import Bar, bars, broken
+from simnav.leaderboard.figures.plots import Style
+from simnav.leaderboard.papers import PAPERS, paper_001
+from simnav.leaderboard.papers import paper as papers
+from simnav.leaderboard.papers.comparison import judge, judge_gain
+from simnav.leaderboard.papers.contents import contents
+from simnav.leaderboard.papers.figures import ERRORS
+from simnav.leaderboard.papers.measures import measure, value_of
+from simnav.leaderboard.papers.page import find as find_pages
+from simnav.leaderboard.papers.paper import Figure, Gain, Method, NotShown, Paper, Table, Value
+from simnav.leaderboard.papers.report import paper_tables, summary, write_csv
+from simnav.leaderboard.papers.reproduction import Reproduction, find, find_method
+from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
+from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.result import Result
+from simnav.scenario import load
+from simnav.scoring import SCORES
+
+ROOT = Path(__file__).parents[3]
+ALL = [papers.load(key) for key in PAPERS]
+
+
+# -- the rule ------------------------------------------------------------------------------------------------
+
+
+def exactly(value: float, half: float = 0.0, runs: int = 10) -> Interval:
+    return Interval(value, value - half, value + half, runs)
+
+
+def test_interval_is_students():
+    """Known value of the t distribution: 2.262 with 9 degrees of freedom, for a sample of sigma 1."""
+    x = np.array([-1.0, 1.0] * 5) * math.sqrt(0.9) + 5.0  # sample variance 10 * 0.9 / 9 = 1
+    found = mean(x)
+    assert found.value == pytest.approx(5.0)
+    assert found.high - 5.0 == pytest.approx(2.2622 / math.sqrt(10.0), rel=1e-4)
+    assert (found.low + found.high) / 2.0 == pytest.approx(5.0)
+    assert found.runs == 10
+
+
+def test_interval_covers_as_often_as_it_says():
+    rng = np.random.default_rng(5)
+    inside = sum(i.low <= 3.0 <= i.high for i in (mean(3.0 + rng.standard_normal(5)) for _ in range(1000)))
+    assert 0.93 <= inside / 1000 <= 0.97
+
+
+def test_what_is_unknown_is_left_out():
+    assert mean([1.0, math.nan, 3.0, math.inf]).runs == 2
+    assert mean([math.nan]).runs == 0
+    alone = mean([4.0])
+    assert (alone.value, alone.runs) == (4.0, 1)
+    assert math.isnan(alone.low)
+
+
+def test_ratio_is_geometric_and_paired():
+    found = mean_ratio({0: 1.0, 1: 8.0, 2: 3.0}, {0: 2.0, 1: 4.0, 3: 9.0})
+    assert found.value == pytest.approx(1.0)  # 1/2 and 2
+    assert found.runs == 2
+    swapped = mean_ratio({0: 2.0, 1: 4.0, 3: 9.0}, {0: 1.0, 1: 8.0, 2: 3.0})
+    assert (swapped.low, swapped.high) == pytest.approx((1.0 / found.high, 1.0 / found.low))
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "word", "side"),
+    [
+        (exactly(1.25), 1.0, "agrees", 0),
+        (exactly(0.8), 1.0, "agrees", 0),
+        (exactly(1.26), 1.0, "differs", 1),
+        (exactly(0.79), 1.0, "differs", -1),
+        (exactly(1.5, 0.6), 1.0, "agrees", 0),  # the paper's figure is in the interval
+        (exactly(1.5, 0.4), 1.0, "differs", 1),
+        (exactly(2.0, 1.1), 1.0, "undecided", 0),  # so wide that it holds almost everything
+        (exactly(9.0, 5.0), 1.0, "differs", 1),  # wide, but nowhere near
+        (exactly(1.0, runs=2), 1.0, "undecided", 0),
+        (exactly(5.0), (4.0, 6.0), "agrees", 0),
+        (exactly(3.2), (4.0, 6.0), "agrees", 0),
+        (exactly(3.1), (4.0, 6.0), "differs", -1),
+        (exactly(7.6), (4.0, 6.0), "differs", 1),
+    ],
+)
+def test_figures(ours, paper, word, side):
+    verdict = judge(ours, paper)
+    assert (verdict.word, verdict.side) == (word, side)
+
+
+def test_bounds():
+    assert judge(exactly(19.9, 5.0), 20.0, "at-most").word == "agrees"
+    assert judge(exactly(0.1), 20.0, "at-most").word == "agrees"
+    assert judge(exactly(21.0, 2.0), 20.0, "at-most").word == "undecided"
+    found = judge(exactly(21.0, 0.5), 20.0, "at-most")
+    assert (found.word, found.side) == ("differs", 1)
+    assert judge(exactly(600.0), 500.0, "at-least").word == "agrees"
+    found = judge(exactly(5.0, 1.0), 500.0, "at-least")
+    assert (found.word, found.side) == ("differs", -1)
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "word", "side"),
+    [
+        (exactly(0.7, 0.05), 0.7, "agrees", 0),
+        (exactly(0.9, 0.05), 0.7, "differs", 1),  # a gain, but a third of the paper's
+        (exactly(0.3, 0.05), 0.7, "differs", -1),
+        (exactly(0.5, 0.25), 0.7, "agrees", 0),  # the paper's ratio is in the interval
+        (exactly(1.3, 0.1), 0.7, "differs", 1),  # worse
+        (exactly(0.9, 0.3), 0.7, "undecided", 0),  # nothing, or the paper's
+        (exactly(1.0, 0.01), 0.7, "differs", 1),  # certainly nothing
+        (exactly(1.5, 0.1), 1.5, "agrees", 0),  # where the paper's is worse
+        (exactly(0.7, runs=2), 0.7, "undecided", 0),
+    ],
+)
+def test_gains(ours, paper, word, side):
+    verdict = judge_gain(ours, paper)
+    assert verdict.word == word
+    if word == "differs":
+        assert verdict.side == side
+
+
+def test_size_of_a_gain_is_on_the_scale_of_ratios():
+    """28.1 % agrees with 20 to 39 %: logarithms within a factor of 1.5."""
+    edge = 1.0 - math.exp(math.log(0.719) / 1.5), 1.0 - math.exp(math.log(0.719) * 1.5)
+    assert edge == pytest.approx((0.1974, 0.3904), abs=1e-3)
+    for gain, word in ((edge[0] + 0.01, "agrees"), (edge[0] - 0.01, "differs"), (edge[1] + 0.01, "differs")):
+        assert judge_gain(exactly(1.0 - gain, 1e-6), 0.719).word == word
+
+
+# -- rows ----------------------------------------------------------------------------------------------------
+
+
+def result(estimator: str, seed: int, status: str = "ok", **scores: float) -> Result:
+    return Result("pond-v1", seed, estimator, {}, False, status, "" if status == "ok" else "why not", scores,
+                  peak_memory=3_000_000)  # fmt: skip
+
+
+def runs_of(estimator: str, values: list[float], score: str = "north_rmse") -> list[Result]:
+    return [result(estimator, seed, **{score: v}) for seed, v in enumerate(values)]
+
+
+def found(row, results, labels=None):
+    by = {}
+    for r in results:
+        by.setdefault((r.scenario, r.estimator), []).append(r)
+    return find("table", row, "pond-v1", labels or {"A": "a", "B": "b"}, by)
+
+
+def test_a_row_that_agrees_gives_no_reason():
+    row = Value("pond", "A", "north_rmse", 2.0, lower="lower", higher="higher")
+    f = found(row, runs_of("a", [1.9, 2.0, 2.1, 2.0]))
+    assert (f.verdict, f.why, f.estimators) == ("agrees", "", ("a",))
+    assert f.ours is not None
+    assert f.ours.value == pytest.approx(2.0)
+
+
+def test_reasons_go_by_the_side():
+    row = Value("pond", "A", "north_rmse", 2.0, lower="ours is better", higher="ours is worse")
+    assert found(row, runs_of("a", [1.0, 1.01, 1.02])).why == "ours is better"
+    assert found(row, runs_of("a", [4.0, 4.01, 4.02])).why == "ours is worse"
+    silent = Value("pond", "A", "north_rmse", 2.0)
+    assert found(silent, runs_of("a", [4.0, 4.01, 4.02])).why == "not explained"
+    gain = Gain("pond", "A", "B", "north_rmse", 0.3, lower="smaller", higher="larger")
+    b = runs_of("b", [1.0, 1.01, 1.02])
+    assert found(gain, runs_of("a", [0.95, 0.96, 0.965]) + b).why == "smaller"
+    assert found(gain, runs_of("a", [0.3, 0.31, 0.3]) + b).why == "larger"
+    assert found(gain, runs_of("a", [0.70, 0.71, 0.70]) + b).verdict == "agrees"
+
+
+def test_what_is_not_there_is_said():
+    f = found(Gain("pond", "A", "C", "north_rmse", 0.3), runs_of("a", [1.0] * 3))
+    assert (f.verdict, f.why) == ("absent", "not there yet: C")
+    assert found(Value("pond", "A", "north_rmse"), runs_of("a", [1.0] * 3)).verdict == "ours"
+    beside = Value("pond", "A", "north_rmse", 9.0, rule="beside", lower="never said")
+    assert (found(beside, runs_of("a", [1.0] * 3)).verdict, found(beside, runs_of("a", [1.0] * 3)).why) == ("ours", "")
+
+
+def test_failures_are_never_dropped():
+    row = Value("pond", "A", "north_rmse", 1.0, higher="it fell over")
+    good = runs_of("a", [1.0, 1.0, 1.01, 0.99])
+    f = found(row, [*good, result("a", 9, "diverged")])
+    assert (f.verdict, f.why, f.failed) == ("differs", "it fell over", 1)
+    assert found(row, [result("a", 0, "diverged")]).verdict == "failed"
+    assert found(row, [result("a", 0, "unsuitable")]).verdict == "unsuitable"
+    gain = Gain("pond", "A", "B", "north_rmse", 0.3, lower="smaller", higher="larger")
+    f = found(gain, [*good, *runs_of("b", [1.4] * 4), result("b", 9, "error")])
+    assert (f.verdict, f.why) == ("differs", "larger")
+
+
+def test_another_score_of_the_other():
+    row = Gain("pond", "A", "B", "smoothed_north_rmse", 0.75, than_score="north_rmse")
+    f = found(row, runs_of("a", [1.0, 1.1, 0.9], "smoothed_north_rmse") + runs_of("b", [4.0, 4.4, 3.6]))
+    assert f.verdict == "agrees"
+    assert f.ours is not None
+    assert f.ours.value == pytest.approx(0.25)
+
+
+def test_measures():
+    r = result("a", 0, heading_rmse=math.pi / 180.0, horizontal_rmse=3.0, vertical_rmse=4.0, update_mean=0.002)
+    assert value_of(r, "heading_rmse") == pytest.approx(1.0)
+    assert measure("heading_rmse").unit == "deg"
+    assert value_of(r, "position_rmse") == 5.0
+    assert value_of(r, "update_mean") == pytest.approx(2.0)
+    assert value_of(r, "peak_memory") == pytest.approx(3.0)
+    assert math.isnan(value_of(r, "north_rmse"))
+
+
+# -- the papers ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_every_row_can_be_filled(paper):
+    methods = {m.name for m in paper.methods}
+    for row in paper.rows():
+        assert measure(row.score).title
+        assert {row.method, row.than if isinstance(row, Gain) else row.method} <= methods
+        if isinstance(row, Gain) and row.than_score:
+            assert measure(row.than_score)
+        if isinstance(row.paper, tuple):
+            assert row.paper[0] < row.paper[1]
+    scenarios = [paper.scenario(name) for name in paper.participants()]
+    assert len({s.id for s in scenarios}) == len(scenarios)
+    assert 3 <= paper.runs <= paper.full
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_every_figure_can_be_drawn(paper):
+    methods, scores = {m.name for m in paper.methods}, {*SCORES, "position_rmse", "peak_memory"}
+    for figure in paper.figures:
+        assert set(figure.methods) <= methods
+        assert paper.scenario(figure.scenario)
+        known = {
+            "run": lambda name: name in ERRORS or "." in name,
+            "spread": {"horizontal", "vertical", "north", "east", "velocity", "heading"}.__contains__,
+            "bars": scores.__contains__,
+            "gains": scores.__contains__,
+        }.get(figure.draw)
+        assert bool(figure.series) == (known is not None)
+        assert known is None or all(known(name) for name in figure.series.values()), figure.number
+    names = [f.name for f in paper.figures]
+    assert len(set(names)) == len(names)
+
+
+# Tables and figures, as the papers count them.
+COUNTS = {"000": (3, 11), "001": (3, 5), "002": (4, 15), "003": (3, 8), "004": (2, 13)}
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_every_table_and_figure_of_a_paper_has_its_place(paper):
+    tables, figures = COUNTS[paper.key]
+    items = contents(paper)
+    assert [i.number for i in items] == [
+        *(f"Table {k + 1}" for k in range(tables)),
+        *(f"Figure {k + 1}" for k in range(figures)),
+    ]
+    for item in items:
+        assert bool(item.shown) != bool(item.why), item.number
+    # docs/papers.md lists them all, in the same words.
+    text = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8")
+    for item in items:
+        where = "; ".join(item.shown).replace("table '", "the table '") if item.shown else f"not shown: {item.why}"
+        assert f"| {item.number} | {item.what} | {where} |" in text, f"paper {paper.key}: {item.number}"
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_filters_are_there_and_fit(paper):
+    """Issue 3: Sage-Husa and IAE (001), EKF and UKF (002), KF and ADKF (003), federated (004), KF, EKF, UKF (000)."""
+    wanted = {
+        "000": ["KF", "EKF", "UKF"],
+        "001": ["Sage-Husa filter", "IAE filter"],
+        "002": ["EKF", "UKF"],
+        "003": ["KF", "ADKF, two segments", "ADKF, three segments", "ADKF, exponential"],
+        "004": ["Federated KF", "Central EKF"],
+    }
+    for name in wanted[paper.key]:
+        assert find_method(paper.method(name)) is not None, name
+
+
+def test_papers_figures():
+    """Table 2 of paper 001 and Table 3 of paper 003, as printed."""
+    rows = {(r.method, r.score): r.paper for r in papers.load("001").rows() if isinstance(r, Value)}
+    assert [rows[m, "sigma_east_rmse"] for m in paper_001._TABLE_2] == [3.65, 1.86, 1.28, 1.20]
+    assert [rows[m, "sigma_north_rmse"] for m in paper_001._TABLE_2] == [3.55, 1.65, 1.37, 1.07]
+    first = [r for r in papers.load("003").tables[0].rows if isinstance(r, Value)]
+    position = {r.method: r.paper for r in first if r.score == "east_rmse"}
+    assert position["KF"] == 2.6649
+    # The gains that the paper prints follow from its table.
+    claims = {r.score: r.paper for r in papers.load("003").rows() if isinstance(r, Gain)}
+    for score in ("east_rmse", "north_rmse"):
+        of = {r.method: r.paper for r in first if r.score == score}
+        assert 1.0 - of["ADKF, three segments"] / of["KF"] == pytest.approx(claims[score], abs=5e-4)
+
+
+def test_second_set_of_intervals():
+    sheets = load("auv-survey-sparse").instruments_sheet()
+    intervals = {name: 1.0 / sheet.rate for name, sheet in sheets.items()}
+    assert intervals == pytest.approx({"dvl": 0.3, "terrain_fix": 7.0, "magnetic_compass": 0.1, "depth": 2.0})
+
+
+def test_a_variant_is_a_scenario_of_its_own():
+    paper = papers.load("003")
+    clean = paper.scenario("uuv-lake-clean")
+    assert clean.id == "uuv-lake-clean-v1"
+    assert {f.kind for f in clean.faults} == {"multipath"}
+    assert clean.content_hash() != load("uuv-lake").content_hash()
+
+
+def test_the_best_candidate_that_is_there_is_taken():
+    request = find_method(Method("A", ("nobody", "ekf:nonsense=1", "ekf:calibrate=false", "gnss-only")))
+    assert request is not None
+    assert (request.name, request.parameters) == ("ekf", {"calibrate": "false"})
+    assert find_method(Method("A", ("nobody",))) is None
+
+
+# -- tables and the command ----------------------------------------------------------------------------------
+
+POND = """
+name = "pond"
+version = 1
+title = "Ten seconds"
+duration_s = 10.0
+
+[start]
+latitude_deg = 50.0
+longitude_deg = -5.0
+heading_deg = 45.0
+speed_m_s = 1.0
+
+[[manoeuvre]]
+kind = "hold"
+duration_s = 10.0
+
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 1.0
+sigma_m = [1.0, 1.0, 1.0]
+"""
+
+FAKE = '''
+import numpy as np
+from simnav import Estimate, Estimator, register
+
+@register("fake")
+class Fake(Estimator):
+    """The last fix; says that its sigma is what the parameter says."""
+
+    def __init__(self, sigma: float = 1.0):
+        self.sigma = sigma
+
+    def reset(self, start, instruments):
+        self.position = start.position.copy()
+
+    def update(self, measurements):
+        for m in measurements.aids:
+            self.position = m.value
+        return Estimate(measurements.time, self.position,
+                        diagnostics={"sigma_north.gnss": self.sigma, "sigma_east.gnss": self.sigma})
+'''
+
+
+NUMBERS = itertools.count()
+
+
+@pytest.fixture
+def tiny(tmp_path, monkeypatch):
+    """A paper about a scenario and estimators in files."""
+    monkeypatch.chdir(tmp_path)
+    scenario, estimator = tmp_path / "pond.toml", tmp_path / "fake.py"
+    scenario.write_text(POND)
+    # The process remembers names: each test needs its own.
+    estimator.write_text(FAKE.replace('"fake"', f'"fake-{next(NUMBERS)}"'))
+    where = str(scenario)
+    paper = Paper(
+        key="001",
+        title="Tiny",
+        citation="Nobody 2026",
+        runs=3,
+        full=9,
+        methods=(
+            Method("Right", (f"{estimator}:Fake",)),
+            Method("Wrong", ("nobody", f"{estimator}:Fake:sigma=3.0")),
+            Method("Future", ("nobody",)),
+        ),
+        tables=(
+            Table(
+                "Sigma",
+                (
+                    Value(where, "Right", "sigma_north_rmse", 0.5, lower="it is told"),
+                    Value(where, "Wrong", "sigma_north_rmse", 2.0),
+                    Value(where, "Future", "sigma_north_rmse", 1.0),
+                    Value(where, "Future", "sigma_east_rmse"),
+                    Value(where, "Wrong", "horizontal_rmse"),
+                ),
+                "Table 1",
+            ),
+            Table("Claims", (Gain(where, "Wrong", "Right", "horizontal_rmse", 0.5, lower="they are the same"),)),
+        ),
+        figures=(
+            Figure("Figure 1", "Errors", "spread", where, ("Right", "Wrong"), {"Error [m]": "horizontal"}),
+            Figure("Figure 2", "Sigma", "run", where, ("Right", "Wrong", "Future"), {"Sigma": "sigma_north.gnss"}),
+            Figure("Figure 2", "Errors", "run", where, ("Right",), {"North": "north", "All": "position"}, part="b"),
+            Figure("Figure 3", "Nothing", "spread", where, ("Future",), {"Error [m]": "horizontal"}),
+            Figure("Figure 4", "Tracks", "track", where, ("Right",)),
+            Figure("Figure 4", "Route", "track", where, (), part="route"),
+            Figure("Figure 5", "Sigma by method", "bars", where, ("Right", "Wrong"), {"Sigma": "sigma_north_rmse"}),
+            Figure("Figure 6", "Gain", "gains", where, ("Wrong", "Right"), {"Gain [%]": "horizontal_rmse"}),
+            Figure("", "Distribution", "distribution", where, ("Right",)),
+        ),
+        not_shown=(NotShown("Figure 7", "The pond", "a photograph"),),
+        notes=("One note.",),
+    )
+    monkeypatch.setattr("simnav.leaderboard.papers.paper.load", lambda key: paper)
+    return tmp_path
+
+
+def call(*words: str):
+    return CliRunner().invoke(app, ["reproduce", *words], env={"COLUMNS": "200"})
+
+
+@pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
+def test_the_command(tiny):
+    done = call("001", "--workers", "1", "--output", "out", "--json")
+    assert done.exit_code == 0, done.output
+    document = json.loads(done.stdout)
+    verdicts = [r["verdict"] for r in document["rows"]]
+    assert verdicts == ["differs", "agrees", "absent", "absent", "ours", "differs"]
+    assert [r["why"] for r in document["rows"]] == [
+        "it is told", "", "not there yet: Future", "not there yet: Future", "", "they are the same",
+    ]  # fmt: skip
+    right, wrong = document["rows"][:2]
+    assert (right["ours"], wrong["ours"], wrong["runs"]) == (0.0, 2.0, 3)
+    claim = document["rows"][-1]
+    assert (claim["ours"], claim["paper"], claim["than"]) == (0.0, 0.5, "Right")
+    assert document["methods"]["Future"] is None
+
+    with open(document["csv"], encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [r["verdict"] for r in rows] == verdicts
+    assert float(rows[1]["ours"]) == 2.0
+    assert [os.path.basename(p) for p in document["figures"]] == [
+        "figure-1.png", "figure-2.png", "figure-2-b.png", "figure-4.png", "figure-4-route.png", "figure-5.png",
+        "figure-6.png", "distribution.png",
+    ]  # fmt: skip
+    assert [(c["number"], c["where"]) for c in document["contents"]] == [
+        ("Table 1", "table 'Sigma'"),
+        ("Figure 1", "figure-1.png"),
+        ("Figure 2", "figure-2.png; figure-2-b.png"),
+        ("Figure 3", "figure-3.png (not there yet: Future)"),
+        ("Figure 4", "figure-4.png; figure-4-route.png"),
+        ("Figure 5", "figure-5.png"),
+        ("Figure 6", "figure-6.png"),
+        ("Figure 7", "not shown: a photograph"),
+    ]
+    page = Path(document["page"]).read_text(encoding="utf-8")
+    for text in ("Tiny", "it is told", "One note.", "figure-2-b.png", "a photograph", "not there yet: Future"):
+        assert text in page
+    assert "index.html" not in page  # it stands alone
+    for path in document["figures"]:
+        with open(path, "rb") as file:
+            assert file.read(8) == b"\x89PNG\r\n\x1a\n"
+
+    shown = call("001", "--workers", "1", "--output", "out").stdout  # nothing is run again
+    for text in ("Nobody 2026", "not there yet: Future", "(a) it is told", "note: One note.", "1 agree, 2 differ"):
+        assert text in shown
+    more = json.loads(call("001", "--workers", "1", "--output", "out", "--json", "-n", "4").stdout)
+    assert more["rows"][1]["runs"] == 4
+    fewer = json.loads(call("001", "--workers", "1", "--output", "out", "--json", "-n", "2").stdout)
+    assert fewer["rows"][1]["runs"] == 2
+    assert fewer["rows"][1]["verdict"] == "undecided"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
+def test_the_site_shows_what_was_reproduced(tiny):
+    assert call("001", "--workers", "1", "--output", "reproduced/001", "-n", "2").exit_code == 0
+    site = CliRunner().invoke(app, ["leaderboard", "reproduced/001/results", "--workers", "1"])
+    assert site.exit_code == 0, site.output
+    page = Path("site/paper-001.html").read_text(encoding="utf-8")
+    shown = re.findall(r'<img src="([^"]+)"', page)
+    assert len(shown) == 8
+    assert all((Path("site") / name).is_file() for name in shown)
+    assert 'href="paper-001.html"' in Path("site/index.html").read_text(encoding="utf-8")
+    assert 'href="index.html"' in page
+    # One that is damaged is left out.
+    (Path("reproduced") / "001" / "figure-1.png").unlink()
+    assert find_pages(Path("reproduced")) == []
+    assert CliRunner().invoke(app, ["leaderboard", "reproduced/001/results", "--workers", "1"]).exit_code == 0
+    assert not Path("site/paper-001.html").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
+def test_the_command_and_its_call_say_the_same(tiny):
+    done = call("001", "--workers", "1", "--output", "out", "--json")
+    document = json.loads(done.stdout)
+    found = simnav.reproduce("001", output="out", workers=1)
+    called = plain(found.to_dict())
+    assert {key: document[key] for key in called} == called
+    assert set(document) - set(called) == {"contents", "csv", "page", "figures"}
+    assert len(found.to_frame()) == len(document["rows"])
+    assert isinstance(found.plot(), matplotlib.figure.Figure)
+    assert isinstance(found.plot("Figure 5"), matplotlib.figure.Figure)
+    with pytest.raises(simnav.RequestError, match="nothing to draw of Figure 3; it has Figure 1"):
+        found.plot("Figure 3")
+
+
+def test_a_curve_is_broken_where_nothing_was_measured():
+    time = np.arange(20.0)
+    values = np.where((time > 5.0) & (time < 14.0), np.nan, time)
+    t, v = broken(time, values)
+    assert np.isnan(v).sum() == 1
+    assert t[np.isnan(v)] == 5.0
+    sparse = np.where(time % 3.0 == 0.0, time, np.nan)  # every third epoch is no gap
+    assert np.isfinite(broken(time, sparse)[1]).all()
+
+
+def test_bars_show_the_papers_figure():
+    of = [Bar("A", 2.0, 1.5, 2.5, [1.9, 2.1], (3.0, 3.0)), Bar("B", 1.0, math.nan, math.nan, [1.0], (0.5, 1.5))]
+    (axes,) = bars({"Error [m]": of}, Style(["A", "B"])).axes
+    xs = [line.get_xdata() for line in axes.lines]
+    assert any(np.array_equal(x, [3.0]) for x in xs)  # the paper's figure
+    assert any(np.array_equal(x, [0.5, 1.5]) for x in xs)  # its range
+    assert any(np.array_equal(x, [1.5, 2.5]) for x in xs)  # our interval
+    assert axes.get_xscale() == "linear"
+    wide = [Bar("A", 1.0, 1.0, 1.0, []), Bar("B", 5000.0, 5000.0, 5000.0, [])]
+    assert bars({"Error [m]": wide}, Style(["A", "B"])).axes[0].get_xscale() == "log"
+
+
+def test_mistakes_get_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call("007")
+    assert done.exit_code == 2
+    assert "there is no paper '007'; there are 000, 001" in done.stderr
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "results").write_text("a file")
+    done = call("001", "--output", "taken")
+    assert done.exit_code == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_tables_hold_every_figure_of_the_papers(tmp_path):
+    """Without any estimator: all rows with a figure are shown as not there yet."""
+    for paper in ALL:
+        findings = [find(t.title, row, "x", {}, {}) for t in paper.tables for row in t.rows]
+        nothing = Reproduction(paper, range(3), findings, dict.fromkeys(m.name for m in paper.methods), [])
+        assert nothing.count("absent") == len(findings)
+        shown = list(paper_tables(nothing))
+        assert sum(t.row_count for t in shown) == sum(r.paper is not None for r in paper.rows())
+        assert f"{len(findings)} not there yet" in summary(nothing)
+        with write_csv(nothing, tmp_path / "t.csv").open(encoding="utf-8") as file:
+            assert len(file.readlines()) == len(findings) + 1
+
+
+def test_a_paper_can_be_cut_to_some_methods():
+    """So that a comparison of two quick filters can have its 200 runs."""
+    whole = papers.load("002")
+    part = whole.only(["EKF", "UKF"])
+    assert {m.name for m in part.methods} == {"EKF", "UKF"}
+    assert 0 < len(list(part.rows())) < len(list(whole.rows()))
+    assert set().union(*part.participants().values()) == {"EKF", "UKF"}
+    with pytest.raises(ValueError, match=r"no method 'PF'; it has GNSS alone, EKF"):
+        whole.only(["PF"])

@@ -1,0 +1,304 @@
+"""Everything that the command does is one Python call: both are run, and must say the same."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
+
+import simnav
+from simnav import Estimate, Estimator, estimator
+from simnav.estimator import registry
+from simnav.leaderboard.cli import app
+from simnav.leaderboard.cli.new_estimator import write_estimator
+from simnav.leaderboard.interface import results_of, scenario_of
+from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.site.site import build
+from simnav.recording import Recording
+
+POND = """
+name = "pond"
+version = 1
+title = "half a minute on a pond"
+duration_s = 30.0
+[start]
+latitude_deg = 54.0
+longitude_deg = 8.0
+speed_m_s = 2.0
+[[manoeuvre]]
+kind = "hold"
+duration_s = 30.0
+[instruments.gnss_position]
+sigma_m = [1.0, 1.0, 2.0]
+"""
+
+
+class LastFix(Estimator):
+    """Keeps a share of the last fix."""
+
+    def __init__(self, gain: float = 1.0):
+        self.gain = gain
+
+    def reset(self, start, instruments):
+        self.position = start.position.copy()
+
+    def update(self, measurements):
+        for m in (m for m in measurements if m.kind == "gnss_position"):
+            self.position = self.position + self.gain * (m.value - self.position)
+        return Estimate(measurements.time, self.position.copy())
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with a short scenario; what a test registers is forgotten."""
+    (tmp_path / "pond.toml").write_text(POND)
+    estimator.names()
+    monkeypatch.setattr(registry, "_classes", dict(registry._classes))
+    monkeypatch.setattr(registry, "_aliases", dict(registry._aliases))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+#: What depends on the moment, not on what was asked for.
+_TIMES = {"seconds", "simulation_seconds", "update_median", "update_mean", "update_p95", "peak_memory", "plot",
+          "computed", "site", "generated"}  # fmt: skip
+
+
+def timeless(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: timeless(v) for k, v in value.items() if k not in _TIMES}
+    return [timeless(v) for v in value] if isinstance(value, list) else value
+
+
+def command(*words: str) -> Any:
+    result = CliRunner().invoke(app, [*words, "--json"])
+    assert result.exit_code == 0, result.stderr
+    return timeless(json.loads(result.stdout))
+
+
+def call_list() -> Any:
+    from simnav.catalogue import headers
+
+    return {"estimators": simnav.names(), "scenarios": [h.id for h in headers()]}
+
+
+def call_simulate() -> Any:
+    recording = simnav.record("pond.toml", 4)
+    recording.save(Path("mine.npz"))
+    theirs = Recording.load(Path("theirs.npz"))
+    for name, stream in recording.data.aids.items():
+        np.testing.assert_array_equal(stream.value, theirs.data.aids[name].value)
+    return {"measurements": {name: len(stream) for name, stream in recording.data.aids.items()}, "seed": 4}
+
+
+def call_leaderboard() -> Any:
+    simnav.campaign("pond.toml", "gnss-only,ship-ekf", runs=2, output="out", workers=1)
+    results = results_of("out", series=True)
+    index = build(results, simnav.rank("out"), Path("mine"))
+    assert json.loads(index.with_name("results.json").read_text())["results"]
+    return {"runs": len(results), "ranking": simnav.rank(results).to_dict(), "failed": {}}
+
+
+def call_check() -> Any:
+    report = simnav.check("gnss-only:acceleration=0.5")
+    return {"estimator": report.estimator, "passed": report.passed, "findings": plain(list(report.findings))}
+
+
+CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
+    "list": (["list"], call_list),
+    "run": (
+        ["run", "pond.toml", "-e", "gnss-only:acceleration=0.5,ship-ekf", "--seed", "3"],
+        lambda: simnav.run("pond.toml", ["gnss-only:acceleration=0.5", "ship-ekf"], seed=3).to_dict(),
+    ),
+    "simulate": (["simulate", "pond.toml", "-o", "theirs.npz", "--seed", "4"], call_simulate),
+    "check": (["check", "gnss-only:acceleration=0.5"], call_check),
+    "new-estimator": (["new-estimator", "theirs"], lambda: {"name": write_estimator("mine")[0]}),
+    "evaluate": (
+        ["evaluate", "gnss-only:acceleration=0.5", "gnss-only:acceleration=2", "-s", "pond.toml", "-n", "3",
+         "--against", "ship-ekf", "--workers", "1"],
+        lambda: simnav.evaluate(
+            [("gnss-only", {"acceleration": "0.5"}), "gnss-only:acceleration=2"], "pond.toml", runs=3,
+            against="ship-ekf", workers=1,
+        ).to_dict(),
+    ),
+    "campaign": (
+        ["campaign", "-s", "pond.toml", "-e", "gnss-only,ship-ekf", "-n", "2", "-o", "out", "--workers", "1"],
+        lambda: simnav.campaign("pond.toml", "gnss-only,ship-ekf", runs=2, output="out", workers=1).to_dict(),
+    ),
+    "leaderboard": (["leaderboard", "out", "-o", "theirs", "--workers", "1"], call_leaderboard),
+    "bound": (
+        ["bound", "open-sea", "-n", "1"],
+        lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
+    ),
+    "warmup": (["warmup"], lambda: {"kernels": len(__import__("simnav.compiled").compiled.kernels())}),
+}  # fmt: skip
+
+#: Commands whose calls are compared where their own tests are: they take minutes.
+ELSEWHERE = {"reproduce"}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_command_and_its_call_say_the_same(here: Path, name: str) -> None:
+    words, call = CALLS[name]
+    if name == "leaderboard":
+        called = timeless(plain(call()))
+        said = command(*words)
+    else:
+        said = command(*words)
+        called = timeless(plain(call()))
+    if name == "list":
+        said = {
+            "estimators": [e["name"] for e in said["estimators"]],
+            "scenarios": [s["id"] for s in said["scenarios"]],
+        }
+    if name == "new-estimator":
+        assert said.pop("name") == "theirs"
+        assert called.pop("name") == "mine"
+        texts = [Path(f"{n}.py").read_text().lower().replace(n, "") for n in ("mine", "theirs")]
+        assert texts[0] == texts[1]
+    assert {k: said[k] for k in called} == called
+    assert set(said) - set(called) <= {"file", "csv", "scenario", "duration", "imu_samples", "failed"}
+
+
+def test_every_command_is_compared() -> None:
+    assert {c.name for c in app.registered_commands} == set(CALLS) | ELSEWHERE
+
+
+# -- what may be given, and what comes back ------------------------------------------------------------------
+
+
+def test_names_load_with_their_first_use() -> None:
+    code = (
+        "import sys, simnav\n"
+        "assert not {m for m in sys.modules if m.startswith('simnav.leaderboard')}\n"
+        "assert not {'numba', 'gtsam', 'matplotlib', 'pyarrow', 'scipy', 'pydantic', 'typer'} & set(sys.modules)\n"
+        "assert set(simnav.__all__) <= set(dir(simnav))\n"
+        "simnav.run, simnav.check, simnav.load\n"
+        "assert not {'gtsam', 'matplotlib', 'pyarrow', 'scipy', 'typer'} & set(sys.modules)\n"
+        "import simnav.contract_check\n"
+        "assert callable(simnav.check)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_public_name_is_there() -> None:
+    for name in simnav.__all__:
+        assert getattr(simnav, name) is not None
+
+
+def test_python_m_simnav(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-m", "simnav", "--version"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout.startswith("simnav 0.")
+
+
+def test_one_estimator_given_in_four_ways(here: Path) -> None:
+    source = inspect.getsource(LastFix)
+    (here / "last_fix.py").write_text(f"from simnav import Estimate, Estimator\n\n\n{source}")
+    half = {"gain": 0.5}
+    ways: list[Any] = [
+        "last_fix.py:gain=0.5",
+        ("last_fix.py:LastFix", half),
+        (Path("last_fix.py"), half),
+    ]
+
+    def rmse(report: Any) -> float:
+        return float(report.estimators[0].scores["horizontal_rmse"])
+
+    found = [rmse(simnav.run("pond.toml", way)) for way in ways]
+    found.append(rmse(simnav.run(simnav.load("pond.toml"), "last_fix.py", parameters=half)))
+    assert len(set(found)) == 1
+    estimator._classes.pop("last-fix")
+    report = simnav.run("pond.toml", [(LastFix, half), LastFix])
+    assert rmse(report) == found[0] != report.estimators[1].scores["horizontal_rmse"]
+    assert [e.estimator for e in report.estimators] == ["last-fix(gain=0.5)", "last-fix"]
+    assert isinstance(simnav.make(LastFix, gain=0.25), LastFix)
+    assert simnav.check(LastFix, gain=0.5).passed
+
+
+@pytest.mark.usefixtures("here")
+def test_what_comes_back_is_a_frame_and_a_figure() -> None:
+    two = "gnss-only,gnss-only:acceleration=2"
+    run = simnav.run("pond.toml", two)
+    evaluation = simnav.evaluate("gnss-only", "pond.toml", runs=2, against=two, workers=1, results="kept")
+    bound = simnav.bound("open-sea", runs=1)
+    assert evaluation.folder is not None
+    ranking = simnav.rank(evaluation.folder)
+    for report, rows in ((run, 2), (evaluation, 4), (ranking, 2), (bound, len(bound.time))):
+        table = report.to_frame()
+        assert len(table) == rows
+        assert isinstance(report.plot(), Figure)
+    scores = run.to_frame()["horizontal_rmse"]
+    assert [float(str(v)) for v in scores] == [e.scores["horizontal_rmse"] for e in run.estimators]
+
+
+def test_frames_without_pandas_are_arrow_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [{"a": 1, "b": "x"}, {"a": 2, "b": "y"}]
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    assert frame(rows).to_pydict() == {"a": [1, 2], "b": ["x", "y"]}
+
+    class Pandas:
+        DataFrame = staticmethod(lambda columns: ("frame", columns))
+
+    monkeypatch.setitem(sys.modules, "pandas", Pandas)  # type: ignore[arg-type]
+    assert frame(rows) == ("frame", {"a": [1, 2], "b": ["x", "y"]})
+
+
+class Unfinished(Estimator):
+    """Has no update."""
+
+    def reset(self, start, instruments):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: simnav.run("open-see", "ekf"), "did you mean 'open-sea'"),
+        (lambda: simnav.run("pond.toml", "efk"), "did you mean 'ekf'"),
+        (lambda: simnav.run("pond.toml", int), "int is no estimator"),
+        (lambda: simnav.run("pond.toml", Unfinished), "lacks update"),
+        (lambda: simnav.run("pond.toml", [3]), "3 is no estimator"),
+        (lambda: simnav.run("pond.toml", "ekf", parameters={"nothing": 1}), "no parameter 'nothing'"),
+        (lambda: simnav.run("pond.toml", "ekf,ukf", parameters={"nothing": 1}), "nothing: none of the estimators"),
+        (lambda: simnav.make("ekf,ukf"), "names 2 estimators"),
+        (lambda: simnav.evaluate("nobody.py", "pond.toml", runs=2, against="gnss-only"), "nobody.py"),
+        (lambda: simnav.campaign("pond.toml", "gnss-only", runs=1, output="."), "other files"),
+        (lambda: simnav.rank("nowhere"), "there are no results in"),
+        (lambda: simnav.bound("car-kitti"), "car-kitti"),
+        (lambda: simnav.reproduce("999"), "there is no paper '999'"),
+        (lambda: simnav.reproduce("001", methods=["nobody"]), "has no method 'nobody'"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_what_cannot_be_done_is_one_sentence(call: Callable[[], Any], says: str) -> None:
+    with pytest.raises(simnav.RequestError, match=says) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scenario_is_taken_as_it_is(here: Path) -> None:
+    scenario = simnav.load("pond.toml")
+    assert scenario_of(scenario) is scenario
+    assert len(simnav.record(scenario).data.truth) == len(simnav.record("pond.toml", seed=0).data.truth) == 30
+    assert scenario_of(here / "pond.toml") == scenario
+
+
+@pytest.mark.usefixtures("here")
+def test_a_class_takes_part_in_a_campaign_of_several_workers() -> None:
+    report = simnav.evaluate((LastFix, {"gain": 0.5}), "pond.toml", runs=3, against=["gnss-only", LastFix], workers=2)
+    assert report.estimators == ("last-fix(gain=0.5)",)
+    assert {r.estimator for r in report.results} == {"last-fix(gain=0.5)", "last-fix", "gnss-only"}
+    assert all(r.status == "ok" for r in report.results), report.results
+    (stand,) = report.standings
+    assert stand.of == 3

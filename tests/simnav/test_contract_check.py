@@ -1,0 +1,173 @@
+"""The contract test finds each way of breaking the contract, and passes what keeps it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from simnav.contract_check import check, contract_recording
+from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.types import KINDS, Estimate
+
+
+class Good(Estimator):
+    """The initial velocity, carried on."""
+
+    def reset(self, start, instruments):
+        self.start = start
+        self.gnss = instruments.of_kind("gnss_position")
+        if not self.gnss:
+            raise UnsuitableScenario("it needs GNSS")
+        self.position = start.position.copy()
+
+    def update(self, measurements):
+        fix = measurements.latest("gnss_position")
+        if fix is not None:
+            self.position = fix.value.copy()
+        return Estimate(measurements.time, self.position, covariance=np.eye(9))
+
+
+class WrongTime(Good):
+    def update(self, measurements):
+        return Estimate(measurements.start, self.position)
+
+
+class WrongShape(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position[:2])
+
+
+class NotFinite(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, np.full(3, np.nan))
+
+
+class BadCovariance(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position, covariance=np.diag([-1.0] + 8 * [1.0]))
+
+
+class Silent(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time)
+
+
+class Degrees(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position * [180 / np.pi, 180 / np.pi, 1.0])
+
+
+class YawInDegrees(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position, attitude=np.degrees(self.start.attitude))
+
+
+class Knots(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position, self.start.velocity * 100.0)
+
+
+class Random(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position + np.array([0.0, 0.0, np.random.default_rng().normal()]))
+
+
+class Forgetful(Good):
+    total = 0.0
+
+    def update(self, measurements):
+        self.total += 1.0
+        return Estimate(measurements.time, self.position + np.array([0.0, 0.0, 1e-3 * self.total]))
+
+
+class Prophet(Good):
+    """Looks beyond the slice that it is given."""
+
+    def update(self, measurements):
+        ahead = measurements.imu.specific_force.base
+        mean = 0.0 if ahead is None else float(ahead.mean())
+        return Estimate(measurements.time, self.position + np.array([0.0, 0.0, mean]))
+
+
+class Vandal(Good):
+    def update(self, measurements):
+        for m in measurements:
+            if m.kind == "depth":
+                m.value[...] += 1.0
+        return super().update(measurements)
+
+
+class Aliasing(Good):
+    def update(self, measurements):
+        self.position += [0.0, 0.0, 0.1]
+        return Estimate(measurements.time, self.position)
+
+
+class NeedsData(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, measurements.latest("gnss_position").value)
+
+
+class NeedsDvl(Good):
+    def reset(self, start, instruments):
+        super().reset(start, instruments)
+        self.dvl = instruments["dvl"]
+
+
+class Mute(Good):
+    def reset(self, start, instruments):
+        if "dvl" not in instruments:
+            raise UnsuitableScenario
+        super().reset(start, instruments)
+
+
+def test_a_good_one_passes():
+    report = check(Good)
+    assert report.passed, str(report)
+    names = [f.name for f in report.findings]
+    assert names == [
+        "output", "units", "determinism", "reset", "causality", "input", "estimates", "silence", "missing instruments",
+    ]  # fmt: skip
+    assert str(report).endswith("Good passes the contract test")
+    assert "without gnss_position" in report.findings[-1].sentence
+
+
+@pytest.mark.parametrize(
+    ("cls", "finding", "words"),
+    [
+        (WrongTime, "output", "time"),
+        (WrongShape, "output", "shape (2,)"),
+        (NotFinite, "output", "not finite"),
+        (BadCovariance, "output", "negative variance"),
+        (Silent, "output", "estimates nothing"),
+        (Degrees, "units", "latitude, longitude [rad]"),
+        (YawInDegrees, "units", "yaw 40"),
+        (Knots, "units", "velocity"),
+        (Random, "determinism", "position differs at 1 s"),
+        (Forgetful, "reset", "position differs at 1 s"),
+        (Prophet, "causality", "position differs at 1 s"),
+        (Vandal, "input", "the measurements of depth"),
+        (Aliasing, "estimates", "copy it"),
+        (NeedsData, "silence", "every aiding instrument falls silent: error"),
+        (NeedsDvl, "missing instruments", "without dvl: error"),
+        (Mute, "missing instruments", "without dvl: UnsuitableScenario does not say what is needed"),
+    ],
+)
+def test_each_breach_is_found(cls: type[Estimator], finding: str, words: str):
+    report = check(cls)
+    assert not report.passed
+    failed = {f.name: f.sentence for f in report.findings if not f.ok}
+    assert finding in failed, str(report)
+    assert words in failed[finding], failed[finding]
+    assert "FAIL" in str(report)
+
+
+def test_a_name_with_parameters():
+    assert check("gnss-only", acceleration="0.5").passed
+
+
+def test_the_recording_has_every_kind_of_instrument():
+    recording = contract_recording(0)
+    assert {s.kind for s in recording.instruments.values()} == set(KINDS)
+    assert recording.instruments.imu is not None
+    assert all(len(s) > 10 for s in recording.data.aids.values())
