@@ -209,6 +209,8 @@ def evaluate(
     from simnav.leaderboard.ranking.runs import group
     from simnav.leaderboard.ranking.standing import standing
 
+    if not estimators:
+        raise RequestError("no estimator was asked for; name those that should be evaluated")
     mine = requests(estimators, parameters)
     labels = [r.label for r in mine]
     everyone = [*mine, *(r for r in requests(against) if r.label not in labels)]

@@ -13,12 +13,13 @@ import inspect
 import json
 import os
 import sys
+import sysconfig
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import simnav
-from simnav.leaderboard.campaign.session_class import is_session, source_text
+from simnav.leaderboard.campaign.session_class import is_session, source_of
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -112,13 +113,14 @@ def estimator_source(cls: type[Estimator]) -> str:
     """Digest of the sources of an estimator.
 
     Of a class in an installed package: all files of the package. Of a class in a file: this file and those
-    beside it that it imports, directly or not. Of a class in a session: its text, and what it uses of the session.
-    Base classes count likewise.
+    beside it that it imports, directly or not. Of a class in a session: its text, what it uses of the session,
+    and the files of the user's own that it uses. Base classes count likewise.
     """
     parts = []
     for base in cls.__mro__:
         if is_session(base.__module__) and not base.__module__.startswith("simnav_file_"):
-            parts.append(digest(source_text(base)))
+            text, modules = source_of(base)
+            parts += [digest(text), *filter(None, map(_used_digest, modules))]
             continue
         package = base.__module__.partition(".")[0]
         if _is_ours(base.__module__):
@@ -153,6 +155,17 @@ def _closure_digest(start: Path) -> str:
                     todo += sorted((place / first).rglob("*.py"))
     files = sorted((os.path.relpath(p, folder), p) for p in found)
     return digest(_files_digest(files), _installed_digest(OUR_ESTIMATORS) if ours else "")
+
+
+def _used_digest(module: str) -> str:
+    """Digest of a module that a class of a session uses; empty for one that is installed or in the simulator."""
+    if _is_ours(module):
+        return _installed_digest(OUR_ESTIMATORS)
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if file is None or module.partition(".")[0] == "simnav":
+        return ""
+    path, installed = Path(file).resolve(), map(Path, sysconfig.get_paths().values())
+    return "" if any(path.is_relative_to(folder.resolve()) for folder in installed) else _closure_digest(path)
 
 
 def _is_ours(module: str) -> bool:

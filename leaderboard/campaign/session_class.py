@@ -2,7 +2,7 @@
 
 No file can be imported for them elsewhere. So a worker is sent the class itself (`carry`, by cloudpickle), and only the
 isolated process of an attempt unpacks it. The key of its results is made of its source text and of all that it uses of
-the session (`source_text`).
+the session (`source_of`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 
 from simnav.leaderboard.results.errors import RequestError, sentence
 
-__all__ = ["carry", "is_session", "receive", "source_text"]
+__all__ = ["carry", "is_session", "receive", "source_of"]
 
 
 def is_session(module: str) -> bool:
@@ -77,12 +77,18 @@ def receive(data: bytes) -> Any:
     return pickle.loads(data)
 
 
-def source_text(cls: type) -> str:
-    """The source text of a class and of all functions, classes and values of its session that it uses.
+def source_of(cls: type) -> tuple[str, list[str]]:
+    """What a class is made of.
 
-    Where there is no text (a prompt that keeps none), the compiled code stands for it.
+    Returns
+    -------
+    text : str
+        Its source text and that of all functions and classes of its session that it uses, with the values. Where there
+        is no text (a prompt that keeps none), the compiled code stands for it.
+    modules : list of str
+        Names of the modules outside the session that it uses.
     """
-    parts, seen, todo = [], set[int](), list[Any]([cls])
+    parts, modules, seen, todo = [], set[str](), set[int](), list[Any]([cls])
     while todo:
         item = todo.pop(0)
         if id(item) in seen:
@@ -91,11 +97,16 @@ def source_text(cls: type) -> str:
         parts.append(_text(item))
         for function in _functions(item):
             for name, value in _uses(function):
-                if isinstance(value, (type, FunctionType)):
-                    todo += [value] if is_session(value.__module__) else []
-                elif not isinstance(value, ModuleType):
+                if isinstance(value, ModuleType):
+                    modules.add(value.__name__)
+                    continue
+                definition = value if isinstance(value, (type, FunctionType)) else type(value)
+                if definition is value or is_session(definition.__module__):
+                    modules.add(definition.__module__)
+                    todo += [definition] if is_session(definition.__module__) else []
+                if definition is not value:
                     parts.append(f"{name}: {_digest(value)}")
-    return "\n".join(parts)
+    return "\n".join(parts), sorted(name for name in modules if not is_session(name))
 
 
 def _functions(item: Any) -> Iterator[FunctionType]:

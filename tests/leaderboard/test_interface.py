@@ -272,6 +272,7 @@ class Unfinished(Estimator):
         (lambda: simnav.run("pond.toml", "ekf", parameters={"nothing": 1}), "no parameter 'nothing'"),
         (lambda: simnav.run("pond.toml", "ekf,ukf", parameters={"nothing": 1}), "nothing: none of the estimators"),
         (lambda: simnav.make("ekf,ukf"), "names 2 estimators"),
+        (lambda: simnav.evaluate([], "pond.toml"), "no estimator was asked for"),
         (lambda: simnav.evaluate("nobody.py", "pond.toml", runs=2, against="gnss-only"), "nobody.py"),
         (lambda: simnav.campaign("pond.toml", "gnss-only", runs=1, output="."), "other files"),
         (lambda: simnav.rank("nowhere"), "there are no results in"),

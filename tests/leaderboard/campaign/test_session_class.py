@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from simnav.leaderboard.campaign.session_class import carry, is_session, receive, source_text
+from simnav.leaderboard.campaign.fingerprint import estimator_source
+from simnav.leaderboard.campaign.session_class import carry, is_session, receive, source_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 
@@ -145,10 +146,11 @@ def test_a_class_is_carried_with_what_it_uses(session: Any) -> None:
     ],
 )
 def test_the_text_holds_the_class_and_what_it_uses(session: Any, change: tuple[str, str], differs: bool) -> None:
-    before = source_text(session(BASE).Mine)
+    before, modules = source_of(session(BASE).Mine)
+    assert modules == []
     assert "class Mine" in before
     assert "def double" in before
-    after = source_text(session(BASE.replace(*change)).Mine)
+    after, _ = source_of(session(BASE.replace(*change)).Mine)
     assert (before != after) is differs
 
 
@@ -156,11 +158,34 @@ def test_without_a_text_the_compiled_code_stands_for_it(session: Any) -> None:
     def compiled(text: str) -> str:
         made = session(text)
         linecache.cache.pop("<a_session>")
-        return source_text(made.Mine)
+        return source_of(made.Mine)[0]
 
     assert compiled(BASE) == compiled(BASE)
     assert compiled(BASE) != compiled(BASE.replace("return 3", "return 4"))
     assert compiled(BASE) != compiled(BASE.replace("return FACTOR * x", "return FACTOR + x"))
+
+
+def test_the_class_of_a_value_that_it_uses_counts(session: Any) -> None:
+    gain = "class Gain:\n    def value(self):\n        return 1\n\nGAIN = Gain()\n"
+    assert "class Gain" in source_of(session(gain + BASE.replace("FACTOR *", "GAIN.value() *")).Mine)[0]
+
+
+def test_files_beside_a_notebook_count_but_not_what_is_installed(
+    session: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    helper = tmp_path / "beside_a_notebook.py"
+    helper.write_text("GAIN = 1\n")
+    text = "import json\nimport numpy as np\nimport beside_a_notebook as b\nfrom simnav.earth import displace\n"
+    text += "class Mine:\n    def f(self):\n        return np.ones(b.GAIN), json.dumps(1), displace\n"
+    made = session(text)
+    assert source_of(made.Mine)[1] == ["beside_a_notebook", "json", "numpy", "simnav.earth"]
+    before = estimator_source(made.Mine)
+    (tmp_path / "unrelated.py").write_text("1\n")
+    assert estimator_source(made.Mine) == before
+    helper.write_text("GAIN = 2\n")
+    assert estimator_source(made.Mine) != before
+    del sys.modules["beside_a_notebook"]
 
 
 def test_what_cannot_be_sent_is_told(session: Any) -> None:
