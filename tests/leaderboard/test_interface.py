@@ -218,7 +218,7 @@ def test_one_estimator_given_in_four_ways(here: Path) -> None:
     found = [rmse(simnav.run("pond.toml", way)) for way in ways]
     found.append(rmse(simnav.run(simnav.load("pond.toml"), "last_fix.py", parameters=half)))
     assert len(set(found)) == 1
-    estimator._classes.pop("last-fix")
+    registry._classes.pop("last-fix")
     report = simnav.run("pond.toml", [(LastFix, half), LastFix])
     assert rmse(report) == found[0] != report.estimators[1].scores["horizontal_rmse"]
     assert [e.estimator for e in report.estimators] == ["last-fix(gain=0.5)", "last-fix"]
