@@ -15,8 +15,8 @@ _BETTER = (
 _SEEDS = "the paper shows one run; ours is the mean over seeds"
 _OTHER_ROAD = "another drive, with faults of our choice"
 _INNOVATIONS = (
-    "an innovation holds the state's own error too: where this drive's IMU is worse than its model for a moment, the "
-    "fixes get the blame, the estimate leans on the IMU and drifts, with faults or without"
+    "the prediction of this drive's IMU is less certain than a fix, so an innovation says little of the noise of the "
+    "fixes, and IAE leaves it as it is; without this rule the fixes get the blame for the IMU's errors"
 )
 _SAME_INNOVATIONS = (
     "the newest state of a window predicts the next fix as a filter's does: the innovations are the same, and so are "

@@ -144,7 +144,7 @@ def turned(recording: Recording, off_deg: float) -> Recording:
     """The recording with an initial heading that is off by an angle, of which its sigma tells."""
     start, off = recording.start, np.radians(off_deg)
     attitude, covariance = start.attitude.copy(), start.covariance.copy()
-    attitude[2] = wrap_angle(recording.initial.attitude[0, 2] + off)
+    attitude[2] = wrap_angle(recording.initial_truth.attitude[0, 2] + off)
     covariance[8, 8] = off**2
     return replace(recording, start=replace(start, attitude=attitude, covariance=covariance))
 
