@@ -20,7 +20,6 @@ from simnav.estimators.adaptive import (
     VbAkf,
 )
 from simnav.estimators.anfis_rows import AnfisEkf, AnfisFgo, AnfisFgoMotion
-from simnav.estimators.dead_reckoning import DeadReckoning
 from simnav.estimators.ekf import Ekf
 from simnav.estimators.ekf_presets import Ekf9, Ekf23
 from simnav.estimators.federated import Federated, FederatedNoReset
@@ -51,6 +50,7 @@ from simnav.estimators.ship_graphs import ShipFgo, ShipFgoFull
 from simnav.estimators.sigma_point import Ckf, ShipCkf, ShipUkf, Ukf
 from simnav.estimators.sliding_window import FgoFull, FgoUnsimplified, IaeFgo, IaeFgoFixed, SwFgo
 from simnav.estimators.smoothers import EkfRts, EkfTwoFilter, ShipEkfRts
+from simnav.estimators.solvers.dead_reckoning import DeadReckoning
 
 __all__ = [
     "Adkf",

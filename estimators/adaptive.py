@@ -14,7 +14,6 @@ from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.adaptations.correntropy import MaximumCorrentropy
 from simnav.estimators.adaptations.fading import FadingMemory
 from simnav.estimators.adaptations.gating import ChiSquareGate
-from simnav.estimators.adaptations.imm import ImmEstimator
 from simnav.estimators.adaptations.innovation_based import InnovationBased
 from simnav.estimators.adaptations.noise import Scope
 from simnav.estimators.adaptations.robust import EquivalentWeights, huber, igg3
@@ -23,6 +22,7 @@ from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.ekf import PoorHeadingStart
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.suitable import model_for
+from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.types import InitialState, Instruments
 
 __all__ = [
@@ -310,7 +310,7 @@ class Mckf(_Adaptive):
 class Imm(ImmEstimator):
     """Interacting multiple models: the noise of each instrument jumps between levels.
 
-    See `simnav.estimators.adaptations.imm`, also for the parameters.
+    See `simnav.estimators.solvers.imm`, also for the parameters.
     """
 
     def __init__(self, levels: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0), stay: float = 0.99, stay_high: float = 0.8):

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any, ClassVar, Literal
 
 from simnav.estimator import register
-from simnav.estimators.adaptations.dynamic_covariance_scaling import DynamicCovarianceScaling
-from simnav.estimators.adaptations.gradient_adaptive import GradientAdaptive, Shape
-from simnav.estimators.adaptations.graduated_non_convexity import GraduatedNonConvexity
-from simnav.estimators.adaptations.m_estimators import MEstimator, cauchy, constants, geman_mcclure, huber, tukey
-from simnav.estimators.adaptations.max_mixture import MaxMixture
-from simnav.estimators.adaptations.switchable_constraints import SwitchableConstraints
-from simnav.estimators.adaptations.weighting import Weighting
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.sliding_window import AidedWindow, InertialWindow
+from simnav.estimators.weightings.base import Weighting
+from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling
+from simnav.estimators.weightings.gradient_adaptive import GradientAdaptive, Shape
+from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
+from simnav.estimators.weightings.m_estimators import MEstimator, cauchy, constants, geman_mcclure, huber, tukey
+from simnav.estimators.weightings.max_mixture import MaxMixture
+from simnav.estimators.weightings.switchable_constraints import SwitchableConstraints
 from simnav.types import Array
 
 __all__ = [
@@ -39,14 +39,14 @@ class _Robust(AidedWindow):
 
 
 class _MEstimation(_Robust):
-    """An M-estimator (`simnav.estimators.adaptations.m_estimators`).
+    """An M-estimator (`simnav.estimators.weightings.m_estimators`).
 
     Parameters
     ----------
     efficiency : float
         On Gaussian noise; the function's constant follows, for each number of components.
     smallest : float
-        Least weight (`simnav.estimators.adaptations.robust_weighting`).
+        Least weight (`simnav.estimators.weightings.robust_weighting`).
     window, tolerance, iterations
         As for ``sw-fgo``.
     """
@@ -89,7 +89,7 @@ class GmFgo(_MEstimation):
 class DcsFgo(_Robust):
     """Sliding window with dynamic covariance scaling.
 
-    See `simnav.estimators.adaptations.dynamic_covariance_scaling`, and ``sw-fgo`` for the other parameters.
+    See `simnav.estimators.weightings.dynamic_covariance_scaling`, and ``sw-fgo`` for the other parameters.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class DcsFgo(_Robust):
 class SwitchableFgo(_Robust):
     """Sliding window with switchable constraints, the switches eliminated in closed form.
 
-    See `simnav.estimators.adaptations.switchable_constraints`, and ``sw-fgo`` for the other parameters.
+    See `simnav.estimators.weightings.switchable_constraints`, and ``sw-fgo`` for the other parameters.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class SwitchableFgo(_Robust):
 class GncFgo(_Robust):
     """Sliding window with graduated non-convexity: after an outlier the robust cost begins convex and hardens.
 
-    See `simnav.estimators.adaptations.graduated_non_convexity`, and ``sw-fgo`` for the other parameters.
+    See `simnav.estimators.weightings.graduated_non_convexity`, and ``sw-fgo`` for the other parameters.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class GncFgo(_Robust):
 class MaxMixtureFgo(_Robust):
     """Sliding window in which each measurement is of the nominal or of a wide noise, whichever is the more probable.
 
-    See `simnav.estimators.adaptations.max_mixture`, and ``sw-fgo`` for the other parameters.
+    See `simnav.estimators.weightings.max_mixture`, and ``sw-fgo`` for the other parameters.
     """
 
     def __init__(
@@ -158,7 +158,7 @@ class MaxMixtureFgo(_Robust):
 class GaFgo(_Robust):
     """Gradient-adaptive factor graph after paper 000, its residuals whitened and its scales consistent.
 
-    See `simnav.estimators.adaptations.gradient_adaptive`, and ``sw-fgo`` for the other parameters.
+    See `simnav.estimators.weightings.gradient_adaptive`, and ``sw-fgo`` for the other parameters.
     """
 
     def __init__(
@@ -222,7 +222,7 @@ class SwFgoPaper(_Paper):
 class GaFgoPaper(_Paper):
     """Gradient-adaptive factor graph as paper 000 prints it: 9 states, fixed sigmas, unwhitened norms and their scale.
 
-    See `simnav.estimators.models.nine_state`, and `simnav.estimators.adaptations.gradient_adaptive` for the preset
+    See `simnav.estimators.models.nine_state`, and `simnav.estimators.weightings.gradient_adaptive` for the preset
     "paper".
     """
 

@@ -7,13 +7,13 @@ from typing import Any
 from simnav.estimator import register
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.adaptations.innovation_based import InnovationBased
-from simnav.estimators.adaptations.weighting import Weighting
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
 from simnav.estimators.models.ship_chain import ShipChain
 from simnav.estimators.models.suitable import model_for, require_inertial_aids
 from simnav.estimators.solvers.full_graph import FullGraph
 from simnav.estimators.solvers.window import WindowEstimator
+from simnav.estimators.weightings.base import Weighting
 from simnav.types import InitialState, Instruments
 
 __all__ = ["AidedWindow", "FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "InertialWindow", "SwFgo"]

@@ -11,7 +11,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
-from simnav.estimators.solvers.joseph import joseph_update
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.types import KINDS, Array, Instruments
 
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "normalised_square", "posterior", "scaled"]

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from simnav.estimators.solvers.joseph import joseph_update, project
+from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
 
 __all__ = ["ErrorModel", "GaussMarkov", "Linearised", "Observation", "gauss_markov", "triad_bias"]

@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Observation
-from simnav.estimators.solvers.joseph import joseph_update
 from simnav.rotation import left_jacobian
 from simnav.types import Array, Measurement
 

@@ -1,7 +1,7 @@
 """The error-state extended Kalman filter with feedback, over any model.
 
 Every measurement is used at its own time of validity: the state is propagated to it, inside the step. The covariance is
-updated in Joseph's form (`simnav.estimators.solvers.joseph`).
+updated in Joseph's form (`simnav.estimators.algebra.joseph`).
 
 Measurements that cannot be used are counted, in the diagnostic ``skipped``: values that mean nothing (not finite, not
 on Earth), those older than the state, repetitions, and innovations whose covariance is singular.
@@ -17,10 +17,10 @@ import numpy as np
 
 from simnav.estimator import Estimator
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
 from simnav.estimators.solvers.admission import Admission
 from simnav.estimators.solvers.iterated import Iteration, absorb_iterated
-from simnav.estimators.solvers.joseph import joseph_update
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["KalmanEstimator"]

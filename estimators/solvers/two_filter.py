@@ -39,8 +39,8 @@ import numpy as np
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Linearised
-from simnav.estimators.solvers.joseph import joseph_update
 from simnav.estimators.solvers.smoother import SmoothingEstimator, Stretches, scale_of
 from simnav.types import Array, InitialState, Instruments, Measurement
 

@@ -2,7 +2,7 @@
 
 Every time of a measurement is a node of the graph (`simnav.estimators.models.chain`), every measurement and every
 stretch of motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares:
-linearise, weigh, solve (`simnav.estimators.solvers.block_tridiagonal`), retract, until the next step would be small. A
+linearise, weigh, solve (`simnav.estimators.algebra.block_tridiagonal`), retract, until the next step would be small. A
 step that raises the cost is taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what
 they say of the node that is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L.
 Matthies, G. Sukhatme, "Sliding window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So
@@ -44,11 +44,11 @@ import numpy as np
 
 from simnav.estimator import Estimator
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.adaptations.weighting import Factors, Weighting
+from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 from simnav.estimators.models.chain import Chain
 from simnav.estimators.solvers.admission import Admission
-from simnav.estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 from simnav.estimators.solvers.cost_test import CostTest
+from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["WindowEstimator"]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.algebra.joseph import project
 from simnav.estimators.ekf import Ekf
 from simnav.estimators.ekf_presets import Ekf23
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.solvers.joseph import project
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Measurement
 

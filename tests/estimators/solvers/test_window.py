@@ -11,10 +11,10 @@ import pytest
 
 from simnav.estimator import Estimator, find, make, names
 from simnav.estimators.adaptations.gating import ChiSquareGate
-from simnav.estimators.adaptations.weighting import Factors, Weighting
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.sliding_window import InertialWindow
 from simnav.estimators.solvers.window import WindowEstimator
+from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -31,6 +31,7 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.cholesky import factorise
 
 __all__ = ["after_step", "half_squares", "keep_weights", "solve_chain", "whiten"]
 
@@ -73,7 +74,7 @@ def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-de
     """Take m measurements with the covariance ``R / weight`` into P and d; False, and nothing done, if S is singular.
 
     With ``L L' = S = H P H' + R / weight`` they are left white: ``U = L^-1 H P``, ``G = L^-1 H`` and
-    ``y = L^-1 (r - H d)``, so that ``d + U' y`` and ``P - U' U`` are the update.
+    ``y = L^-1 (r - H d)``, so that ``d + U' y`` and ``P - U' U`` are the update. The last row of L is for the pivots.
     """
     n = P.shape[0]
     for a in range(m):
@@ -93,15 +94,9 @@ def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-de
             for c in range(n):
                 if H[b, c] != 0.0:
                     x += H[b, c] * U[a, c]
-            variance = x
-            for k in range(b):
-                x -= L[a, k] * L[b, k]
-            if b < a:
-                L[a, b] = x / L[b, b]
-            elif x > 1e-14 * variance:
-                L[a, a] = sqrt(x)
-            else:
-                return False
+            L[a, b] = x
+    if not factorise(L, m, 1e-14, L[3]):
+        return False
     for a in range(m):
         for b in range(a):
             x = L[a, b]
@@ -212,7 +207,7 @@ def solve_chain(  # type: ignore[no-untyped-def]
     """
     count, n = step.shape
     total = node.size
-    work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((3, 3))
+    work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((4, 3))
     damps = count if damping > 0.0 else 0
     damp_crosses, damp_whites = np.empty((damps, n, 1, n)), np.empty((damps, n, 1, n))
     damp_innovations = np.empty((damps, n, 1))

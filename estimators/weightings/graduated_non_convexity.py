@@ -19,9 +19,9 @@ from typing import Literal
 
 import numpy as np
 
-from simnav.estimators.adaptations.m_estimators import constants, geman_mcclure, truncated
-from simnav.estimators.adaptations.robust_weighting import RobustWeighting
-from simnav.estimators.adaptations.weighting import Factors
+from simnav.estimators.weightings.base import Factors
+from simnav.estimators.weightings.m_estimators import constants, geman_mcclure, truncated
+from simnav.estimators.weightings.robust_weighting import RobustWeighting
 from simnav.types import Array, Instruments
 
 __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncated"]

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.prediction import chi_square_limits, fixes_and_logs
-from simnav.estimators.adaptations.weighting import Factors
+from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.models.roles import fixes_and_logs
+from simnav.estimators.weightings.base import Factors
 from simnav.types import Instruments
 
 __all__ = ["MotionTest"]

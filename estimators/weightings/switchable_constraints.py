@@ -18,7 +18,7 @@ Geman and McClure's with ``c = 1/sigma_s``: the two methods differ in how they c
 
 from __future__ import annotations
 
-from simnav.estimators.adaptations.m_estimators import MEstimator, geman_mcclure
+from simnav.estimators.weightings.m_estimators import MEstimator, geman_mcclure
 
 __all__ = ["SwitchableConstraints"]
 

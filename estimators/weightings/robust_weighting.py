@@ -3,7 +3,7 @@
 With measurements alone being weighed, a motion that is wrong (a disturbed IMU) is not seen as such: no measurement
 fits, none is believed, and the window follows the IMU to wherever it goes. In a graph, motion is a factor like any
 other, and is weighed too, as in paper 000 (`weigh_motion`). And where fixes and logs contradict the motion together,
-they are asked whether they agree with each other (`simnav.estimators.adaptations.fault_isolation`).
+they are asked whether they agree with each other (`simnav.estimators.weightings.fault_isolation`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from functools import cache
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.fault_isolation import MotionTest
-from simnav.estimators.adaptations.weighting import Factors, Weighting
+from simnav.estimators.weightings.base import Factors, Weighting
+from simnav.estimators.weightings.fault_isolation import MotionTest
 from simnav.types import Instruments
 
 __all__ = ["RobustWeighting", "weigh_motion"]

@@ -36,7 +36,7 @@ from typing import Literal
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.weighting import Factors, Weighting
+from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.kinds import POSITION, VELOCITY
 from simnav.types import Array, Instruments
 

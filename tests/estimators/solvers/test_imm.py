@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from simnav.estimator import EstimatorError, make
-from simnav.estimators.adaptations.imm import _chain, mixture_update
-from simnav.estimators.solvers.joseph import joseph_update
+from simnav.estimators.algebra.joseph import joseph_update
+from simnav.estimators.solvers.imm import _chain, mixture_update
 
 
 def problem(seed: int, m: int = 3):

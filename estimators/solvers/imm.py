@@ -10,6 +10,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.algebra.cholesky import factorise
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
@@ -58,22 +59,16 @@ def mixture_update(  # type: ignore[no-untyped-def]
     count = variances.size
     inverses, solved = np.zeros((count, m, m)), np.zeros((count, m))
     likelihood, distance = np.empty(count), np.empty(count)
-    L, W = np.zeros((m, m)), np.zeros((m, m))
+    L, W, pivot = np.zeros((m, m)), np.zeros((m, m)), np.empty(m)
     for j in range(count):
-        determinant = 0.0
         for r in range(m):
             for c in range(r + 1):
-                s = predicted[r, c] + variances[j] * noise[r, c]
-                x = s
-                for k in range(c):
-                    x -= L[r, k] * L[c, k]
-                if r == c:
-                    if not x > 1e-14 * s:
-                        return -1.0, 0.0
-                    L[r, r] = sqrt(x)
-                    determinant += log(x)
-                else:
-                    L[r, c] = x / L[c, c]
+                L[r, c] = predicted[r, c] + variances[j] * noise[r, c]
+        if not factorise(L, m, 1e-14, pivot):
+            return -1.0, 0.0
+        determinant = 0.0
+        for r in range(m):
+            determinant += log(pivot[r])
         for c in range(m):  # W = L^-1
             for r in range(c, m):
                 x = 1.0 if r == c else 0.0

@@ -6,11 +6,10 @@ Discrete Sequential Estimation*, 1977).
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.cholesky import factorise
 
 __all__ = ["joseph_update", "project"]
 
@@ -75,18 +74,9 @@ def joseph_update(covariance, cross, innovation_covariance, residual, correction
         Normalised innovation squared; -1 where S is singular, and nothing is changed.
     """
     n, m = cross.shape
-    L = np.zeros((m, m))
-    for i in range(m):
-        for j in range(i + 1):
-            x = innovation_covariance[i, j]
-            for k in range(j):
-                x -= L[i, k] * L[j, k]
-            if i == j:
-                if not x > 1e-14 * innovation_covariance[i, i]:
-                    return -1.0
-                L[i, i] = sqrt(x)
-            else:
-                L[i, j] = x / L[j, j]
+    L, white = innovation_covariance.copy(), np.empty(m)
+    if not factorise(L, m, 1e-14, white):
+        return -1.0
     # Whitened: U = P H' L^-T, so that K S K' = U U', K (P H')' = U U'; Joseph's sum needs the gain K = U L^-1.
     gain = np.empty((n, m))
     for r in range(n):
@@ -101,7 +91,6 @@ def joseph_update(covariance, cross, innovation_covariance, residual, correction
                 x -= L[k, i] * gain[r, k]
             gain[r, i] = x / L[i, i]
     nis = 0.0
-    white = np.empty(m)
     for i in range(m):
         x = residual[i]
         for k in range(i):

@@ -19,7 +19,7 @@ from math import log
 
 import numpy as np
 
-from simnav.estimators.adaptations.m_estimators import MEstimator
+from simnav.estimators.weightings.m_estimators import MEstimator
 from simnav.types import Array
 
 __all__ = ["MaxMixture"]

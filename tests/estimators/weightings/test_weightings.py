@@ -13,14 +13,15 @@ from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi, multivariate_normal
 
-from simnav.estimators.adaptations.dynamic_covariance_scaling import DynamicCovarianceScaling, covariance_scaling
-from simnav.estimators.adaptations.gradient_adaptive import GradientAdaptive, medians
-from simnav.estimators.adaptations.graduated_non_convexity import (
+from simnav.estimators.weightings.base import Factors, Weighting
+from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling, covariance_scaling
+from simnav.estimators.weightings.gradient_adaptive import GradientAdaptive, medians
+from simnav.estimators.weightings.graduated_non_convexity import (
     GraduatedNonConvexity,
     softened_geman_mcclure,
     softened_truncated,
 )
-from simnav.estimators.adaptations.m_estimators import (
+from simnav.estimators.weightings.m_estimators import (
     MEstimator,
     cauchy,
     constants,
@@ -30,10 +31,9 @@ from simnav.estimators.adaptations.m_estimators import (
     truncated,
     tukey,
 )
-from simnav.estimators.adaptations.max_mixture import MaxMixture
-from simnav.estimators.adaptations.robust_weighting import weigh_motion
-from simnav.estimators.adaptations.switchable_constraints import SwitchableConstraints
-from simnav.estimators.adaptations.weighting import Factors, Weighting
+from simnav.estimators.weightings.max_mixture import MaxMixture
+from simnav.estimators.weightings.robust_weighting import weigh_motion
+from simnav.estimators.weightings.switchable_constraints import SwitchableConstraints
 from simnav.types import Datasheet, Instruments
 
 SHEETS = Instruments(

@@ -20,7 +20,7 @@ the weights of the epoch before, with new measurements at full weight (`RobustWe
 
 Source: P. J. Huber, *Robust Statistics*, 1981; Z. Zhang, "Parameter estimation techniques: a tutorial with application
 to conic fitting", *Image and Vision Computing* 15, 1997, table 1. Eq. 21 of paper 000 calls Geman-McClure what is
-Cauchy's; it is in `simnav.estimators.adaptations.gradient_adaptive` as printed.
+Cauchy's; it is in `simnav.estimators.weightings.gradient_adaptive` as printed.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from functools import cache
 
 import numpy as np
 
-from simnav.estimators.adaptations.robust_weighting import RobustWeighting
-from simnav.estimators.adaptations.weighting import Factors
+from simnav.estimators.weightings.base import Factors
+from simnav.estimators.weightings.robust_weighting import RobustWeighting
 from simnav.types import Array
 
 __all__ = ["MEstimator", "cauchy", "constants", "efficiency", "geman_mcclure", "huber", "truncated", "tukey"]

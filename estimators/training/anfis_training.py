@@ -26,8 +26,8 @@ import numpy as np
 from simnav.estimators.adaptations.anfis import Features
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.adaptations.hybrid_learning import Learned, learn, rmse
 from simnav.estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.training.hybrid_learning import Learned, learn, rmse
 from simnav.kinds import POSITION
 from simnav.types import KINDS, Array, Instruments
 

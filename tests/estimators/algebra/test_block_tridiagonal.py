@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.estimators.models.chain import whitening
-from simnav.estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.algebra.whitening import whitening
 
 N, COUNT = 5, 6
 

@@ -6,7 +6,7 @@ scaling", ICRA 2013, eq. 15: with ``chi^2 = v' R^-1 v`` and a constant F, the in
     ``s = min(1, 2 F / (F + chi^2))``.
 
 It is 1 up to ``chi^2 = F``; beyond, twice the ``s = F / (F + chi^2)`` of
-`simnav.estimators.adaptations.switchable_constraints` with ``F = 1/sigma_s^2``.
+`simnav.estimators.weightings.switchable_constraints` with ``F = 1/sigma_s^2``.
 
 The paper takes F = 1 whatever the number of components. Of noise with 3 components 80 % is beyond that, and the
 efficiency on Gaussian noise is 0.48. By default F is therefore that of an efficiency of 95 %: 3.60, 4.48 and 5.31 for
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.estimators.adaptations.m_estimators import MEstimator, constants
+from simnav.estimators.weightings.m_estimators import MEstimator, constants
 from simnav.types import Array
 
 __all__ = ["DynamicCovarianceScaling", "covariance_scaling"]
