@@ -112,7 +112,6 @@ class AdaptiveFactor(NoiseAdaptation):
     """
 
     SMALLEST = 1e-3
-    inflates = True
 
     def __init__(
         self,
@@ -139,6 +138,7 @@ class AdaptiveFactor(NoiseAdaptation):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
         self.factor = FACTORS[factor]
         self.together = 0 if self.printed or target == "P" else together
+        self.inflates = target == "P" or self.together > 0
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

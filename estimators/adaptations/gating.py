@@ -23,7 +23,7 @@ class ChiSquareGate(NoiseAdaptation):
     probability : float
         Of a good measurement to pass.
     patience : float
-        [s]
+        Time without a pass after which the filter is doubted [s].
     """
 
     together = 0

@@ -73,8 +73,6 @@ class VariationalBayes(EstimatedNoise):
         How many measurements the datasheet's noise counts for at the start.
     iterations : int
         At least 1.
-    lowest, highest, scope
-        See `EstimatedNoise`.
     """
 
     def __init__(

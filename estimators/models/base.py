@@ -61,6 +61,22 @@ class ErrorModel(ABC):
     #: Place of the attitude, a rotation vector, in the error; None for a model without one.
     attitude_at: ClassVar[int | None] = None
 
+    def choose(self, instruments: Instruments, name: str) -> ErrorModel:
+        """The model for a set of instruments, which is itself.
+
+        Parameters
+        ----------
+        instruments : Instruments
+        name : str
+            Of the estimator, for the message.
+
+        Raises
+        ------
+        UnsuitableScenario
+            If an instrument is lacking that the model needs.
+        """
+        return self
+
     @abstractmethod
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; return the (n, n) covariance of its error. Raises UnsuitableScenario."""

@@ -18,6 +18,7 @@ A subclass compiles four loops over a window: `linearise_motion`, `linearise_aid
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
 
-__all__ = ["Chain", "Columns"]
+__all__ = ["Chain", "Columns", "chain_of"]
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
@@ -224,6 +225,11 @@ class Chain(ABC):
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
 
+    def choose(self, instruments: Instruments, name: str) -> Chain:
+        """Itself; UnsuitableScenario where its model lacks an instrument."""
+        self.front.choose(instruments, name)
+        return self
+
     def observes(self, instrument: Datasheet) -> bool:
         """Whether measurements of an instrument can be factors."""
         return self.front.observes(instrument)
@@ -406,3 +412,20 @@ class Chain(ABC):
     def less(self, shift: Array, step: Array) -> Array:
         """A (n,) shift as seen from where a step leads; a hook for those whose errors do not simply subtract."""
         return shift - step
+
+
+@singledispatch
+def chain_of(model: Any) -> Chain:
+    """The chain of a model, for a graph; a file with a chain of its own registers it for its model's class.
+
+    Raises
+    ------
+    TypeError
+        If no chain is known for the model.
+    """
+    raise TypeError(f"{type(model).__name__} has no chain, so that no graph can be made of it")
+
+
+@chain_of.register
+def _(model: Chain) -> Chain:
+    return model

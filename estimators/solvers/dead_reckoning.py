@@ -1,4 +1,4 @@
-"""The row ``dead-reckoning``: heading and speed, carried forward; no position is ever measured.
+"""Dead reckoning: heading and speed, carried forward; no position is ever measured.
 
 Heading
     With an IMU, the gyroscopes' from the initial heading on, drawn slowly (`COMPASS_TIME`) to the compass if there is
@@ -24,7 +24,8 @@ from math import hypot
 import numpy as np
 
 from simnav.earth import gravity
-from simnav.estimator import Estimator, UnsuitableScenario, register
+from simnav.estimator import UnsuitableScenario
+from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import triad_bias
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED
@@ -32,7 +33,7 @@ from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.strapdown import mechanize
 from simnav.types import KINDS, Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurements
 
-__all__ = ["DeadReckoning"]
+__all__ = ["DeadReckoningEstimator"]
 
 #: Time constants of the heading towards the compass and of roll and pitch towards the vertical [s].
 COMPASS_TIME, LEVEL_TIME = 60.0, 300.0
@@ -47,8 +48,7 @@ LARGEST = (50.0, 500.0)
 _N, _E, _PSI, _GYRO, _AHEAD, _ABEAM = range(6)
 
 
-@register("dead-reckoning", aliases=("dr",))
-class DeadReckoning(Estimator):
+class DeadReckoningEstimator(Solver):
     """Dead reckoning: heading from gyroscopes or compass, speed from DVL or log, from the initial position on.
 
     Parameters

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from math import exp, hypot, log, sqrt
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.algebra.cholesky import factorise
-from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.smoother import Smoother
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["ImmEstimator", "mixture_update"]
@@ -147,8 +149,9 @@ class ImmEstimator(KalmanEstimator):
 
     Parameters
     ----------
-    model : ErrorModel
-    levels : sequence of float
+    model, smoother
+        As for `KalmanEstimator`.
+    levels : tuple of float
         Sigmas in units of the nominal one, the first 1.
     stay : float
         Probability to stay on the lowest level from one measurement to the next.
@@ -156,14 +159,25 @@ class ImmEstimator(KalmanEstimator):
         Likewise for each of the others; they leave for the lowest most often.
     """
 
+    pieces = ("model", "smoother")
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "adaptation": "the noise of each measurement is a mixture over its levels",
+        "iteration": "the mixture is over one linearisation",
+    }
+
     def __init__(
         self,
-        model: ErrorModel,
-        levels: Sequence[float] = (1.0, 3.0, 10.0, 30.0),
+        model: ModelChoice,
+        smoother: Smoother | None = None,
+        *,
+        levels: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0),
         stay: float = 0.99,
         stay_high: float = 0.8,
     ):
-        super().__init__(model)
+        super().__init__(model, smoother=smoother)
+        if self._stepwise:
+            raise ValueError(f"{type(smoother).__name__} needs one noise of a measurement; here it is a mixture")
         if len(levels) < 2 or list(levels) != sorted(set(levels)) or not levels[0] > 0.0:
             raise ValueError(f"levels = {', '.join(f'{x:g}' for x in levels)}: two or more, above 0 and rising")
         for name, p in (("stay", stay), ("stay_high", stay_high)):
@@ -207,7 +221,7 @@ class ImmEstimator(KalmanEstimator):
             self._correction,
         )  # fmt: skip
         if nis >= 0.0:
-            self._correct(self._correction)
+            self.model.correct(self._correction)
             for label, variance in zip(self._labels[m.instrument], noise.diagonal().tolist()):
                 self._report[label] = sqrt(expected * variance)
             self._report[f"quiet.{m.instrument}"] = float(probability[0])

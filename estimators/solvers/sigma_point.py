@@ -30,7 +30,9 @@ Choices (``ALGORITHMS.md`` leaves them open; paper 000 compares with a UKF and g
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
+from typing import ClassVar
 
 import numpy as np
 
@@ -82,6 +84,13 @@ class SigmaPointEstimator(KalmanEstimator):
         Above -n.
     """
 
+    pieces = ("model", "adaptation")
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "iteration": "it linearises no measurement",
+        "smoother": "it has no transition matrix, only the points that went through the motion",
+    }
+    assimilates = False
     model: PointModel
 
     def __init__(
@@ -129,7 +138,7 @@ class SigmaPointEstimator(KalmanEstimator):
 
     def _observe(self, m: Measurement) -> Observation | None:
         """Innovation, its covariance and its cross-covariance with the state, from points drawn afresh."""
-        linearised = self._linearise(m)
+        linearised = self.model.measure(m)
         if linearised is None:
             return None
         points = self._points

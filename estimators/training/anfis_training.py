@@ -233,7 +233,9 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
         for scenario in scenarios():
             recording = record(scenario, seed)
             teacher = _Teacher(recording)
-            ship = KalmanEstimator(ShipModel(turn_rate=0.01), teacher)  # as the files that are shipped were trained
+            model = ShipModel()
+            model.turn_rate = 0.01  # as the files that are shipped were trained
+            ship = KalmanEstimator(model, teacher)
             ship.reset(recording.start, recording.instruments)
             for packet in recording.steps():
                 ship.update(packet)

@@ -38,8 +38,6 @@ class DynamicCovarianceScaling(MEstimator):
         F for every number of components, 1 in the paper; 0: as ``efficiency`` says.
     efficiency : float
         On Gaussian noise.
-    smallest : float
-        Least weight (`RobustWeighting`).
     """
 
     def __init__(self, phi: float = 0.0, efficiency: float = 0.95, smallest: float = 1e-3):

@@ -54,8 +54,6 @@ class GraduatedNonConvexity(RobustWeighting):
     efficiency : float
         On Gaussian noise, of the hard cost; c follows. For truncated least squares and 95 %, c^2 is near the 99 %
         quantile of chi-square.
-    smallest : float
-        Least weight (`RobustWeighting`).
     """
 
     def __init__(

@@ -34,7 +34,17 @@ from simnav.estimators.weightings.base import Factors
 from simnav.estimators.weightings.robust_weighting import RobustWeighting
 from simnav.types import Array
 
-__all__ = ["MEstimator", "cauchy", "constants", "efficiency", "geman_mcclure", "huber", "truncated", "tukey"]
+__all__ = [
+    "MEstimator",
+    "TunedMEstimator",
+    "cauchy",
+    "constants",
+    "efficiency",
+    "geman_mcclure",
+    "huber",
+    "truncated",
+    "tukey",
+]
 
 WeightFunction = Callable[[Array], Array]
 
@@ -127,8 +137,6 @@ class MEstimator(RobustWeighting):
         Of ``u = r/c``; vectorised, in [0, 1].
     constants : (3,) sequence of float
         c of measurements of 1, 2 and 3 components.
-    smallest : float
-        Least weight (`RobustWeighting`).
     """
 
     def __init__(self, weight: WeightFunction, constants: tuple[float, float, float], smallest: float = 1e-3):
@@ -142,3 +150,18 @@ class MEstimator(RobustWeighting):
         """Set the weights of the measurements."""
         factors.weight[:] = self.weight(factors.norm * self._scale[factors.components])
         return True
+
+
+class TunedMEstimator(MEstimator):
+    """An M-estimator whose constants follow from its efficiency, for each number of components.
+
+    Parameters
+    ----------
+    weight : callable
+        As for `MEstimator`.
+    efficiency : float
+        On Gaussian noise, above 0.5 and below 1.
+    """
+
+    def __init__(self, weight: WeightFunction, efficiency: float = 0.95, smallest: float = 1e-3):
+        super().__init__(weight, constants(weight, efficiency), smallest)

@@ -32,8 +32,6 @@ class SwitchableConstraints(MEstimator):
         sigma_s, of the switch's prior, for measurements of one component; for m it is ``sigma / sqrt(m)``, so that the
         measurement that just fits, ``chi^2 = m``, has the same switch. The paper's is 1, at which the efficiency on
         Gaussian noise is 44 to 66 %; at 0.3 it is 93 to 98 %.
-    smallest : float
-        Least weight (`RobustWeighting`).
     """
 
     def __init__(self, sigma: float = 0.3, smallest: float = 1e-3):

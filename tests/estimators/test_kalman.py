@@ -13,8 +13,8 @@ from scipy.stats import chi2
 from simnav.estimator import UnsuitableScenario, find, make, names
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.ekf import Ekf
 from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.rows.kalman import Ekf
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.recording import Recording
 from simnav.scenario import load

@@ -12,7 +12,7 @@ from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalma
 from simnav.check import check
 from simnav.estimator import UnsuitableScenario, make, names
 from simnav.estimators.filterpy_adapter import FilterpyEstimator
-from simnav.estimators.solvers.dead_reckoning import DeadReckoning
+from simnav.estimators.rows.dead_reckoning import DeadReckoning
 from simnav.recording import FaultLabel
 from simnav.scenario import load
 from simnav.source import record

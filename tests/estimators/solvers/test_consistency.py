@@ -19,8 +19,8 @@ import pytest
 
 from simnav import earth, rotation
 from simnav.estimator import make
-from simnav.estimators.federated import Federated, FederatedNoReset
 from simnav.estimators.models.propagation import propagate_covariance
+from simnav.estimators.rows.federated import Federated, FederatedNoReset
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.scoring import nees_band

@@ -1,4 +1,4 @@
-"""The row ``filterpy-ukf``: filterpy's unscented filter over our ship model, through the adapter.
+"""filterpy's unscented filter over our ship model, through the adapter.
 
 The motion, the measurements and the noise are `simnav.estimators.models.ship_points`; the filter is filterpy's, version
 2. It is there to be compared with ``ship-ukf``, which does the same on the manifold.
@@ -21,29 +21,29 @@ from typing import Any
 import numpy as np
 
 from simnav.earth import displace
-from simnav.estimator import register
-from simnav.estimators.filterpy_adapter import FilterpyEstimator
+from simnav.estimators.composition import Solver
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.estimators.models.ship import OBSERVED, E, N
 from simnav.estimators.models.ship_points import ShipPoints
-from simnav.estimators.ship_row import ShipRow
+from simnav.estimators.solvers.filterpy_adapter import FilterpyEstimator
 from simnav.estimators.solvers.sigma_point import draw_points
 from simnav.kinds import HEADING
 from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
-__all__ = ["FilterpyUkf"]
+__all__ = ["FilterpyUnscentedEstimator"]
 
 
-class _Unscented(FilterpyEstimator):
+class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
     """filterpy's unscented Kalman filter over a ship's points.
 
     Parameters
     ----------
     model : ShipPoints
     alpha, beta, kappa : float
-        Of the sigma points.
+        Of the sigma points, as for `simnav.estimators.solvers.sigma_point.SigmaPointEstimator`.
     """
 
+    pieces = ("model",)
     uses = OBSERVED
 
     def __init__(self, model: ShipPoints, *, alpha: float = 0.5, beta: float = 2.0, kappa: float = 0.0):
@@ -51,6 +51,11 @@ class _Unscented(FilterpyEstimator):
             raise ValueError(f"alpha is the scale of the sigma points: a number above 0, not {alpha}")
         self.alpha, self.beta, self.kappa = alpha, beta, kappa
         self.model = model
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        self.model.choose(instruments, self.label)
+        super().reset(start, instruments)
 
     def build(self, start: InitialState, instruments: Instruments) -> Any:
         """The filter at the model's initial state."""
@@ -117,21 +122,6 @@ class _Unscented(FilterpyEstimator):
         estimate.time = self._time
         estimate.diagnostics = {"skipped": float(self._admission.skipped)}
         return estimate
-
-
-@register("filterpy-ukf")
-class FilterpyUkf(ShipRow, _Unscented):
-    """filterpy's unscented Kalman filter over the ship model: the states and the noise of ``ship-ukf``.
-
-    Parameters
-    ----------
-    alpha, beta, kappa : float
-        Of the sigma points, as for ``ship-ukf``.
-    acceleration, turn_rate_deg, turn_time, current, current_time, sway : float
-        Of the model, as for ``ship-ekf``.
-    """
-
-    model_class = ShipPoints
 
 
 def _root(matrix: Array) -> Array:
