@@ -49,6 +49,7 @@ class GraduatedNonConvexity(RobustWeighting):
     Parameters
     ----------
     cost : "tls" or "gm"
+        Truncated least squares, or Geman and McClure's.
     growth : float
         Factor of mu from an iteration to the next; 1.4 in the paper, which has time.
     efficiency : float

@@ -212,7 +212,7 @@ def test_calibration_can_be_switched_off(recording_of):
     instruments = Instruments(sheets, recording.instruments.imu)
     sizes = []
     for calibrate in (True, False):
-        e = Ekf(calibrate)
+        e = Ekf(calibrate=calibrate)
         e.reset(recording.start, instruments)
         sizes.append(e.model.size)
     assert sizes == [22, 15]
