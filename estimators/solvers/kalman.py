@@ -52,9 +52,7 @@ class KalmanEstimator(Solver):
     """
 
     pieces: ClassVar[tuple[str, ...]] = ("model", "adaptation", "iteration", "smoother")
-    refuses: ClassVar[Mapping[str, str]] = {
-        "weighting": "it sees one measurement at a time, and a weighting sees a window"
-    }
+    refuses: ClassVar[Mapping[str, str]] = {"weighting": "WeightedKalmanEstimator is the filter that takes one"}
     #: Whether the model may do in one go what `_observe` and `_absorb` do (`ErrorModel.assimilate`), where the noise is
     #: the nominal one. A solver that does one of the two in a way of its own says False.
     assimilates: ClassVar[bool] = True
