@@ -36,14 +36,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.estimators.adaptations.truth import FisherNoise, NominalNoise, TrueNoise
-from simnav.estimators.oracle import Oracle
-from simnav.estimators.solvers.smoother import SmoothingEstimator
+from simnav.estimators.solvers.oracle import OracleEstimator
+from simnav.estimators.solvers.smoother import Smoother
 from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.simulator import ideal
@@ -117,28 +117,8 @@ class Bound:
         }
 
 
-class _Clean(Oracle):
-    knowledge: ClassVar[type[TrueNoise]] = NominalNoise
-
-
-class _Mix(Oracle):
-    knowledge: ClassVar[type[TrueNoise]] = FisherNoise
-
-
-class _Rts(SmoothingEstimator, Oracle):
-    pass
-
-
-class _CleanRts(_Rts):
-    knowledge: ClassVar[type[TrueNoise]] = NominalNoise
-
-
-class _MixRts(_Rts):
-    knowledge: ClassVar[type[TrueNoise]] = FisherNoise
-
-
-_ESTIMATORS: dict[str, type[Oracle]] = {"clean": _Clean, "flags": Oracle, "mix": _Mix}
-_SMOOTHERS: dict[str, type[_Rts]] = {"clean": _CleanRts, "flags": _Rts, "mix": _MixRts}
+#: What the estimator of each bound is told of the noise.
+_KNOWLEDGE: dict[str, type[TrueNoise]] = {"clean": NominalNoise, "flags": TrueNoise, "mix": FisherNoise}
 
 
 def information(recording: Recording, kind: Kind = "flags", smoothed: bool = False) -> tuple[Array, NDArray[np.bool_]]:
@@ -164,12 +144,13 @@ def information(recording: Recording, kind: Kind = "flags", smoothed: bool = Fal
     SpecError
         If no model fits the instruments.
     """
-    estimator = (_SMOOTHERS if smoothed else _ESTIMATORS)[kind]()
+    smoother = Smoother() if smoothed else None
+    estimator = OracleEstimator(_KNOWLEDGE[kind](), smoother)
     trial = run_trial(estimator, recording)
     if trial.status != "ok" or trial.covariance is None:
         raise SpecError(f"{recording.scenario}, seed {recording.seed}: there is no bound: {trial.reason}")
     estimated: NDArray[np.bool_] = np.all(trial.estimated, axis=0)
-    every = estimator.smoothed_covariance if isinstance(estimator, _Rts) else trial.covariance
+    every = trial.covariance if smoother is None else smoother.smoothed_covariance
     covariance = every[:, estimated][:, :, estimated]
     return _inverse(covariance), estimated
 

@@ -101,18 +101,20 @@ class AdaptiveFactor(NoiseAdaptation):
     Parameters
     ----------
     statistic : "discrepancy", "residual" or "ratio"
+        Of the innovation, as in the table.
     factor : "two-segment", "three-segment" or "exponential"
+        The function of the statistic that the factor follows: eq. 34, 35 or 36.
     target : "R" or "P"
+        What is divided by the factor: the noise of the measurement, or the covariance of the prediction.
     preset : "default" or "paper"
         ``paper``: statistics and thresholds as printed, no doubt of the prediction with target R.
     c0, c1 : float or None
         Thresholds; None: the preset's (paper: c = 1; c0 = 1.5, c1 = 4).
     together : int
-        See above; 0: never.
+        How many times running a fix and a log have to fail before it is the prediction that is doubted; 0: never.
     """
 
     SMALLEST = 1e-3
-    inflates = True
 
     def __init__(
         self,
@@ -139,6 +141,7 @@ class AdaptiveFactor(NoiseAdaptation):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
         self.factor = FACTORS[factor]
         self.together = 0 if self.printed or target == "P" else together
+        self.inflates = target == "P" or self.together > 0
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

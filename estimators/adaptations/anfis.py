@@ -2,9 +2,9 @@
 
 Section 3 of the paper, the ANFIS itself, is missing from the text at hand. Known are: a five-layer first-order network,
 fed with features of the present moment (of the ship's motion), that gives the covariance of the GNSS. Reconstructed
-after Jang 1993 (`simnav.estimators.adaptations.sugeno`, `simnav.estimators.adaptations.hybrid_learning`): three inputs
+after Jang 1993 (`simnav.estimators.adaptations.sugeno`, `simnav.estimators.training.hybrid_learning`): three inputs
 with three Gaussian memberships, 27 rules. The output is the logarithm of the variance over the datasheet's. What it
-learns from is in `simnav.estimators.adaptations.anfis_training`; `simnav train anfis` learns it again.
+learns from is in `simnav.estimators.training.anfis_training`; `simnav train anfis` learns it again.
 """
 
 from __future__ import annotations

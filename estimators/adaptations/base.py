@@ -51,9 +51,13 @@ class Adaptation:
     inflation : float
         What the solver multiplies P by before it uses the measurement that `adapt` has just seen; for those who
         doubt the prediction rather than the measurement.
+    inflates : bool
+        Whether ``inflation`` is ever other than 1. A window keeps no covariance of a prediction to multiply, and
+        refuses an adaptation that inflates it.
     """
 
     inflation: float = 1.0
+    inflates: bool = False
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

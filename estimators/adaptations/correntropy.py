@@ -77,10 +77,11 @@ class MaximumCorrentropy(NoiseAdaptation):
     bandwidth : float
         In sigma; the filter is the plain one as it grows.
     iterations : int
-        At most.
+        Most iterations of a measurement.
     smallest : float
         Least weight.
     begin : "update" or "prediction"
+        Whether the first weights are those of the residual after the plain update, or of the innovation.
     """
 
     def __init__(

@@ -20,10 +20,11 @@ class FadingMemory(NoiseAdaptation):
     Parameters
     ----------
     memory : float
-        [s]
+        Time in which information loses a factor of e of its weight [s].
     """
 
     together = 0
+    inflates = True
 
     def __init__(self, memory: float = 1000.0):
         if not memory > 0.0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import NoiseAdaptation, normalised_square
-from simnav.estimators.adaptations.prediction import chi_square_limits
+from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.types import Array, Instruments
 
 __all__ = ["ChiSquareGate"]
@@ -23,7 +23,7 @@ class ChiSquareGate(NoiseAdaptation):
     probability : float
         Of a good measurement to pass.
     patience : float
-        [s]
+        Time without a pass after which the filter is doubted [s].
     """
 
     together = 0

@@ -11,7 +11,7 @@ from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import EstimatedNoise, Posterior, Scope
 from simnav.types import Array, Instruments
 
-__all__ = ["InnovationBased", "adaptive_window"]
+__all__ = ["FixedWindow", "InnovationBased", "adaptive_window"]
 
 
 @kernel("i8(f8, f8, f8, f8, i8, i8)")
@@ -125,8 +125,6 @@ class InnovationBased(EstimatedNoise):
         a, in (0, 1].
     newest : bool
         True: eq. 17 as printed.
-    lowest, highest, full, scope
-        See `EstimatedNoise`.
     """
 
     def __init__(
@@ -184,3 +182,29 @@ class InnovationBased(EstimatedNoise):
         )  # fmt: skip
         self.report(self._lengths[name], length)
         return window.estimate
+
+
+class FixedWindow(InnovationBased):
+    """R as the mean over a fixed number of innovations: paper 001's IAE-FGO-Fix in a graph.
+
+    Parameters
+    ----------
+    innovations : int
+        M of eq. 17.
+    """
+
+    def __init__(
+        self,
+        source: Literal["innovation", "residual"] = "innovation",
+        innovations: int = 20,
+        forgetting: float = 0.9,
+        newest: bool = False,
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        full: bool = False,
+        scope: Scope = "fixes",
+    ):
+        super().__init__(
+            source, innovations, innovations, forgetting=forgetting, newest=newest, lowest=lowest, highest=highest,
+            full=full, scope=scope,
+        )  # fmt: skip

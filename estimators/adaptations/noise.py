@@ -11,7 +11,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
-from simnav.estimators.solvers.joseph import joseph_update
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.types import KINDS, Array, Instruments
 
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "normalised_square", "posterior", "scaled"]
@@ -134,12 +134,11 @@ class NoiseAdaptation(Adaptation):
     together : int
         See `PredictionTest`; 0: the prediction is never at fault.
     inflates : bool
-        Whether P is inflated besides. Only `AdaptiveFactor` does: it helps where an IMU is disturbed, and does harm
-        to the attitude where it was the instruments after all.
+        Whether P is inflated besides, where the prediction is at fault. Only `AdaptiveFactor` does: it helps where an
+        IMU is disturbed, and does harm to the attitude where it was the instruments after all.
     """
 
     together = 3
-    inflates = False
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

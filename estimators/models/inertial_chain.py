@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.models.chain import Chain, Columns
+from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import OWN, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
@@ -371,3 +371,8 @@ class InertialChain(Chain):
         rest = np.empty_like(shift)
         _less(shift, step, rest)
         return rest
+
+
+@chain_of.register
+def _(model: InertialModel) -> Chain:
+    return InertialChain(model)

@@ -10,9 +10,9 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.measurements import observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
-from simnav.estimators.solvers.joseph import joseph_update, project
 
 __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
 

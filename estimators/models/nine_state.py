@@ -36,6 +36,8 @@ class NineStateModel(InertialModel):
         Of a DVL velocity [m/s]; 0 for the datasheet's.
     """
 
+    fused = False
+
     def __init__(
         self,
         sigma_position: float = 0.01,

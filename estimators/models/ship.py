@@ -44,7 +44,7 @@ from simnav.estimators.models.ship_kernels import (
 )
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
-__all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel", "require_ship_aids"]
+__all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 
 #: Measurement equations (`simnav.kinds.EQUATIONS`) that the model knows.
 POSITIONS = (kinds.POSITION, kinds.HORIZONTAL_POSITION)
@@ -54,15 +54,6 @@ OBSERVED = (*POSITIONS, *VELOCITIES, kinds.HEADING)
 HEEL = 0.03
 
 
-def require_ship_aids(instruments: Instruments, name: str) -> None:
-    """UnsuitableScenario, in the name of an estimator, without a heading, or a position or speed."""
-    if not instruments.of_equation(kinds.HEADING):
-        compasses = " or ".join(kinds.kinds_with(kinds.HEADING))
-        raise UnsuitableScenario(f"{name} needs a compass ({compasses}); there is none")
-    if not instruments.of_equation(*POSITIONS, *VELOCITIES):
-        raise UnsuitableScenario(f"{name} needs GNSS, a terrain fix, a speed log or a DVL; there is none")
-
-
 class ShipModel(ErrorModel):
     """The model of the module.
 
@@ -70,15 +61,17 @@ class ShipModel(ErrorModel):
     ----------
     acceleration : float
         Noise density of the speed [m/s/sqrt(s)].
-    turn_rate, turn_time : float
-        Stationary sigma [rad/s] and correlation time [s] of the turn rate.
+    turn_rate_deg, turn_time : float
+        Sigma [deg/s] and correlation time [s] of the turn rate.
     current, current_time : float
-        Likewise of each component of the current [m/s], [s].
+        Sigma of each component of the current [m/s], and its correlation time [s].
     sway : float
         Sigma of the sideways velocity through the water [m/s].
 
     Attributes
     ----------
+    turn_rate : float
+        Sigma of the turn rate [rad/s].
     position : (3,) array
         Latitude, longitude [rad] and height [m].
     x : (n,) array
@@ -98,20 +91,29 @@ class ShipModel(ErrorModel):
     def __init__(
         self,
         acceleration: float = 0.05,
-        turn_rate: float = radians(0.6),
+        turn_rate_deg: float = 0.6,
         turn_time: float = 10.0,
         current: float = 0.3,
         current_time: float = 3600.0,
         sway: float = 0.2,
     ):
         self.acceleration = acceleration
-        self.turn_rate, self.turn_time = turn_rate, turn_time
+        self.turn_rate, self.turn_time = radians(turn_rate_deg), turn_time
         self.current, self.current_time = current, current_time
         self.sway = sway
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether it is a position, velocity, speed or heading."""
         return instrument.equation in OBSERVED
+
+    def choose(self, instruments: Instruments, name: str) -> ErrorModel:
+        """Itself; UnsuitableScenario without a heading, or without a position and a speed."""
+        if not instruments.of_equation(kinds.HEADING):
+            compasses = " or ".join(kinds.kinds_with(kinds.HEADING))
+            raise UnsuitableScenario(f"{name} needs a compass ({compasses}); there is none")
+        if not instruments.of_equation(*POSITIONS, *VELOCITIES):
+            raise UnsuitableScenario(f"{name} needs GNSS, a terrain fix, a speed log or a DVL; there is none")
+        return self
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario if there is nothing that gives a speed and a heading."""

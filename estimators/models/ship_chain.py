@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.earth import radii_scalar
-from simnav.estimators.models.chain import Chain, Columns
+from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_kernels import (
     E,
@@ -197,3 +197,8 @@ class ShipChain(Chain):
             step, along,
         )  # fmt: skip
         return along
+
+
+@chain_of.register
+def _(model: ShipModel) -> Chain:
+    return ShipChain(model)

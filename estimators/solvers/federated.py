@@ -39,13 +39,15 @@ Electronic Systems 26(3), 1990; paper 004 (the rival that it measures itself aga
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.propagation import propagate_covariance
@@ -84,6 +86,13 @@ class FederatedEstimator(KalmanEstimator):
         Of the aiding sensors in the scenario's order, above 0; with the master's they sum to 1. Empty: equal shares.
     """
 
+    pieces = ("model", "adaptation")
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "iteration": "a local filter corrects its own error, not the reference that is linearised about",
+        "smoother": "every local filter has a covariance of its own",
+    }
+    assimilates = False
     model: InertialModel
 
     def __init__(
@@ -161,7 +170,7 @@ class FederatedEstimator(KalmanEstimator):
 
     def _observe(self, m: Measurement) -> Observation | None:
         """What a measurement says of its local filter's state."""
-        linearised = self._linearise(m)
+        linearised = self.model.measure(m)
         if linearised is None:
             return None
         local = self._locals[m.instrument]
@@ -180,9 +189,13 @@ class FederatedEstimator(KalmanEstimator):
         if self._period == 0.0:
             self._fuse()
 
-    def _correct(self, dx: Array) -> None:
+    def _absorb(self, observation: Observation) -> float:
         """Correct the local filter whose turn it is."""
-        self._correcting.error[:] += dx
+        residual, cross, predicted, noise = observation
+        nis: float = joseph_update(self.covariance, cross, predicted + noise, residual, self._correction)
+        if nis >= 0.0:
+            self._correcting.error[:] += self._correction
+        return nis
 
     def _fuse(self) -> None:
         """Add up the information of all local filters; correct the reference; share the sum out again."""

@@ -6,27 +6,25 @@ long past are linearised or weighed anew. At the end it is the batch solution: t
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.models.chains import Chain
+from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.smoother import smoother_gains
 from simnav.estimators.solvers.window import WindowEstimator
+from simnav.estimators.weightings.base import Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 __all__ = ["FullGraph"]
 
 
 class FullGraph(WindowEstimator):
-    """A graph that keeps all its nodes, and smooths; put it before a window's class that has a model of its own::
-
-        class FgoFull(FullGraph, InertialWindow): ...
+    """A window that keeps all its nodes, and smooths.
 
     Parameters
     ----------
-    *model
-        What the window's class is given.
-    tolerance, iterations
+    model, adaptation, weighting, tolerance, iterations, spacing
         As for `WindowEstimator`.
 
     Attributes
@@ -35,10 +33,22 @@ class FullGraph(WindowEstimator):
         Of the trajectory that `smooth` returned.
     """
 
+    slow = True
     incremental = False
 
-    def __init__(self, *model: Any, tolerance: float = 1e-3, iterations: int = 10):
-        super().__init__(*model, window=None, tolerance=tolerance, iterations=iterations)
+    def __init__(
+        self,
+        model: ModelChoice | Chain,
+        adaptation: Adaptation | None = None,
+        weighting: Weighting | None = None,
+        *,
+        tolerance: float = 1e-3,
+        iterations: int = 10,
+        spacing: float = 0.2,
+    ):
+        super().__init__(
+            model, adaptation, weighting, window=None, tolerance=tolerance, iterations=iterations, spacing=spacing
+        )
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""

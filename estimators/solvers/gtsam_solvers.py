@@ -24,12 +24,13 @@ Letters 5(2), 2020; F. Dellaert and others, GTSAM 4.3.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from simnav.estimator import Estimator
-from simnav.estimators.models.suitable import require_inertial_aids
+from simnav.estimators.composition import Solver
+from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.admission import LATE, Admission
 from simnav.estimators.solvers.gtsam_graph import InertialGraph, Observation
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
@@ -53,7 +54,7 @@ LEAST_WEIGHT = 1e-4
 _Y = ord("y") << 56
 
 
-class GtsamEstimator(Estimator):
+class GtsamEstimator(Solver):
     """What the rows share; a subclass makes the solver and says which nodes it needs.
 
     Parameters
@@ -65,6 +66,9 @@ class GtsamEstimator(Estimator):
     """
 
     slow = True
+    refuses: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("model", "adaptation", "weighting"), "GTSAM's graph is made from our inertial model, to be compared with it"
+    )
     #: Whether every end of a step is a node.
     every_step = False
 
@@ -78,7 +82,7 @@ class GtsamEstimator(Estimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and at least one aiding instrument."""
-        require_inertial_aids(instruments, self.name)
+        InertialModel().choose(instruments, self.label)
         prior, values = self.graph.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if sheet.equation and self.graph.model.observes(sheet)]
         self._admission = Admission(instruments, observed)

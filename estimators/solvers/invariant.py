@@ -36,11 +36,14 @@ Bonnabel, *Associating uncertainty to extended poses for on Lie group IMU preint
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.algebra.joseph import joseph_update
+from simnav.estimators.models.base import Observation
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.rotation import left_jacobian, skew
@@ -63,6 +66,14 @@ class InvariantKalmanEstimator(KalmanEstimator):
         Which error is invariant.
     """
 
+    pieces = ("model", "adaptation")
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "iteration": "an iterated correction is not one on the group",
+        "smoother": "it turns the covariance after a correction, which a smoother does not undo",
+    }
+    assimilates = False
+
     def __init__(
         self, model: InertialModel, adaptation: Adaptation | None = None, error: Literal["left", "right"] = "left"
     ):
@@ -70,6 +81,13 @@ class InvariantKalmanEstimator(KalmanEstimator):
         if error not in ("left", "right"):
             raise ValueError(f'error is {error!r}; it must be "left" or "right"')
         self.error = error
+
+    def _absorb(self, observation: Observation) -> float:
+        residual, cross, predicted, noise = observation
+        nis: float = joseph_update(self.covariance, cross, predicted + noise, residual, self._correction)
+        if nis >= 0.0:
+            self._correct(self._correction)
+        return nis
 
     def _correct(self, dx: Array) -> None:
         """Correct on the group, and take the covariance of the invariant error along."""

@@ -22,12 +22,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Observation
-from simnav.estimators.solvers.joseph import joseph_update
 from simnav.rotation import left_jacobian
 from simnav.types import Array, Measurement
 
-__all__ = ["Iteration", "absorb_iterated"]
+__all__ = ["Iteration", "absorb_iterated", "poor_heading"]
 
 
 class Iteration(NamedTuple):
@@ -65,6 +65,18 @@ class Iteration(NamedTuple):
             return False
         heading = model.attitude_at + 2
         return float(covariance[heading, heading]) > radians(self.above_deg) ** 2
+
+
+def poor_heading(iterate_above_deg: float | None = None) -> Iteration | None:
+    """Iteration for a start from a poor heading.
+
+    Parameters
+    ----------
+    iterate_above_deg : float, optional
+        While the heading's standard deviation is above this [deg], measurements are linearised again until the
+        correction stands still, as in ``iekf``. None: never; 0: always.
+    """
+    return None if iterate_above_deg is None else Iteration(iterate_above_deg)
 
 
 def absorb_iterated(

@@ -1,7 +1,7 @@
 """The error-state extended Kalman filter with feedback, over any model.
 
 Every measurement is used at its own time of validity: the state is propagated to it, inside the step. The covariance is
-updated in Joseph's form (`simnav.estimators.solvers.joseph`).
+updated in Joseph's form (`simnav.estimators.algebra.joseph`).
 
 Measurements that cannot be used are counted, in the diagnostic ``skipped``: values that mean nothing (not finite, not
 on Earth), those older than the state, repetitions, and innovations whose covariance is singular.
@@ -11,60 +11,90 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import hypot
+from typing import ClassVar
 
 import numpy as np
 
-from simnav.estimator import Estimator
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
+from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.admission import Admission
 from simnav.estimators.solvers.iterated import Iteration, absorb_iterated
-from simnav.estimators.solvers.joseph import joseph_update
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
+from simnav.estimators.solvers.smoother import Smoother
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 __all__ = ["KalmanEstimator"]
 
-#: Of `KalmanEstimator`: what is done with a measurement.
-_HOOKS = ("_observe", "_linearise", "_correct")
 
-
-class KalmanEstimator(Estimator):
-    """An estimator made of a model and an adaptation; a subclass says which, and registers.
+class KalmanEstimator(Solver):
+    """The filter of the module. Those that observe or correct otherwise are subclasses: other solvers.
 
     Parameters
     ----------
-    model : ErrorModel
+    model : ErrorModel or ModelChoice
     adaptation : Adaptation, optional
         None: every measurement counts with its nominal noise.
     iteration : Iteration, optional
         None: every measurement is linearised once. Where measurements are iterated, the diagnostic ``iterations`` is
         the most linearisations that one of them took.
+    smoother : Smoother, optional
+        Smooths the trajectory after the last update.
 
     Attributes
     ----------
+    model : ErrorModel
+        From `reset` on.
     covariance : (n, n) array
         Of the model's error.
     """
 
-    def __init__(self, model: ErrorModel, adaptation: Adaptation | None = None, iteration: Iteration | None = None):
-        self.model = model
-        self.adaptation = adaptation or Adaptation()
+    pieces: ClassVar[tuple[str, ...]] = ("model", "adaptation", "iteration", "smoother")
+    refuses: ClassVar[Mapping[str, str]] = {"weighting": "WeightedKalmanEstimator is the filter that takes one"}
+    #: Whether the model may do in one go what `_observe` and `_absorb` do (`ErrorModel.assimilate`), where the noise is
+    #: the nominal one. A solver that does one of the two in a way of its own says False.
+    assimilates: ClassVar[bool] = True
+
+    model: ErrorModel
+
+    def __init__(
+        self,
+        model: ModelChoice,
+        adaptation: Adaptation | None = None,
+        iteration: Iteration | None = None,
+        smoother: Smoother | None = None,
+    ):
+        self._choice = model
+        if isinstance(model, ErrorModel):
+            self.model = model
+        self.adaptation = adaptation
         self.iteration = None if iteration is None else iteration.check()
+        self.smoother = smoother
+        self._stepwise = smoother is not None and smoother.stepwise
+        if self._stepwise and iteration is not None:
+            raise ValueError(f"{type(smoother).__name__} knows one Jacobian of a measurement; iterated, it has several")
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        self.model = self._chosen(instruments)
         self.covariance = self.model.begin(start, instruments)
-        self.adaptation.reset(instruments)
+        if self.adaptation is not None:
+            self.adaptation.reset(instruments)
         self._names = [name for name, sheet in instruments.items() if self.model.observes(sheet)]
         self._admission = Admission(instruments, self._names)
         self._correction = np.empty(self.model.size)
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
-        # Where no hook is in the way, the model may do in one go what is else done step by step.
-        hooks = {name for name in _HOOKS if getattr(type(self), name) is not getattr(KalmanEstimator, name)}
-        self._direct, self._corrects = "_linearise" not in hooks, "_correct" not in hooks
-        self._plain = not hooks and type(self.adaptation) is Adaptation
+        self._plain = self.assimilates and self.adaptation is None and not self._stepwise
+        self._linearised: Linearised | None = None
+        if self.smoother is not None:
+            self.smoother.begin(self.model, [instruments[name] for name in self._names])
+
+    def _chosen(self, instruments: Instruments) -> ErrorModel:
+        """The model of a run; a hook."""
+        return self._choice.choose(instruments, self.label)
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
@@ -72,19 +102,42 @@ class KalmanEstimator(Estimator):
         model.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
+        advance = self._propagate if self.smoother is None else self._advance
         for m in self._admission.admit(measurements, model.time):
-            self._propagate(min(m.time, measurements.time))
+            advance(min(m.time, measurements.time))
             self._take(m, diagnostics, flagged)
-        self._propagate(measurements.time)
+        advance(measurements.time)
         diagnostics["skipped"] = float(self._admission.skipped)
-        diagnostics.update(self.adaptation.diagnostics())
+        if self.adaptation is not None:
+            diagnostics.update(self.adaptation.diagnostics())
         estimate = self._estimate()
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
+        if self.smoother is not None:
+            self.smoother.end_step(measurements.time)
         return estimate
+
+    def smooth(self) -> NavigationStates | None:
+        """The smoother's trajectory at the ends of all steps; None before the first, and without a smoother."""
+        return None if self.smoother is None else self.smoother.smooth(self.model, self.covariance)
+
+    @property
+    def smoothed_covariance(self) -> Array:
+        """(T, 9, 9) array: of the trajectory that `smooth` returned."""
+        assert self.smoother is not None, "it has no smoother"
+        return self.smoother.smoothed_covariance
 
     def _propagate(self, until: float) -> None:
         """Advance the state and the covariance; a hook."""
         self.model.propagate(self.covariance, until)
+
+    def _advance(self, until: float) -> None:
+        """`_propagate`, the smoother looking on."""
+        assert self.smoother is not None
+        begin = self.model.time
+        if until > begin:
+            self.smoother.depart(self.model, self.covariance)
+            self._propagate(until)
+            self.smoother.arrive(self.model, self.covariance, until - begin)
 
     def _estimate(self) -> Estimate:
         """The estimate at the end of a step; a hook."""
@@ -92,21 +145,22 @@ class KalmanEstimator(Estimator):
 
     def _observe(self, m: Measurement) -> Observation | None:
         """What a measurement says of the state; None where nothing usable; a hook."""
-        if self._direct:
+        if not self._stepwise:
             return self.model.innovate(m, self.covariance)
-        linearised = self._linearise(m)
-        return None if linearised is None else linearised.project(self.covariance)
+        self._linearised = self.model.measure(m)
+        return None if self._linearised is None else self._linearised.project(self.covariance)
 
-    def _linearise(self, m: Measurement) -> Linearised | None:
-        """The measurement at the present estimate; a hook."""
-        return self.model.measure(m)
+    def _absorb(self, observation: Observation) -> float:
+        """Correct the state and the covariance, with the noise that is to be used; a hook.
 
-    def _correct(self, dx: Array) -> None:
-        """Correct the state, the covariance being updated already; a hook."""
-        self.model.correct(dx)
+        Returns the normalised innovation squared, -1 where nothing was changed; ``_correction`` is what was added.
+        """
+        if not self._stepwise:
+            return self.model.absorb(observation, self.covariance, self._correction)
+        return ErrorModel.absorb(self.model, observation, self.covariance, self._correction)
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Correct the state by one measurement."""
+        """Correct the state by one measurement; a hook."""
         iteration = self.iteration
         if iteration is not None and not iteration.applies(self.model, self.covariance):
             iteration = None
@@ -120,32 +174,31 @@ class KalmanEstimator(Estimator):
             self._admission.skipped += 1
             return
         residual, cross, predicted, noise = observation
-        chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, self.covariance, cross))
-        if chosen is None:
-            flagged.append((m.instrument, m.time))
-            return
-        inflation = self.adaptation.inflation
-        if inflation != 1.0:
-            for matrix in (self.covariance, cross, predicted):
-                matrix *= inflation
+        if self.adaptation is not None:
+            chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, self.covariance, cross))
+            if chosen is None:
+                flagged.append((m.instrument, m.time))
+                return
+            noise, inflation = chosen, self.adaptation.inflation
+            if inflation != 1.0:
+                for matrix in (self.covariance, cross, predicted):
+                    matrix *= inflation
+        observation = residual, cross, predicted, noise
         if iteration is not None:
-            chosen_observation = residual, cross, predicted, chosen
-            nis, count = absorb_iterated(
-                self.model, m, chosen_observation, self.covariance, self._correction, iteration
-            )
+            nis, count = absorb_iterated(self.model, m, observation, self.covariance, self._correction, iteration)
             diagnostics["iterations"] = max(float(count), float(diagnostics.get("iterations", 0.0)))
-        elif self._corrects:
-            nis = self.model.absorb((residual, cross, predicted, chosen), self.covariance, self._correction)
         else:
-            nis = joseph_update(self.covariance, cross, predicted + chosen, residual, self._correction)
-            if nis >= 0.0:
-                self._correct(self._correction)
-        self._note(m, nis, hypot(*residual.tolist()), diagnostics)
+            nis = self._absorb(observation)
+        self._note(m, nis, hypot(*residual.tolist()), diagnostics, noise)
 
-    def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
+    def _note(
+        self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array], noise: Array | None = None
+    ) -> None:
         """Note the innovation of a measurement, or that it was skipped (``nis`` below 0)."""
         if nis < 0.0:
             self._admission.skipped += 1
             return
         innovation, normalised = self._keys[m.instrument]
         diagnostics[innovation], diagnostics[normalised] = size, nis
+        if self.smoother is not None:
+            self.smoother.use(self._correction, self._linearised, noise)

@@ -28,11 +28,17 @@ feedback configurations); P. D. Groves 2013, section 14.1.1 (open loop).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
-from simnav.estimators.models.base import Linearised
+from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.algebra.joseph import joseph_update
+from simnav.estimators.models.base import Observation
+from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
+from simnav.types import Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["LinearKalmanEstimator"]
 
@@ -40,11 +46,27 @@ __all__ = ["LinearKalmanEstimator"]
 class LinearKalmanEstimator(KalmanEstimator):
     """The solver of the module, over any model that can carry an error along.
 
+    Parameters
+    ----------
+    model, adaptation
+        As for `KalmanEstimator`.
+
     Attributes
     ----------
     x : (n,) array
         The correction: minus the estimated error of the model's state.
     """
+
+    pieces = ("model", "adaptation")
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "iteration": "it linearises about the nominal trajectory, which no measurement moves",
+        "smoother": "its corrections stay outside of the state that a smoother goes back over",
+    }
+    assimilates = False
+
+    def __init__(self, model: ModelChoice, adaptation: Adaptation | None = None):
+        super().__init__(model, adaptation)
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
@@ -63,14 +85,19 @@ class LinearKalmanEstimator(KalmanEstimator):
             self.model.propagate(self.covariance, until)
             self.model.carry(self.x, elapsed)
 
-    def _linearise(self, m: Measurement) -> Linearised | None:
+    def _observe(self, m: Measurement) -> Observation | None:
         linearised = self.model.measure(m)
         if linearised is None:
             return None
-        return linearised._replace(innovation=linearised.innovation - linearised.jacobian @ self.x)
+        innovation = linearised.innovation - linearised.jacobian @ self.x
+        return linearised._replace(innovation=innovation).project(self.covariance)
 
-    def _correct(self, dx: Array) -> None:
-        self.x += dx
+    def _absorb(self, observation: Observation) -> float:
+        residual, cross, predicted, noise = observation
+        nis: float = joseph_update(self.covariance, cross, predicted + noise, residual, self._correction)
+        if nis >= 0.0:
+            self.x += self._correction
+        return nis
 
     def _estimate(self) -> Estimate:
         nominal = self.model.snapshot()

@@ -24,18 +24,21 @@ Choices (``ALGORITHMS.md`` leaves them open; paper 000 compares with a UKF and g
   motion lack the process noise, and the innovation's covariance would lack H Q H'.
 - They are drawn once between measurements, not at every IMU sample: the motion of minutes is nearly linear in its
   errors, and the RMSE is the same.
-- The update of the covariance is Joseph's (`simnav.estimators.solvers.joseph.joseph_update`), and the square root
+- The update of the covariance is Joseph's (`simnav.estimators.algebra.joseph.joseph_update`), and the square root
   accepts a semi-definite matrix, so that a state known exactly does no harm.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
+from typing import ClassVar
 
 import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.algebra.cholesky import factorise
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.points import PointModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
@@ -57,22 +60,11 @@ def draw_points(covariance, spread, points):  # type: ignore[no-untyped-def]
         Overwritten.
     """
     n = covariance.shape[0]
-    for j in range(n):
-        for i in range(j):
-            points[j, i] = 0.0
-        x = covariance[j, j]
-        for k in range(j):
-            x -= points[k, j] * points[k, j]
-        pivot = sqrt(x) if x > 1e-14 * covariance[j, j] else 0.0
-        points[j, j] = pivot
-        for i in range(j + 1, n):
-            x = covariance[i, j]
-            for k in range(j):
-                x -= points[k, i] * points[k, j]
-            points[j, i] = x / pivot if pivot > 0.0 else 0.0
+    L = covariance.copy()
+    factorise(L, n, 1e-14, np.empty(n))
     for j in range(n):
         for i in range(n):
-            points[j, i] *= spread
+            points[j, i] = L[i, j] * spread if i >= j else 0.0
             points[n + j, i] = -points[j, i]
 
 
@@ -92,6 +84,13 @@ class SigmaPointEstimator(KalmanEstimator):
         Above -n.
     """
 
+    pieces = ("model", "adaptation")
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "iteration": "it linearises no measurement",
+        "smoother": "it has no transition matrix, only the points that went through the motion",
+    }
+    assimilates = False
     model: PointModel
 
     def __init__(
@@ -139,7 +138,7 @@ class SigmaPointEstimator(KalmanEstimator):
 
     def _observe(self, m: Measurement) -> Observation | None:
         """Innovation, its covariance and its cross-covariance with the state, from points drawn afresh."""
-        linearised = self._linearise(m)
+        linearised = self.model.measure(m)
         if linearised is None:
             return None
         points = self._points

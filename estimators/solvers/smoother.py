@@ -23,14 +23,15 @@ Source: H. E. Rauch, F. Tung and C. T. Striebel, "Maximum likelihood estimates o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import ClassVar
 
 import numpy as np
 
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
+from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.types import Array, Datasheet, NavigationStates
 
-__all__ = ["SmoothingEstimator", "Stretches", "scale_of", "smoother_gains"]
+__all__ = ["Smoother", "Stretches", "scale_of", "smoother_gains"]
 
 #: Stretches are stored, and gains are solved for, this many at a time.
 _BATCH = 512
@@ -101,25 +102,28 @@ class Stretches:
         return self.covariance[: self.count], self.transition[: self.count], self.predicted[: self.count]
 
 
-class SmoothingEstimator(KalmanEstimator):
-    """A Kalman filter that smooths after the last update; put it before the filter's class::
-
-        class EkfRts(SmoothingEstimator, Ekf): ...
+class Smoother:
+    """The smoother of the module, a piece of `KalmanEstimator`: it looks on while the filter runs, then goes back.
 
     It stores three (n, n) matrices a stop: 5 kB at 15 states, 30 MB for 6000 of them.
 
     Attributes
     ----------
+    stepwise : bool
+        Whether it needs the Jacobian and the noise of each measurement: the filter then linearises and corrects step by
+        step.
     smoothed_covariance : (T, 9, 9) array
         Of the trajectory that `smooth` returned.
     """
 
-    def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(start, instruments)
-        self._stretches = [Stretches(self.model.size)]
-        self._here = np.zeros(self.model.size)
-        self._identity = np.eye(self.model.size)
+    stepwise: ClassVar[bool] = False
+    smoothed_covariance: Array
+
+    def begin(self, model: ErrorModel, observed: Sequence[Datasheet]) -> None:
+        """Begin a run, with the instruments that the model observes."""
+        self._stretches = [Stretches(model.size)]
+        self._here = np.zeros(model.size)
+        self._identity = np.eye(model.size)
         self._ends: list[tuple[int, float]] = []
 
     @property
@@ -127,40 +131,38 @@ class SmoothingEstimator(KalmanEstimator):
         """How many stretches have been recorded: the index of the present stop."""
         return (len(self._stretches) - 1) * _BATCH + self._stretches[-1].count
 
-    def update(self, measurements: Measurements) -> Estimate:
-        """Take one step's measurements; the filter's own estimate."""
-        estimate = super().update(measurements)
-        self._ends.append((self.stops, measurements.time))
-        return estimate
-
-    def _propagate(self, until: float) -> None:
-        model, into = self.model, self._stretches[-1]
-        begin = model.time
-        if until <= begin:
-            return
-        k = into.count
-        if k == _BATCH:
-            into, k = Stretches(model.size), 0
+    def depart(self, model: ErrorModel, covariance: Array) -> None:
+        """Note the state and its covariance, which are about to be propagated."""
+        into = self._stretches[-1]
+        if into.count == _BATCH:
+            into = Stretches(model.size)
             self._stretches.append(into)
         into.states.append(model.snapshot())
-        into.covariance[k] = self.covariance
-        super()._propagate(until)
+        into.covariance[into.count] = covariance
+
+    def arrive(self, model: ErrorModel, covariance: Array, elapsed: float) -> None:
+        """Note the transition and the predicted covariance."""
+        into = self._stretches[-1]
+        k = into.count
         into.transition[k] = self._identity
-        model.carry(into.transition[k], until - begin)
-        into.predicted[k] = self.covariance
+        model.carry(into.transition[k], elapsed)
+        into.predicted[k] = covariance
         into.correction[k] = self._here
         into.count = k + 1
         self._here[:] = 0.0
 
-    def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
-        super()._note(m, nis, size, diagnostics)
-        if nis >= 0.0:
-            self._here += self._correction
+    def use(self, correction: Array, linearised: Linearised | None, noise: Array | None) -> None:
+        """Note the correction that a measurement made; one that is ``stepwise`` is given its Jacobian and noise."""
+        self._here += correction
 
-    def _backward(self) -> Iterator[tuple[int, list[Array], Array, Array]]:
+    def end_step(self, time: float) -> None:
+        """Note that a step ends at the present stop."""
+        self._ends.append((self.stops, time))
+
+    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
         """From the last stop to the first: its index, the filter's state there, c and S; a hook."""
-        c, s = np.zeros(self.model.size), self.covariance
-        yield self.stops, self.model.snapshot(), c, s
+        c, s = np.zeros(model.size), covariance
+        yield self.stops, model.snapshot(), c, s
         ahead, stop = self._here, self.stops
         for stretches in reversed(self._stretches):
             p, phi, m = stretches.matrices()
@@ -175,20 +177,28 @@ class SmoothingEstimator(KalmanEstimator):
                 stop -= 1
                 yield stop, stretches.states[k], c, s
 
-    def smooth(self) -> NavigationStates | None:
-        """The smoothed trajectory at the ends of all steps; None before the first."""
+    def smooth(self, model: ErrorModel, covariance: Array) -> NavigationStates | None:
+        """The smoothed trajectory at the ends of all steps; None before the first.
+
+        Parameters
+        ----------
+        model : ErrorModel
+            At the end of the run; it is left there.
+        covariance : (n, n) array
+            Likewise.
+        """
         if not self._ends:
             return None
-        model, count = self.model, len(self._ends)
+        count = len(self._ends)
         position, velocity, attitude = np.full((3, count, 3), np.nan)
         self.smoothed_covariance = np.full((count, 9, 9), np.nan)
         now, row = model.snapshot(), count - 1
-        for stop, state, correction, covariance in self._backward():
+        for stop, state, correction, spread in self._backward(model, covariance):
             if row < 0 or self._ends[row][0] != stop:
                 continue
             model.restore(state)
             model.correct(correction)
-            out = model.estimate(covariance)
+            out = model.estimate(spread)
             while row >= 0 and self._ends[row][0] == stop:  # a step may hold no time at all
                 for series, vector in ((position, out.position), (velocity, out.velocity), (attitude, out.attitude)):
                     if vector is not None:

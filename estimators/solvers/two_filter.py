@@ -32,19 +32,18 @@ IEEE Trans. Automatic Control 14(4), 1969; G. J. Bierman, *Factorization Methods
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from simnav.estimator import UnsuitableScenario
-from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.models.base import Linearised
-from simnav.estimators.solvers.joseph import joseph_update
-from simnav.estimators.solvers.smoother import SmoothingEstimator, Stretches, scale_of
-from simnav.types import Array, InitialState, Instruments, Measurement
+from simnav.estimators.algebra.joseph import joseph_update
+from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.solvers.smoother import Smoother, Stretches, scale_of
+from simnav.types import Array, Datasheet
 
-__all__ = ["TwoFilterEstimator"]
+__all__ = ["TwoFilterSmoother"]
 
 
 class _Used(NamedTuple):
@@ -55,73 +54,46 @@ class _Used(NamedTuple):
     correction: Array
 
 
-class _Witness(Adaptation):
-    """Lets another adaptation decide, and remembers the noise that it chose."""
+class TwoFilterSmoother(Smoother):
+    """The smoother of the module, a piece of `KalmanEstimator`.
 
-    def __init__(self, inner: Adaptation):
-        self.inner = inner
-        self.noise = np.empty((0, 0))
+    It costs more than `Smoother`, and stores the measurements beside; it is there to check that one.
 
-    @property
-    def inflation(self) -> float:  # type: ignore[override]
-        return self.inner.inflation
-
-    def reset(self, instruments: Instruments) -> None:
-        self.inner.reset(instruments)
-
-    def adapt(self, innovation: Innovation) -> Array | None:
-        chosen = self.inner.adapt(innovation)
-        if chosen is not None:
-            self.noise = chosen
-        return chosen
-
-    def diagnostics(self) -> dict[str, float | Array]:
-        return self.inner.diagnostics()
-
-
-class TwoFilterEstimator(SmoothingEstimator):
-    """A Kalman filter that smooths after the last update, in two-filter form; put it before the filter's class.
-
-    It costs more than `SmoothingEstimator`, and stores the measurements beside; it is there to check that one.
-
-    Attributes
+    Parameters
     ----------
     seed_backward : bool
-        Start the backward filter with the forward result, as paper 004 prints it, instead of with nothing. Uses all
-        data twice: over-confident.
+        Start the backward filter with the forward result, as the post-processing paper prints it, instead of with
+        nothing. Uses all data twice: over-confident.
     """
 
-    seed_backward = False
+    stepwise = True
 
-    def reset(self, start: InitialState, instruments: Instruments) -> None:
+    def __init__(self, seed_backward: bool = False):
+        self.seed_backward = seed_backward
+
+    def begin(self, model: ErrorModel, observed: Sequence[Datasheet]) -> None:
         """Begin a run; UnsuitableScenario where an instrument is said to be without noise."""
-        exact = [s.name for s in instruments.values() if self.model.observes(s) and not np.all(s.sigma > 0.0)]
+        exact = [s.name for s in observed if not np.all(s.sigma > 0.0)]
         if exact:
             raise UnsuitableScenario(f"a filter that runs backward needs sigmas above 0; {exact[0]}'s are not")
-        if not isinstance(self.adaptation, _Witness):
-            self.adaptation = _Witness(self.adaptation)
-        super().reset(start, instruments)
+        super().begin(model, observed)
         self._seen: dict[int, list[_Used]] = {}
-        self._linearised: Linearised | None = None
 
-    def _linearise(self, m: Measurement) -> Linearised | None:
-        self._linearised = super()._linearise(m)
-        return self._linearised
+    def use(self, correction: Array, linearised: Linearised | None, noise: Array | None) -> None:
+        """Note a measurement, whitened, and the correction that it made."""
+        super().use(correction, linearised, noise)
+        assert linearised is not None
+        assert noise is not None
+        residual, jacobian, _ = linearised
+        white = np.linalg.solve(np.linalg.cholesky(noise), np.column_stack([jacobian, residual]))
+        self._seen.setdefault(self.stops, []).append(_Used(white[:, -1], white[:, :-1], correction.copy()))
 
-    def _correct(self, dx: Array) -> None:
-        super()._correct(dx)
-        assert self._linearised is not None
-        assert isinstance(self.adaptation, _Witness)
-        residual, jacobian, _ = self._linearised
-        white = np.linalg.solve(np.linalg.cholesky(self.adaptation.noise), np.column_stack([jacobian, residual]))
-        self._seen.setdefault(self.stops, []).append(_Used(white[:, -1], white[:, :-1], dx.copy()))
-
-    def _backward(self) -> Iterator[tuple[int, list[Array], Array, Array]]:
-        n, stop = self.model.size, self.stops
+    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
+        n, stop = model.size, self.stops
         root, known = np.zeros((0, n)), np.zeros(0)  # U and z, just after the measurements of the stop
         if self.seed_backward:
-            root, known = _information_root(self.covariance), np.zeros(n)
-        yield (stop, self.model.snapshot(), *_combine(self.covariance, root, known))
+            root, known = _information_root(covariance), np.zeros(n)
+        yield (stop, model.snapshot(), *_combine(covariance, root, known))
         array = np.zeros((0, 0))
         for stretches in reversed(self._stretches):
             noise = _noise_roots(stretches)

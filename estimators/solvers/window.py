@@ -2,7 +2,7 @@
 
 Every time of a measurement is a node of the graph (`simnav.estimators.models.chain`), every measurement and every
 stretch of motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares:
-linearise, weigh, solve (`simnav.estimators.solvers.block_tridiagonal`), retract, until the next step would be small. A
+linearise, weigh, solve (`simnav.estimators.algebra.block_tridiagonal`), retract, until the next step would be small. A
 step that raises the cost is taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what
 they say of the node that is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L.
 Matthies, G. Sukhatme, "Sliding window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So
@@ -37,18 +37,21 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
+from collections.abc import Mapping
 from math import hypot, isfinite
 from typing import ClassVar
 
 import numpy as np
 
-from simnav.estimator import Estimator
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.adaptations.weighting import Factors, Weighting
-from simnav.estimators.models.chain import Chain
+from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.composition import Solver
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.chains import Chain, chain_of
+from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.admission import Admission
-from simnav.estimators.solvers.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
 from simnav.estimators.solvers.cost_test import CostTest
+from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["WindowEstimator"]
@@ -61,14 +64,15 @@ FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 FAULTY_WEIGHT = 0.5
 
 
-class WindowEstimator(Estimator):
+class WindowEstimator(Solver):
     """The solver of the module.
 
     Parameters
     ----------
-    chain : Chain
+    model : ErrorModel, ModelChoice or Chain
+        One for which `simnav.estimators.models.chain.chain_of` knows a chain.
     adaptation : Adaptation, optional
-        None: every measurement counts with its nominal noise. Its ``inflation`` is not for graphs.
+        None: every measurement counts with its nominal noise. Not one that ``inflates``.
     weighting : Weighting, optional
         None: every factor counts in full.
     window : int or None
@@ -82,22 +86,29 @@ class WindowEstimator(Estimator):
     spacing : float
         Measurements at times closer to the newest node than this [s] get no node of their own (`Chain`, folds), unless
         they are the last of their step. 0: every time of a measurement is a node.
+    every_sample : bool
+        A node for every IMU sample, instead of one preintegrated factor between measurements: the graph of the
+        post-processing paper without its equivalent IMU factor.
 
     Attributes
     ----------
+    chain : Chain
+        From `reset` on.
     covariance : (n, n) array
         Of the newest node.
     """
 
-    #: A node for every IMU sample, instead of one preintegrated factor between measurements (paper 004's un-simplified
-    #: graph).
-    every_sample: ClassVar[bool] = False
+    pieces = ("model", "adaptation", "weighting")
+    refuses: ClassVar[Mapping[str, str]] = {
+        "iteration": "it linearises anew until the nodes have converged",
+        "smoother": "the full graph is the window that smooths",
+    }
     #: Whether a step takes the older nodes as they were eliminated before.
     incremental: ClassVar[bool] = True
 
     def __init__(
         self,
-        chain: Chain,
+        model: ModelChoice | Chain,
         adaptation: Adaptation | None = None,
         weighting: Weighting | None = None,
         *,
@@ -105,6 +116,7 @@ class WindowEstimator(Estimator):
         tolerance: float = 1e-3,
         iterations: int = 10,
         spacing: float = 0.2,
+        every_sample: bool = False,
     ):
         if window is not None and window < 1:
             raise ValueError(f"window is {window}; it must hold at least 1 epoch")
@@ -114,13 +126,22 @@ class WindowEstimator(Estimator):
             raise ValueError(f"iterations is {iterations}; at least 1 is needed")
         if not 0.0 <= spacing < np.inf:
             raise ValueError(f"spacing is {spacing}; it is a time in seconds, 0 or more")
-        self.chain = chain
+        if adaptation is not None and adaptation.inflates:
+            raise ValueError(
+                f"{type(adaptation).__name__}, as it is set, inflates the covariance of the prediction; a window keeps "
+                "none, so that it adapts filters only"
+            )
+        self._choice = model
+        if isinstance(model, (Chain, ErrorModel)):
+            self.chain = chain_of(model)
         self.adaptation = adaptation
         self.weighting = weighting
         self.window, self.tolerance, self.iterations, self.spacing = window, tolerance, iterations, spacing
+        self.every_sample = every_sample
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        self.chain = chain_of(self._choice.choose(instruments, self.label))
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
         self._admission = Admission(instruments, observed)

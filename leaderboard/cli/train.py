@@ -17,7 +17,7 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.estimators.adaptations.anfis_file import Parameters
-    from simnav.estimators.adaptations.hybrid_learning import Learned
+    from simnav.estimators.training.hybrid_learning import Learned
 
 __all__ = ["register", "run"]
 
@@ -68,7 +68,7 @@ def _command(
 
 def run(out: Output, features: str, seeds: int, passes: int, output: Path | None) -> None:
     """Gather, learn, and write the parameter file with two figures beside it."""
-    from simnav.estimators.adaptations.anfis_training import (
+    from simnav.estimators.training.anfis_training import (
         FIRST_TRAINING_SEED,
         FIRST_VALIDATION_SEED,
         gather,

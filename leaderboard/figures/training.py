@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
-from simnav.estimators.adaptations.hybrid_learning import Learned
+from simnav.estimators.training.hybrid_learning import Learned
 from simnav.leaderboard.figures.plots import GREY, PALETTE, figure, legend_below, save, styled
 from simnav.types import Array
 

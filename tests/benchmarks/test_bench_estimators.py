@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from simnav.estimator import make
-from simnav.estimators.ekf import Ekf
+from simnav.estimators.rows.kalman import Ekf
 from simnav.recording import Recording
 from simnav.scenario import parse
 from simnav.source import record

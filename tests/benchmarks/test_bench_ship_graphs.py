@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from simnav.estimator import Estimator, make
-from simnav.estimators.ship_graphs import ShipFgo, ShipFgoFull
+from simnav.estimators.rows.windows import ShipFgo, ShipFgoFull
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

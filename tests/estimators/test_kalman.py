@@ -12,9 +12,9 @@ from scipy.stats import chi2
 
 from simnav.estimator import UnsuitableScenario, find, make, names
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.ekf import Ekf
+from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.estimators.solvers.joseph import joseph_update
+from simnav.estimators.rows.kalman import Ekf
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
@@ -212,7 +212,7 @@ def test_calibration_can_be_switched_off(recording_of):
     instruments = Instruments(sheets, recording.instruments.imu)
     sizes = []
     for calibrate in (True, False):
-        e = Ekf(calibrate)
+        e = Ekf(calibrate=calibrate)
         e.reset(recording.start, instruments)
         sizes.append(e.model.size)
     assert sizes == [22, 15]

@@ -9,6 +9,8 @@ import pytest
 
 from simnav.earth import displace
 from simnav.estimator import EstimatorError, make
+from simnav.estimators.rows.robust_windows import GaFgoPaper
+from simnav.estimators.rows.windows import SwFgoPaper
 from simnav.recording import AidStream, Recording
 from simnav.scenario import load
 from simnav.scoring import score
@@ -183,8 +185,6 @@ def test_ships_without_an_imu(recording_of, name: str):
 
 
 def test_the_paper_has_nine_states():
-    from simnav.estimators.robust_graphs import GaFgoPaper, SwFgoPaper
-
     for row in (SwFgoPaper(), GaFgoPaper()):
         assert row.tolerance == 1e-6
         assert row.iterations == 10

@@ -11,8 +11,8 @@ from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalma
 
 from simnav.contract_check import check
 from simnav.estimator import UnsuitableScenario, make, names
-from simnav.estimators.dead_reckoning import DeadReckoning
 from simnav.estimators.filterpy_adapter import FilterpyEstimator
+from simnav.estimators.rows.dead_reckoning import DeadReckoning
 from simnav.recording import FaultLabel
 from simnav.scenario import load
 from simnav.source import record

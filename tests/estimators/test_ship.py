@@ -9,7 +9,7 @@ from simnav import earth, rotation
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_points import ShipPoints
-from simnav.estimators.ship_ekf import ShipEkf
+from simnav.estimators.rows.kalman import ShipEkf
 from simnav.recording import AidStream, Block, Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -17,7 +17,7 @@ from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Instruments
 
-ROWS = [name for name in names() if find(name).__module__ == "simnav.estimators.adaptive"]
+ROWS = [name for name in names() if find(name).__module__ == "simnav.estimators.rows.adaptive"]
 PAPER = [name for name in ROWS if name.endswith("-paper")]
 DEFAULTS = [name for name in ROWS if name not in PAPER]
 #: Rows that are to withstand gross errors; Sage-Husa and its kin estimate a noise that lasts.

@@ -14,7 +14,11 @@ from simnav.earth import relative_position
 from simnav.estimator import make
 from simnav.estimators.adaptations.anfis import Anfis, Features, Motion
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters, ParametersError, shipped
-from simnav.estimators.adaptations.anfis_training import (
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.training.anfis_training import (
     FIRST_TRAINING_SEED,
     FIRST_VALIDATION_SEED,
     gather,
@@ -22,10 +26,6 @@ from simnav.estimators.adaptations.anfis_training import (
     scenarios,
     train,
 )
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.sugeno import Sugeno
-from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.scenario import load, parse
 from simnav.scoring import score
 from simnav.source import record
@@ -242,7 +242,7 @@ def test_shipped_files_are_in_the_package_and_have_the_score_that_they_say():
 
 def test_training_on_little_is_the_same_every_time(monkeypatch, tmp_path: Path):
     """Two voyages: what is learnt is the same, bit for bit, and survives its file."""
-    from simnav.estimators.adaptations import anfis_training
+    from simnav.estimators.training import anfis_training
 
     few = scenarios()[1:3]
     monkeypatch.setattr(anfis_training, "scenarios", lambda: few)

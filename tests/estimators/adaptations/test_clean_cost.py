@@ -12,8 +12,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simnav.estimator import describe, make, names
-from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimator import find, make, names
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
@@ -26,20 +27,16 @@ SCORES = ("horizontal_rmse", "vertical_rmse", "velocity_horizontal_rmse", "headi
 
 def plain(name: str) -> str:
     """The row that it is but for its adaptation or weighting; empty for one that has none."""
-    estimator = make(name)
-    attributes = [getattr(estimator, part, None) for part in ("adaptation", "weighting")]
-    parts = [*type(estimator).__mro__, *map(type, attributes)]
-    if not any(p.__module__.startswith("simnav.estimators.adaptations.") and p is not Adaptation for p in parts):
+    recipe = find(name).recipe
+    if not {"adaptation", "weighting"} & set(recipe) and recipe["solver"].make is not ImmEstimator:
         return ""
-    window = isinstance(estimator, WindowEstimator)
-    model = estimator.chain if window else estimator.model
-    ship = "ship" in type(model).__module__
+    window, ship = issubclass(recipe["solver"].make, WindowEstimator), recipe["model"].make is ShipModel
     return {(False, False): "ekf", (False, True): "ship-ekf", (True, False): "sw-fgo", (True, True): "ship-fgo"}[
         window, ship
     ]
 
 
-PLAIN = {n: plain(n) for n in names() if not describe(n).reference and not n.endswith("-paper") and plain(n)}
+PLAIN = {n: plain(n) for n in names() if not find(n).reference and not n.endswith("-paper") and plain(n)}
 WINDOWS = [n for n, p in PLAIN.items() if p.endswith("fgo")]
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav.estimators.adaptations.hybrid_learning import StepSize, fit_consequents, learn, premise_gradient, rmse
 from simnav.estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.training.hybrid_learning import StepSize, fit_consequents, learn, premise_gradient, rmse
 
 
 def random_network(seed: int, inputs: int = 2, memberships: int = 3) -> Sugeno:

@@ -10,9 +10,9 @@ import pytest
 from simnav import earth
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_chain import ShipChain
-from simnav.estimators.ship_ekf import ShipEkf
-from simnav.estimators.ship_graphs import ShipFgo, ShipFgoFull
-from simnav.estimators.smoothers import ShipEkfRts
+from simnav.estimators.rows.kalman import ShipEkf
+from simnav.estimators.rows.smoothers import ShipEkfRts
+from simnav.estimators.rows.windows import ShipFgo, ShipFgoFull
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from simnav.estimators.adaptations.base import Adaptation
-from simnav.estimators.ekf import Ekf
-from simnav.estimators.ekf_presets import Ekf23
+from simnav.estimators.algebra.joseph import project
+from simnav.estimators.composition import Row
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.solvers.joseph import project
+from simnav.estimators.rows.kalman import Ekf, Ekf23
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Measurement
 
@@ -29,10 +29,10 @@ def test_projection():
 
 
 @pytest.mark.parametrize("row", [Ekf, Ekf23])
-def test_it_is_the_same_filter(recording_of, row: type[KalmanEstimator]):
+def test_it_is_the_same_filter(recording_of, row: type[Row]):
     recording = recording_of(2, 60.0)
     plain, stepwise = row(), row()
-    stepwise.adaptation = StepByStep()
+    stepwise.solver.adaptation = StepByStep()
     for estimator in (plain, stepwise):
         estimator.reset(recording.start, recording.instruments)
     taken = [0]
@@ -53,16 +53,16 @@ def test_it_is_the_same_filter(recording_of, row: type[KalmanEstimator]):
     assert taken[0] > 100
 
 
-@pytest.mark.parametrize("hook", ["_observe", "_linearise", "_correct"])
-def test_hooks_are_seen(recording_of, hook: str):
+@pytest.mark.parametrize("hook", ["_observe", "_absorb"])
+def test_a_solver_that_does_it_in_its_own_way_is_asked(recording_of, hook: str):
     seen = []
 
-    def overridden(self, argument):
+    def own(self, argument):
         seen.append(argument)
         return getattr(KalmanEstimator, hook)(self, argument)
 
     recording = recording_of(2, 5.0)
-    estimator = type("Hooked", (Ekf,), {hook: overridden})()
+    estimator = type("Hooked", (KalmanEstimator,), {hook: own, "assimilates": False})(InertialModel())
     estimator.reset(recording.start, recording.instruments)
     for packet in recording.steps():
         estimator.update(packet)
@@ -70,15 +70,17 @@ def test_hooks_are_seen(recording_of, hook: str):
 
 
 @pytest.mark.parametrize("method", ["measure", "correct"])
-def test_a_model_that_does_it_in_its_own_way_is_asked(recording_of, method: str):
+def test_a_model_that_does_it_in_its_own_way_says_so_and_is_asked(recording_of, method: str):
     seen = []
 
     def own(self, argument):
         seen.append(argument)
         return getattr(InertialModel, method)(self, argument)
 
+    with pytest.raises(TypeError, match="Silent measures or corrects in a way of its own"):
+        type("Silent", (InertialModel,), {method: own})
     recording = recording_of(2, 5.0)
-    estimator = KalmanEstimator(type("Own", (InertialModel,), {method: own})())
+    estimator = KalmanEstimator(type("Own", (InertialModel,), {method: own, "fused": False})())
     estimator.reset(recording.start, recording.instruments)
     for packet in recording.steps():
         estimator.update(packet)

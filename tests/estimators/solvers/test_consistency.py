@@ -19,8 +19,9 @@ import pytest
 
 from simnav import earth, rotation
 from simnav.estimator import make
-from simnav.estimators.federated import Federated, FederatedNoReset
+from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.propagation import propagate_covariance
+from simnav.estimators.solvers.federated import FederatedEstimator
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.scoring import nees_band
@@ -168,14 +169,14 @@ def test_federated_where_it_is_exact(errors_of, assert_consistent, group: str):
     assert_consistent(e[..., at], P[..., at, at])
 
 
-def analysed(row: type[Federated]) -> Federated:
+def analysed(reset_locals: bool) -> FederatedEstimator:
     """The filter with ``actual``, the covariance of the errors of all local filters together, and ``left`` of it.
 
     All start from one error and have the same motion and noise, 11' (x) P_0 and 11' (x) Q; everything that the filter
     does to their estimates is linear.
     """
 
-    class Analysed(row):
+    class Analysed(FederatedEstimator):
         def reset(self, start, instruments):
             super().reset(start, instruments)
             n = self.model.size
@@ -223,23 +224,23 @@ def analysed(row: type[Federated]) -> Federated:
                     A[common] = W
                 self.actual = A @ self.actual @ A.T
 
-    return Analysed()
+    return Analysed(InertialModel(), reset_locals=reset_locals)
 
 
-BOUNDS = [("open_sea", FederatedNoReset), ("uuv", Federated), ("uuv", FederatedNoReset)]
+BOUNDS = [("open_sea", "federated-no-reset"), ("uuv", "federated"), ("uuv", "federated-no-reset")]
 
 
-@pytest.fixture(scope="module", params=BOUNDS, ids=lambda p: f"{p[0]} {p[1].name}")
+@pytest.fixture(scope="module", params=BOUNDS, ids=" ".join)
 def federated(request, runs, errors_of) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Errors of all seeds, the filter's covariances, and those by analysis of the first run: the track is the same."""
     scenario, row = request.param
-    estimator, (recording, _) = analysed(row), runs(scenario)[0]
+    estimator, (recording, _) = analysed(row == "federated"), runs(scenario)[0]
     estimator.reset(recording.start, recording.instruments)
     left = []
     for packet in recording.steps():
         estimator.update(packet)
         left.append(estimator.left)
-    return *errors_of(scenario, row.name), np.array(left)
+    return *errors_of(scenario, row), np.array(left)
 
 
 @pytest.mark.parametrize("group", GROUPS)

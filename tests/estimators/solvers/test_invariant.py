@@ -9,8 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from simnav import earth
-from simnav.estimators.ekf import Ekf
-from simnav.estimators.invariant import InvariantEkf
+from simnav.estimators.rows.kalman import Ekf, InvariantEkf
 from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm, skew
 from simnav.types import Datasheet, Instruments, Measurement
 

@@ -10,8 +10,7 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 
 from simnav.estimator import make
-from simnav.estimators.ekf import Ekf
-from simnav.estimators.iterated import IteratedEkf
+from simnav.estimators.rows.kalman import Ekf, IteratedEkf
 from simnav.rotation import left_jacobian, rotation_vector_from_dcm, skew
 from simnav.types import Datasheet, Instruments, Measurement, Measurements
 

@@ -9,8 +9,8 @@ import pytest
 
 from simnav import earth, rotation, strapdown
 from simnav.estimator import make
-from simnav.estimators.kf import Kf
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.rows.kalman import Kf
 from simnav.types import ImuDatasheet, TriadDatasheet
 
 DEG = np.pi / 180.0

@@ -8,7 +8,7 @@ import pytest
 from simnav.estimator import make
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.smoother import SmoothingEstimator, smoother_gains
+from simnav.estimators.solvers.smoother import Smoother, smoother_gains
 from simnav.scenario import load
 from simnav.scoring import errors
 from simnav.scoring.consistency import GROUPS, nees, nees_band
@@ -63,9 +63,8 @@ class Line(ErrorModel):
         return Estimate(self.time, np.array([0.0, 0.0, self.x[0]]), np.array([0.0, 0.0, self.x[1]]), np.zeros(3), full)
 
 
-class Smoothed(SmoothingEstimator, KalmanEstimator):
-    def __init__(self):
-        super().__init__(Line())
+def smoothed_line() -> KalmanEstimator:
+    return KalmanEstimator(Line(), smoother=Smoother())
 
 
 SHEETS = [Datasheet("a", "depth", 1.0, np.array([0.5])), Datasheet("b", "depth", 0.7, np.array([0.2]))]
@@ -79,7 +78,7 @@ def line():
     measured += [(round(0.7 * k, 6), "b") for k in range(1, 43) if not 8 < 0.7 * k < 20]  # 0.7 * 10 = 7: both
     measured.sort()
     values = [float(10.0 + 0.3 * t + rng.normal()) for t, _ in measured]
-    estimator = Smoothed()
+    estimator = smoothed_line()
     start = InitialState(0.0, np.array([0.0, 0.0, 9.0]), np.array([0.0, 0.0, 0.5]), np.zeros(3), np.eye(9))
     estimator.reset(start, Instruments(SHEETS))
     filtered = []
@@ -158,7 +157,7 @@ def test_last_epoch_is_the_filters_and_earlier_ones_are_better(line):
 def test_a_second_call_gives_the_same_and_a_reset_forgets(line):
     estimator, smoothed, *_ = line
     np.testing.assert_array_equal(estimator.smooth().position, smoothed.position)
-    fresh = Smoothed()
+    fresh = smoothed_line()
     fresh.reset(InitialState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), np.eye(9)), Instruments(SHEETS))
     assert fresh.smooth() is None
 

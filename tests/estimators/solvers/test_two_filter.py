@@ -9,22 +9,15 @@ from simnav import earth
 from simnav.estimator import UnsuitableScenario, make
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.ship_ekf import ShipEkf
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.solvers.iterated import Iteration
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.smoother import SmoothingEstimator
-from simnav.estimators.solvers.two_filter import TwoFilterEstimator
+from simnav.estimators.solvers.smoother import Smoother
+from simnav.estimators.solvers.two_filter import TwoFilterSmoother
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.simulator import simulate
 from simnav.types import Datasheet, Instruments
-
-
-class ShipTwoFilter(TwoFilterEstimator, ShipEkf):
-    pass
-
-
-class ShipRts(SmoothingEstimator, ShipEkf):
-    pass
 
 
 class Doubtful(Adaptation):
@@ -35,14 +28,12 @@ class Doubtful(Adaptation):
         return None if nis > 9.0 else (1.0 + nis) * innovation.noise
 
 
-class DoubtfulTwoFilter(TwoFilterEstimator, KalmanEstimator):
-    def __init__(self):
-        super().__init__(InertialModel(), Doubtful())
+def doubtful(smoother: Smoother) -> KalmanEstimator:
+    return KalmanEstimator(InertialModel(), Doubtful(), smoother=smoother)
 
 
-class DoubtfulRts(SmoothingEstimator, KalmanEstimator):
-    def __init__(self):
-        super().__init__(InertialModel(), Doubtful())
+def ship(smoother: Smoother) -> KalmanEstimator:
+    return KalmanEstimator(ShipModel(), smoother=smoother)
 
 
 def run(estimator, recording: Recording):
@@ -64,8 +55,8 @@ def difference(a, b) -> np.ndarray:
         ("open-sea", 120.0, lambda: make("ekf-two-filter"), lambda: make("ekf-rts")),
         # Asynchronous, with outages, and calibration states
         ("auv-survey", 420.0, lambda: make("ekf-two-filter"), lambda: make("ekf-rts")),
-        ("coastal-voyage", 120.0, DoubtfulTwoFilter, DoubtfulRts),
-        ("ship-dead-reckoning", 200.0, ShipTwoFilter, ShipRts),
+        ("coastal-voyage", 120.0, lambda: doubtful(TwoFilterSmoother()), lambda: doubtful(Smoother())),
+        ("ship-dead-reckoning", 200.0, lambda: ship(TwoFilterSmoother()), lambda: ship(Smoother())),
     ],
     ids=["ekf", "ekf, auv", "adaptive", "ship"],
 )
@@ -91,6 +82,11 @@ def test_what_it_needs():
     exact = Datasheet("depth", "depth", 1.0, np.zeros(1))
     with pytest.raises(UnsuitableScenario, match="sigmas above 0; depth's are not"):
         make("ekf-two-filter").reset(recording.start, Instruments((exact,), imu=recording.instruments.imu))
+
+
+def test_an_iterated_measurement_has_no_one_jacobian():
+    with pytest.raises(ValueError, match="TwoFilterSmoother knows one Jacobian"):
+        KalmanEstimator(InertialModel(), iteration=Iteration(), smoother=TwoFilterSmoother())
 
 
 def test_seeded_with_the_forward_result_as_printed_it_is_over_confident():

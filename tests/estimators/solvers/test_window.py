@@ -11,17 +11,16 @@ import pytest
 
 from simnav.estimator import Estimator, find, make, names
 from simnav.estimators.adaptations.gating import ChiSquareGate
-from simnav.estimators.adaptations.weighting import Factors, Weighting
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.sliding_window import InertialWindow
 from simnav.estimators.solvers.window import WindowEstimator
+from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
 from simnav.trial import Trial, run_trial
 from simnav.types import Estimate, Measurements
 
-ROWS = [n for n in names() if issubclass(find(n), WindowEstimator)]
+ROWS = [n for n in names() if issubclass(find(n).recipe["solver"].make, WindowEstimator)]
 #: Few nodes, so that these tests take seconds.
 FAST = [n for n in ROWS if n not in ("fgo-unsimplified",) and "ship" not in n and "anfis" not in n]
 
@@ -99,14 +98,14 @@ def test_its_memory_does_not_grow_with_the_run(clean: Recording):
     finally:
         tracemalloc.stop()
     assert grown < 20_000
-    assert isinstance(estimator, WindowEstimator)
+    assert isinstance(estimator.solver, WindowEstimator)
     assert len(estimator.chain.nodes) <= 40  # two instants a second
 
 
 def test_an_adaptation_decides_when_a_measurement_arrives(clean: Recording):
     bad = spoiled(clean, "gnss", 60.0, 61.0, 300.0)
-    plain = run_trial(InertialWindow(InertialModel()), bad)
-    gated = run_trial(InertialWindow(InertialModel(), ChiSquareGate()), bad)
+    plain = run_trial(WindowEstimator(InertialModel()), bad)
+    gated = run_trial(WindowEstimator(InertialModel(), ChiSquareGate()), bad)
     at = int(np.searchsorted(gated.time, 61.5))
     assert horizontal(plain, bad)[at] > 5.0 * horizontal(gated, bad)[at]
     assert any(name == "gnss" and 60.0 <= t <= 61.0 for name, t in gated.flagged)
@@ -127,7 +126,7 @@ def test_a_weighting_sees_every_factor_and_is_asked_until_it_has_settled(clean: 
             factors.weight[factors.instrument == factors.names.index("gnss")] = 0.25
             return factors.iteration >= 4
 
-    weighed = InertialWindow(InertialModel(), weighting=Slow())
+    weighed = WindowEstimator(InertialModel(), weighting=Slow())
     trial = run_trial(weighed, clean)
     assert trial.status == "ok", trial.reason
     asked = np.array(Slow.asked)

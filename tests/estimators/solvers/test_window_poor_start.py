@@ -15,7 +15,8 @@ import pytest
 
 import simnav
 from simnav.estimator import find, make, names
-from simnav.estimators.models.inertial_chain import InertialChain
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
@@ -29,17 +30,14 @@ def inertial_windows(slow: bool) -> list[str]:
     """All windows over the inertial model of 15 states that are registered."""
     found = []
     for name in names():
-        if not issubclass(find(name), WindowEstimator) or find(name).slow is not slow:
-            continue
-        chain = make(name).chain
-        if isinstance(chain, InertialChain) and chain.front.state and not name.endswith("-paper"):
+        recipe = find(name).recipe
+        window = issubclass(recipe["solver"].make, WindowEstimator) and find(name).slow is slow
+        if window and recipe["model"].make in (InertialModel, Suitable):
             found.append(name)
     return found
 
 
-#: They need a compass, and there is none.
-UNSUITABLE = {"anfis-fgo", "anfis-fgo-motion"}
-WINDOWS = [name for name in inertial_windows(slow=False) if name not in UNSUITABLE]
+WINDOWS = inertial_windows(slow=False)
 
 
 @cache

@@ -118,7 +118,7 @@ def test_our_own_estimators_share_their_sources() -> None:
 
 
 def test_building_on_our_estimators_makes_them_count(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mine = write(folder / "fp_ours.py", imports="from simnav.estimators.ekf import Ekf")
+    mine = write(folder / "fp_ours.py", imports="from simnav.estimators.rows.kalman import Ekf")
     alone = write(folder / "fp_not_ours.py", "Alone")
     before = [estimator_source(find(str(p))) for p in (mine, alone)]
     original = fingerprint._installed_digest

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from simnav.estimator import make
-from simnav.estimators.adaptations import anfis_training
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
+from simnav.estimators.training import anfis_training
 from simnav.leaderboard import cli
 from simnav.leaderboard.cli.train import _Features
 from simnav.leaderboard.figures.training import LABELS

@@ -263,7 +263,7 @@ def test_bad_files_are_a_sentence(tmp_path: Path, text: str, message: str):
         find(path)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert find("ekf").__module__ == "simnav.estimators.ekf"
+    assert find("ekf").__module__ == "simnav.estimators.rows.kalman"
 
 
 def test_absent_files():
@@ -301,4 +301,4 @@ def test_a_broken_plug_in_is_named_and_harms_nobody(monkeypatch: pytest.MonkeyPa
     assert any("'a-thief'" in s and "taken by Ekf" in s for s in said)
     assert "half-done" not in found
     assert {"ekf", "good-one"} <= set(found)
-    assert find("ekf").__module__ == "simnav.estimators.ekf"
+    assert find("ekf").__module__ == "simnav.estimators.rows.kalman"

@@ -1,0 +1,1 @@
+"""Linear algebra that models and solvers share."""

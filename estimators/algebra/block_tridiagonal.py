@@ -1,0 +1,409 @@
+"""Gauss-Newton steps on a chain of nodes: the block-tridiagonal normal equations, solved by elimination.
+
+A window is a prior on its first node, motion factors between neighbours and aiding factors on single nodes. With dx_k
+what is added to node k, the step minimises the sum of
+
+- ``(dx_0 - d)' P_0^-1 (dx_0 - d)``                        prior
+- ``w_k (e_k + dx_k+1 - F_k dx_k)' Q_k^-1 (...)``          motion
+- ``w_i (r_i - H_i dx_k)' R_i^-1 (r_i - H_i dx_k)``        aiding
+- ``lambda dx_k' diag(P_k)^-1 dx_k``                       Levenberg-Marquardt damping, P_k as predicted
+
+whose normal equations are block-tridiagonal. They are eliminated from the oldest node to the newest and solved for
+backward. The Schur complement that is left of all nodes before k,
+``S_k = Q^-1 - Q^-1 F (F' Q^-1 F + ...)^-1 F' Q^-1``, is kept as its inverse, ``P_k = F (...)^-1 F' + Q``, the same by
+Woodbury's identity: as printed it is a small difference of large numbers (Q of a hundredth of a second is 12 orders of
+magnitude below P), and a state without process noise has no Q^-1 at all. So
+
+- P_k and d_k before node k's own measurements are the prior that marginalising all nodes before k leaves;
+- P at the newest node, after its measurements, is its covariance;
+- the backward pass needs no inverse: with a the adjoint after a node's measurements, ``dx = d + P a``, and through them
+  ``a <- a + H' S^-1 (v - H P a)``, through the motion ``a <- F' a``;
+- damping is a measurement of each component to be zero.
+
+Sources: B. M. Bell, "The iterated Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994; for the
+backward pass G. J. Bierman, "Fixed interval smoothing with discrete measurements", Int. J. Control 18(1), 1973.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.algebra.cholesky import factorise
+
+__all__ = ["after_step", "half_squares", "keep_weights", "solve_chain", "whiten"]
+
+#: A factor of less weight than this counts for nothing.
+LEAST_WEIGHT = 1e-9
+
+
+@kernel()
+def _predict(P, F, Q, weight, work, turned, out):  # type: ignore[no-untyped-def]
+    """``out = F P F' + Q / weight``; F is sparse."""
+    n = P.shape[0]
+    for i in range(n):
+        for j in range(n):
+            work[i, j] = 0.0
+        for k in range(n):
+            x = F[i, k]
+            if x != 0.0:
+                for j in range(n):
+                    work[i, j] += x * P[k, j]
+    for i in range(n):
+        for j in range(n):
+            turned[i, j] = work[j, i]
+            out[i, j] = 0.0
+    for i in range(n):
+        for k in range(n):
+            x = F[i, k]
+            if x != 0.0:
+                for j in range(n):
+                    out[i, j] += x * turned[k, j]
+    scale = 1.0 / weight
+    for i in range(n):
+        for j in range(i + 1):
+            x = 0.5 * (out[i, j] + out[j, i]) + scale * Q[i, j]
+            out[i, j] = x
+            out[j, i] = x
+
+
+@kernel()
+def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-def]
+    """Take m measurements with the covariance ``R / weight`` into P and d; False, and nothing done, if S is singular.
+
+    With ``L L' = S = H P H' + R / weight`` they are left white: ``U = L^-1 H P``, ``G = L^-1 H`` and
+    ``y = L^-1 (r - H d)``, so that ``d + U' y`` and ``P - U' U`` are the update. The last row of L is for the pivots.
+    """
+    n = P.shape[0]
+    for a in range(m):
+        y[a] = r[a]
+        for c in range(n):
+            U[a, c] = 0.0
+        for c in range(n):  # few are not zero
+            x = H[a, c]
+            G[a, c] = x
+            if x != 0.0:
+                y[a] -= x * d[c]
+                for j in range(n):
+                    U[a, j] += x * P[c, j]
+    for a in range(m):
+        for b in range(a + 1):
+            x = 0.5 * (R[a, b] + R[b, a]) / weight
+            for c in range(n):
+                if H[b, c] != 0.0:
+                    x += H[b, c] * U[a, c]
+            L[a, b] = x
+    if not factorise(L, m, 1e-14, L[3]):
+        return False
+    for a in range(m):
+        for b in range(a):
+            x = L[a, b]
+            y[a] -= x * y[b]
+            for c in range(n):
+                U[a, c] -= x * U[b, c]
+                G[a, c] -= x * G[b, c]
+        x = 1.0 / L[a, a]
+        y[a] *= x
+        for c in range(n):
+            U[a, c] *= x
+            G[a, c] *= x
+    for i in range(n):
+        for a in range(m):
+            d[i] += U[a, i] * y[a]
+        if m == 3:  # in one pass
+            u, v, w = U[0, i], U[1, i], U[2, i]
+            for j in range(n):
+                P[i, j] -= u * U[0, j] + v * U[1, j] + w * U[2, j]
+        else:
+            for a in range(m):
+                u = U[a, i]
+                for j in range(n):
+                    P[i, j] -= u * U[a, j]
+    return True
+
+
+@kernel()
+def _whiten(error, whitener, whitened):  # type: ignore[no-untyped-def]
+    square = 0.0
+    for i in range(error.size):
+        x = 0.0
+        for j in range(i + 1):
+            x += whitener[i, j] * error[j]
+        whitened[i] = x
+        square += x * x
+    return sqrt(square)
+
+
+@kernel()
+def _return(adjoint, U, G, y, m, z):  # type: ignore[no-untyped-def]
+    """Take the adjoint back through m measurements: ``a + G' (y - U a)``; z is work space."""
+    n = adjoint.size
+    for a in range(m):
+        z[a] = y[a]
+        for c in range(n):
+            z[a] -= U[a, c] * adjoint[c]
+    for a in range(m):
+        for c in range(n):
+            adjoint[c] += G[a, c] * z[a]
+
+
+@kernel(
+    "UniTuple(f8, 2)(f8[:, ::1], f8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], "
+    "i8[::1], i8, i8[::1], f8[:, :, ::1], "
+    "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], "
+    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], f8[:, ::1])"
+)
+def solve_chain(  # type: ignore[no-untyped-def]
+    prior, prior_shift, transition, noise, error, motion_weight,
+    node, base, components, jacobian, residual, aid_noise, aid_weight, damping, first,
+    predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used, step,
+):  # fmt: skip
+    """One step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
+
+    Parameters
+    ----------
+    prior : (n, n) array
+        Covariance of the first node before its measurements.
+    prior_shift : (n,) array
+        d, mean of the prior less the first node.
+    transition, noise : (K - 1, n, n) array
+        F and Q.
+    error : (K - 1, n) array
+        e, newer node less the motion of the older one.
+    motion_weight : (K - 1,) array
+    node : (M,) int array
+        In ascending order; the first node is number ``base``.
+    base : int
+    components : (M,) int array
+        0 for a factor that says nothing.
+    jacobian : (M, 3, n) array
+    residual : (M, 3) array
+        Measured less predicted.
+    aid_noise : (M, 3, 3) array
+    aid_weight : (M,) array
+    damping : float
+        lambda, 0 for a Gauss-Newton step.
+    first : int
+        Nodes before it have been eliminated, without damping; the arrays that follow hold what that left.
+    predicted, filtered : (K, n, n) arrays
+        Overwritten with the covariances of a node without and with its own measurements, all older ones included.
+    predicted_shift, filtered_shift : (K, n) arrays
+        Overwritten with their means less the node.
+    cross, white : (M, 3, n) arrays
+    innovation : (M, 3) array
+        Overwritten with ``L^-1 H P``, ``L^-1 H`` and ``L^-1 (r - H d)`` at its turn, ``L L'`` being S.
+    used : (M,) int array
+        Overwritten with 1 where a measurement counts, else 0.
+    step : (K, n) array
+        Overwritten with dx.
+
+    Returns
+    -------
+    float, float
+        Largest component of the step, in its filtered sigmas, of all nodes and of those before ``first``; NaN or
+        infinite where the step is of no use.
+    """
+    count, n = step.shape
+    total = node.size
+    work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((4, 3))
+    damps = count if damping > 0.0 else 0
+    damp_crosses, damp_whites = np.empty((damps, n, 1, n)), np.empty((damps, n, 1, n))
+    damp_innovations = np.empty((damps, n, 1))
+    damp_used = np.zeros((damps, n), dtype=np.bool_)
+    unit, zero, variance = np.zeros((1, n)), np.zeros(1), np.empty((n, 1, 1))
+
+    i = 0
+    while i < total and node[i] - base < first:
+        i += 1
+    for k in range(first, count):
+        P, d = predicted[k], predicted_shift[k]
+        if k == 0:
+            P[:] = prior
+            d[:] = prior_shift
+        else:
+            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], work, turned, P)
+            for r in range(n):
+                x = -error[k - 1, r]
+                for c in range(n):
+                    x += transition[k - 1, r, c] * filtered_shift[k - 1, c]
+                d[r] = x
+        P, d = filtered[k], filtered_shift[k]
+        P[:] = predicted[k]
+        d[:] = predicted_shift[k]
+        if damps:
+            for r in range(n):
+                variance[r, 0, 0] = P[r, r]
+            for r in range(n):
+                unit[0, r] = 1.0
+                damp_used[k, r] = _absorb(
+                    P, d, unit, zero, variance[r], damping, 1, L,
+                    damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r],
+                )  # fmt: skip
+                unit[0, r] = 0.0
+        while i < total and node[i] - base == k:
+            used[i] = 0
+            if components[i] > 0 and aid_weight[i] > LEAST_WEIGHT:
+                used[i] = _absorb(
+                    P, d, jacobian[i], residual[i], aid_noise[i], aid_weight[i], components[i], L,
+                    cross[i], white[i], innovation[i],
+                )  # fmt: skip
+            i += 1
+
+    adjoint, after, z = np.zeros(n), np.empty(n), np.empty(3)
+    largest = older = 0.0
+    i = total - 1
+    for k in range(count - 1, -1, -1):
+        if k < count - 1:
+            after[:] = 0.0
+            for r in range(n):
+                x = adjoint[r]
+                for c in range(n):
+                    after[c] += transition[k, r, c] * x
+            adjoint[:] = after
+        for r in range(n):
+            step[k, r] = filtered_shift[k, r]
+        for c in range(n):
+            x = adjoint[c]
+            for r in range(n):
+                step[k, r] += filtered[k, c, r] * x
+        for r in range(n):
+            if not filtered[k, r, r] <= 0.0:
+                size = abs(step[k, r]) / sqrt(filtered[k, r, r])
+                if size > largest or size != size:
+                    largest = size
+                if k < first and (size > older or size != size):
+                    older = size
+        while i >= 0 and node[i] - base == k:
+            if used[i] == 1:
+                _return(adjoint, cross[i], white[i], innovation[i], components[i], z)
+            i -= 1
+        if damps:
+            for r in range(n - 1, -1, -1):
+                if damp_used[k, r]:
+                    _return(adjoint, damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r], 1, z)
+    return largest, older
+
+
+@kernel(
+    "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], "
+    "i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
+)
+def after_step(  # type: ignore[no-untyped-def]
+    step, predicted_shift, filtered_shift, transition, error, whitener, whitened, norm,
+    node, base, jacobian, residual, aid_whitener, aid_whitened, aid_norm,
+):  # fmt: skip
+    """Shifts and residuals after a step, as the factors were linearised: what solving for it supposes them to be.
+
+    Parameters
+    ----------
+    step, predicted_shift, filtered_shift : (K, n) arrays
+        The step is taken off the shifts.
+    transition, error, node, base, jacobian, residual
+        As for `solve_chain`; errors and residuals are updated.
+    whitener, whitened, norm, aid_whitener, aid_whitened, aid_norm
+        As for `whiten`, of motion and of aids.
+    """
+    n = step.shape[1]
+    for k in range(step.shape[0]):
+        for r in range(n):
+            predicted_shift[k, r] -= step[k, r]
+            filtered_shift[k, r] -= step[k, r]
+    for k in range(error.shape[0]):
+        for r in range(n):
+            x = error[k, r] + step[k + 1, r]
+            for c in range(n):
+                x -= transition[k, r, c] * step[k, c]
+            error[k, r] = x
+        norm[k] = _whiten(error[k], whitener[k], whitened[k])
+    for i in range(node.size):
+        k = node[i] - base
+        for a in range(3):
+            x = residual[i, a]
+            for c in range(n):
+                x -= jacobian[i, a, c] * step[k, c]
+            residual[i, a] = x
+        aid_norm[i] = _whiten(residual[i], aid_whitener[i], aid_whitened[i])
+
+
+@kernel("void(i8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
+def whiten(first, error, whitener, whitened, norm):  # type: ignore[no-untyped-def]
+    """Whiten N errors of n components.
+
+    Parameters
+    ----------
+    first : int
+        Row to begin with.
+    error : (N, n) array
+    whitener : (N, n, n) array
+        Lower triangular.
+    whitened : (N, n) array
+        Overwritten.
+    norm : (N,) array
+        Overwritten with the norms of the whitened errors.
+    """
+    for k in range(first, error.shape[0]):
+        norm[k] = _whiten(error[k], whitener[k], whitened[k])
+
+
+@kernel("i8(f8[::1], f8[::1], f8[::1], i8[::1], i8, f8[::1], f8[::1], f8[::1], f8)")
+def keep_weights(before, norm, weight, node, base, aid_before, aid_norm, aid_weight, tolerance):  # type: ignore[no-untyped-def]
+    """Set weights back that have hardly changed.
+
+    Parameters
+    ----------
+    before, aid_before : (K - 1,), (M,) arrays
+        The weights with which the factors, of motion and aiding, were eliminated.
+    norm, aid_norm : arrays
+        Of the whitened residuals.
+    weight, aid_weight : arrays
+        The weights that are wanted; overwritten with those before where the weight and the factor's pull, which is the
+        weight times the norm, differ by no more than the tolerance.
+    node, base
+        As for `solve_chain`.
+    tolerance : float
+
+    Returns
+    -------
+    int
+        The first node at whose elimination a weight differs; K if there is none.
+    """
+    first = norm.size + 1
+    for k in range(norm.size - 1, -1, -1):
+        if abs(weight[k] - before[k]) * max(norm[k], 1.0) > tolerance:
+            first = k + 1
+        else:
+            weight[k] = before[k]
+    for i in range(node.size - 1, -1, -1):
+        if abs(aid_weight[i] - aid_before[i]) * max(aid_norm[i], 1.0) > tolerance:
+            first = min(first, node[i] - base)
+        else:
+            aid_weight[i] = aid_before[i]
+    return first
+
+
+@kernel("f8(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def half_squares(whitener, shift, weight, norm, aid_weight, aid_norm):  # type: ignore[no-untyped-def]
+    """The cost: half the sum of squares of all factors.
+
+    Parameters
+    ----------
+    whitener : (n, n) array
+        Of the prior; lower triangular.
+    shift : (n,) array
+        Mean of the prior less the first node.
+    weight, norm, aid_weight, aid_norm : arrays
+        Of the factors of motion and of aids: their weights, and the norms of their whitened residuals.
+    """
+    total = 0.0
+    for i in range(shift.size):
+        x = 0.0
+        for j in range(i + 1):
+            x += whitener[i, j] * shift[j]
+        total += x * x
+    for k in range(norm.size):
+        total += weight[k] * norm[k] * norm[k]
+    for i in range(aid_norm.size):
+        total += aid_weight[i] * aid_norm[i] * aid_norm[i]
+    return 0.5 * total

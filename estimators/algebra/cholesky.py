@@ -1,0 +1,46 @@
+"""The Cholesky factor of a small covariance, in place, for all kernels that need one."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from simnav.compiled import kernel
+
+__all__ = ["factorise"]
+
+
+@kernel()
+def factorise(L, m, least, pivot):  # type: ignore[no-untyped-def]
+    """Overwrite the lower triangle of a covariance with its Cholesky factor; what lies above is left as it is.
+
+    Parameters
+    ----------
+    L : (>= m, >= m) array
+        The covariance in, the factor out. A component that depends on those before it gets a column of zeros.
+    m : int
+        Number of components.
+    least : float
+        A pivot of no more than this part of its variance counts as zero.
+    pivot : (>= m,) array
+        Overwritten with the pivots: the squares of the factor's diagonal.
+
+    Returns
+    -------
+    bool
+        Whether all pivots are above zero: the covariance is positive definite.
+    """
+    definite = True
+    for i in range(m):
+        variance = L[i, i]
+        for j in range(i + 1):
+            x = L[i, j]
+            for k in range(j):
+                x -= L[i, k] * L[j, k]
+            if j < i:
+                L[i, j] = x / L[j, j] if L[j, j] > 0.0 else 0.0
+            elif x > least * variance:
+                L[i, i], pivot[i] = sqrt(x), x
+            else:
+                L[i, i], pivot[i] = 0.0, 0.0
+                definite = False
+    return definite

@@ -1,0 +1,119 @@
+"""The Kalman update in Joseph's form, as kernels.
+
+Joseph's form stays symmetric and positive semi-definite for any gain (G. J. Bierman, *Factorization Methods for
+Discrete Sequential Estimation*, 1977).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.algebra.cholesky import factorise
+
+__all__ = ["joseph_update", "project"]
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def project(covariance, jacobian, cross, predicted):  # type: ignore[no-untyped-def]
+    """What a covariance says of a measurement: ``P H'`` and ``H P H'``.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        P, symmetric.
+    jacobian : (m, n) array
+        H; its zeros cost nothing.
+    cross : (n, m) array
+        Overwritten with P H'.
+    predicted : (m, m) array
+        Overwritten with H P H'.
+    """
+    m, n = jacobian.shape
+    for r in range(n):
+        for i in range(m):
+            cross[r, i] = 0.0
+    for i in range(m):
+        for c in range(n):
+            x = jacobian[i, c]
+            if x != 0.0:
+                for r in range(n):
+                    cross[r, i] += x * covariance[c, r]
+    for i in range(m):
+        for k in range(m):
+            predicted[i, k] = 0.0
+        for c in range(n):
+            x = jacobian[i, c]
+            if x != 0.0:
+                for k in range(m):
+                    predicted[i, k] += x * cross[c, k]
+
+
+@kernel("f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+def joseph_update(covariance, cross, innovation_covariance, residual, correction):  # type: ignore[no-untyped-def]
+    """Kalman gain, correction and Joseph-form update of the covariance, in place.
+
+    With S = H P H' + R and K = P H' S^-1, Joseph's (I - K H) P (I - K H)' + K R K' is, multiplied out,
+    ``P - K (P H')' - (P H') K' + K S K'``.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        P, updated.
+    cross : (n, m) array
+        P H'.
+    innovation_covariance : (m, m) array
+        S.
+    residual : (m,) array
+    correction : (n,) array
+        Overwritten with K times the residual.
+
+    Returns
+    -------
+    float
+        Normalised innovation squared; -1 where S is singular, and nothing is changed.
+    """
+    n, m = cross.shape
+    L, white = innovation_covariance.copy(), np.empty(m)
+    if not factorise(L, m, 1e-14, white):
+        return -1.0
+    # Whitened: U = P H' L^-T, so that K S K' = U U', K (P H')' = U U'; Joseph's sum needs the gain K = U L^-1.
+    gain = np.empty((n, m))
+    for r in range(n):
+        for i in range(m):
+            x = cross[r, i]
+            for k in range(i):
+                x -= L[i, k] * gain[r, k]
+            gain[r, i] = x / L[i, i]
+        for i in range(m - 1, -1, -1):
+            x = gain[r, i]
+            for k in range(i + 1, m):
+                x -= L[k, i] * gain[r, k]
+            gain[r, i] = x / L[i, i]
+    nis = 0.0
+    for i in range(m):
+        x = residual[i]
+        for k in range(i):
+            x -= L[i, k] * white[k]
+        white[i] = x / L[i, i]
+        nis += white[i] * white[i]
+    for r in range(n):
+        x = 0.0
+        for i in range(m):
+            x += gain[r, i] * residual[i]
+        correction[r] = x
+    spread = np.empty((n, m))  # K S - P H'
+    for r in range(n):
+        for i in range(m):
+            x = -cross[r, i]
+            for k in range(m):
+                x += gain[r, k] * innovation_covariance[k, i]
+            spread[r, i] = x
+    for r in range(n):
+        for c in range(r + 1):
+            x = covariance[r, c]
+            for i in range(m):
+                x += spread[r, i] * gain[c, i] - gain[r, i] * cross[c, i]
+            covariance[r, c] = x
+            covariance[c, r] = x
+    return nis

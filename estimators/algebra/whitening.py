@@ -1,0 +1,37 @@
+"""Whitening: what makes the unit covariance of an error's own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.algebra.cholesky import factorise
+
+__all__ = ["whitening"]
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1])")
+def whitening(covariance, whitener):  # type: ignore[no-untyped-def]
+    """The inverse Cholesky factor of a covariance, so that ``whitener`` times an error has unit covariance.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        Positive semi-definite; what is zero or depends on the components before it is left out.
+    whitener : (n, n) array
+        Overwritten: lower triangular, with rows of zeros for components left out.
+    """
+    n = covariance.shape[0]
+    L = covariance.copy()
+    factorise(L, n, 1e-13, np.empty(n))
+    for i in range(n):
+        for j in range(n):
+            whitener[i, j] = 0.0
+        if L[i, i] == 0.0:
+            continue
+        for j in range(i):
+            x = 0.0
+            for k in range(j, i):
+                x += L[i, k] * whitener[k, j]
+            whitener[i, j] = -x / L[i, i]
+        whitener[i, i] = 1.0 / L[i, i]

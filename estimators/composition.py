@@ -1,0 +1,287 @@
+"""How a row is declared: a solver, and the pieces that it works with; their parameters become the row's.
+
+A row is a class without a body::
+
+    @register("gated-ukf")
+    class GatedUkf(Row, solver=SigmaPointEstimator, model=InertialPoints, adaptation=ChiSquareGate):
+        \"\"\"Unscented Kalman filter that leaves out measurements whose innovation is improbable.\"\"\"
+
+Every piece is a class, or a function that makes one; its constructor says the parameters, and its docstring what they
+mean. Both are written there and nowhere else. `piece` changes what a row takes of one: it fixes parameters, and gives
+others a default or a name of the row's own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import re
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from simnav.estimator import Estimator
+from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
+
+if typing.TYPE_CHECKING:
+    from simnav.recording import Recording
+
+__all__ = ["Piece", "Row", "Solver", "piece"]
+
+
+class Solver(Estimator):
+    """Base of the estimators that are put together from pieces.
+
+    Attributes
+    ----------
+    pieces : tuple of str
+        Parameters of the constructor that are pieces.
+    refuses : mapping of str to str
+        Pieces of other solvers that this one cannot work with, and why.
+    row : str
+        Name of the row that it works for, for messages; a solver that is registered itself has its own.
+    """
+
+    pieces: ClassVar[tuple[str, ...]] = ()
+    refuses: ClassVar[Mapping[str, str]] = {}
+    row: str = ""
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return self.row or self.name
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece as a row uses it; `piece` makes one.
+
+    Attributes
+    ----------
+    make : callable
+        The class of the piece, or a function that returns one.
+    fixed : mapping
+        Parameters that the row sets, and does not have.
+    defaults : mapping
+        Defaults of the row's own.
+    rename : mapping of str to str
+        The name of a parameter in the row, by that of the constructor.
+    """
+
+    make: Callable[..., Any]
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+    rename: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """Name of the class."""
+        return getattr(self.make, "__name__", repr(self.make))
+
+    def parameters(self) -> dict[str, inspect.Parameter]:
+        """What a row takes for it, by the constructor's names; named as the row names them.
+
+        Raises
+        ------
+        TypeError
+            If a parameter that is fixed, renamed or given a default is none of the constructor's.
+        """
+        known = {p.name: p for p in inspect.signature(self.make).parameters.values() if p.kind in _NAMED}
+        for name in (*self.fixed, *self.defaults, *self.rename):
+            if name not in known:
+                raise TypeError(f"{self.label} has no parameter {name!r}; it has {', '.join(known) or 'none'}")
+        inner = getattr(self.make, "pieces", ())
+        return {
+            name: p.replace(
+                name=self.rename.get(name, name),
+                kind=inspect.Parameter.KEYWORD_ONLY,
+                annotation=getattr(p.annotation, "__forward_arg__", p.annotation),
+                default=self.defaults.get(name, p.default),
+            )
+            for name, p in known.items()
+            if name not in self.fixed and name not in inner
+        }
+
+    def build(self, values: Mapping[str, Any], **pieces: Any) -> Any:
+        """The piece, with those of a row's parameters that are its own."""
+        own = {
+            name: values.get(p.name, p.default)
+            for name, p in self.parameters().items()
+            if p.name in values or name in self.defaults
+        }
+        return self.make(**pieces, **self.fixed, **own)
+
+
+_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+
+
+def piece(
+    make: Callable[..., Any],
+    *,
+    defaults: Mapping[str, Any] | None = None,
+    rename: Mapping[str, str] | None = None,
+    **fixed: Any,
+) -> Piece:
+    """A piece of a row, changed for it.
+
+    Parameters
+    ----------
+    make : callable
+        The class of the piece, or a function that returns one.
+    defaults : mapping, optional
+        Defaults of the row's own, by the names of the constructor's parameters.
+    rename : mapping, optional
+        Names of the row's own, likewise; for two pieces that have a parameter of one name.
+    **fixed
+        Parameters that the row sets, and does not have.
+
+    Examples
+    --------
+    >>> from simnav.estimators.adaptations.fading import FadingMemory
+    >>> slow = piece(FadingMemory, defaults={"memory": 5000.0})
+    >>> slow.build({}).memory, slow.build({"memory": 60.0}).memory
+    (5000.0, 60.0)
+    """
+    return Piece(make, fixed, defaults or {}, rename or {})
+
+
+class Row(Estimator):
+    """Base of the rows: an estimator that is a solver with its pieces, named as keywords of the class.
+
+    A subclass that names pieces again is the row with those pieces exchanged. The class's docstring says what the row
+    is and whose it is; what the parameters mean is added from the docstrings of the pieces.
+
+    Attributes
+    ----------
+    recipe : mapping of str to Piece
+        The pieces: ``solver``, and those that the solver takes.
+    solver : Estimator
+        Does the work. What a row does not have itself, it has of its solver: ``row.model``, ``row.covariance``.
+
+    Raises
+    ------
+    TypeError
+        When the class is defined: if the solver does not take a piece, or two pieces have a parameter of one name.
+    """
+
+    recipe: ClassVar[Mapping[str, Piece]] = {}
+    solver: Estimator
+
+    def __init_subclass__(cls, **pieces: Any):
+        super().__init_subclass__()
+        if not pieces:
+            return
+        given = {name: p if isinstance(p, Piece) else Piece(p) for name, p in pieces.items()}
+        cls.recipe = {**cls.recipe, **given}
+        solver = cls.recipe["solver"]
+        taken: tuple[str, ...] = getattr(solver.make, "pieces", ())
+        for name in cls.recipe:
+            if name != "solver" and name not in taken:
+                reasons: Mapping[str, str] = getattr(solver.make, "refuses", {})
+                why = reasons.get(name, f"it takes {', '.join(taken) or 'none'}")
+                raise TypeError(f"{cls.__name__}: {solver.label} takes no {name}: {why}")
+        for flag in ("slow", "reference"):
+            if flag not in vars(cls):
+                setattr(cls, flag, getattr(solver.make, flag, False))
+        _equip(cls)
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
+        self.solver.reset(start, instruments)
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step's measurements, each at its own time."""
+        return self.solver.update(measurements)
+
+    def smooth(self) -> NavigationStates | None:
+        """The trajectory of a solver that smooths; else None."""
+        return self.solver.smooth()
+
+    def reveal(self, recording: Recording) -> None:
+        """Let a solver that is told the truth have it."""
+        self.solver.reveal(recording)
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "solver" or name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.solver, name)
+
+
+def _equip(cls: type[Row]) -> None:
+    """Give a row its constructor, and the documentation of its parameters."""
+    recipe = cls.recipe
+    order = [name for name in ("adaptation", "weighting") if name in recipe]
+    order += [name for name in recipe if name not in (*order, "solver")]
+    parameters: dict[str, inspect.Parameter] = {}
+    owner: dict[str, str] = {}
+    hints: dict[str, Any] = {}
+    told: list[tuple[str, str, str]] = []
+    for each in [recipe[name] for name in (*order, "solver")]:
+        types, meanings = _hints(each.make), documented(each.make)
+        for inner, parameter in each.parameters().items():
+            name = parameter.name
+            if name in parameters:
+                raise TypeError(
+                    f"{cls.__name__}: {owner[name]} and {each.label} both have a parameter {name!r}; "
+                    f"rename one: piece({each.label}, rename={{{inner!r}: ...}})"
+                )
+            parameters[name], owner[name] = parameter, each.label
+            if inner in types:
+                hints[name] = types[inner]
+            sort, meaning = meanings.get(inner, ("", ""))
+            if told and told[-1][1:] == (sort, meaning):  # documented together
+                told[-1] = f"{told[-1][0]}, {name}", sort, meaning
+            else:
+                told.append((name, sort, meaning))
+
+    def __init__(self: Row, **values: Any) -> None:  # noqa: N807 (it becomes the class's)
+        for name in values:
+            if name not in parameters:
+                raise TypeError(f"{cls.__name__} has no parameter {name!r}; it has {', '.join(parameters) or 'none'}")
+        parts = {name: p.build(values) for name, p in recipe.items() if name != "solver"}
+        self.solver = recipe["solver"].build(values, **parts)
+        if isinstance(self.solver, Solver):
+            self.solver.row = type(self).name
+
+    __init__.__qualname__, __init__.__module__ = f"{cls.__qualname__}.__init__", cls.__module__
+    __init__.__annotations__ = hints
+    own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    __init__.__signature__ = inspect.Signature([own, *parameters.values()])  # type: ignore[attr-defined]
+    cls.__init__ = __init__  # type: ignore[assignment]
+    text = inspect.cleandoc(vars(cls).get("__doc__") or "")
+    if told:
+        text += "\n\nParameters\n----------"
+    for names, sort, meaning in told:
+        text += f"\n{names} : {sort}" if sort else f"\n{names}"
+        text += "".join(f"\n    {line}" for line in meaning.splitlines())
+    cls.__doc__ = text
+
+
+def _hints(make: Callable[..., Any]) -> dict[str, Any]:
+    """The types of a constructor's parameters; none where an annotation cannot be resolved."""
+    plain = isinstance(make, type) and make.__init__ is not object.__init__  # type: ignore[misc]
+    with contextlib.suppress(Exception):
+        return typing.get_type_hints(make.__init__ if plain else make)
+    return {}
+
+
+def documented(make: Callable[..., Any]) -> dict[str, tuple[str, str]]:
+    """What numpydoc docstrings say of parameters: type and meaning by name, a class's own before its bases'.
+
+    Parameters
+    ----------
+    make : callable
+        A class or a function.
+    """
+    found: dict[str, tuple[str, str]] = {}
+    for each in make.__mro__ if isinstance(make, type) else (make,):
+        text = inspect.cleandoc(vars(each).get("__doc__") or "") if isinstance(each, type) else inspect.getdoc(each)
+        for section in re.findall(
+            r"^(?:Parameters|Attributes)\n-+\n(.*?)(?=\n\n\S[^\n]*\n-+\n|\Z)", text or "", re.M | re.S
+        ):
+            for head, body in re.findall(r"^(\S[^\n]*)\n?((?:(?:[ ]+[^\n]*)?(?:\n|\Z))*)", section, re.M):
+                names, _, sort = head.partition(" : ")
+                for name in names.split(", "):
+                    found.setdefault(name, (sort, inspect.cleandoc(body)))
+    return found

@@ -1,0 +1,27 @@
+"""The inertial model of a vessel that looks at no other instrument."""
+
+from __future__ import annotations
+
+from simnav.estimator import UnsuitableScenario
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.inertial import InertialModel
+from simnav.types import Datasheet, Instruments
+
+__all__ = ["UnaidedModel"]
+
+
+class UnaidedModel(InertialModel):
+    """The inertial model, blind to every aid."""
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def choose(self, instruments: Instruments, name: str) -> ErrorModel:
+        """Itself; UnsuitableScenario without an IMU."""
+        if instruments.imu is None:
+            raise UnsuitableScenario("pure inertial navigation needs an IMU; there is none")
+        return self
+
+    def observes(self, instrument: Datasheet) -> bool:
+        """None of them."""
+        return False

@@ -1,0 +1,151 @@
+"""Adaptive and robust rows: the Kalman filter with one adaptation each.
+
+Every row takes the inertial model where there is an IMU and the ship model where there is none, so that it is ``ekf``
+or ``ship-ekf`` but for its adaptation.
+"""
+
+from simnav.estimator import register
+from simnav.estimators.adaptations.adkf import AdaptiveFactor
+from simnav.estimators.adaptations.correntropy import MaximumCorrentropy
+from simnav.estimators.adaptations.fading import FadingMemory
+from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.adaptations.innovation_based import FixedWindow, InnovationBased
+from simnav.estimators.adaptations.robust import HuberWeights, Igg3Weights
+from simnav.estimators.adaptations.sage_husa import SageHusa
+from simnav.estimators.adaptations.variational_bayes import VariationalBayes
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.solvers.imm import ImmEstimator
+from simnav.estimators.solvers.iterated import poor_heading
+from simnav.estimators.solvers.kalman import KalmanEstimator
+
+__all__ = ["Adkf", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf", "Rae"]
+__all__ += ["SageHusaKf", "SageHusaPaper", "VbAkf"]
+
+#: `FixedWindow` as a filter's rows have it: there is no other window.
+_WINDOW = {"innovations": "window"}
+
+
+class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading):
+    """The filter without its adaptation."""
+
+
+@register("sage-husa")
+class SageHusaKf(_Adaptive, adaptation=SageHusa):
+    """Sage-Husa filter: the measurement noise estimated from all innovations, the old ones fading.
+
+    Source: A. P. Sage and G. W. Husa, *Adaptive filtering with unknown prior statistics*, Joint Automatic Control
+    Conference, 1969.
+    """
+
+
+@register("sage-husa-paper")
+class SageHusaPaper(_Adaptive, adaptation=piece(SageHusa, defaults={"fading": 1.0, "prior": 0, "lowest": 0.5})):
+    """Sage-Husa filter without fading, the rival in the figures of the paper on adaptive windows.
+
+    Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
+    optimization*, 2025.
+    """
+
+
+@register("iae")
+class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
+    """Innovation-based adaptive estimation of the measurement noise over a window that adapts its length.
+
+    Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
+    optimization*, 2025, eqs. 16-20.
+    """
+
+
+@register("iae-fixed")
+class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation", rename=_WINDOW)):
+    """Innovation-based adaptive estimation of the measurement noise over a fixed window.
+
+    Source: A. H. Mohamed and K. P. Schwarz, *Adaptive Kalman filtering for INS/GPS*, J. Geodesy 73, 1999.
+    """
+
+
+@register("rae")
+class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False, rename=_WINDOW)):
+    """Residual-based adaptive estimation of the measurement noise over a fixed window.
+
+    Source: A. H. Mohamed and K. P. Schwarz, *Adaptive Kalman filtering for INS/GPS*, J. Geodesy 73, 1999.
+    """
+
+
+@register("adkf")
+class Adkf(_Adaptive, adaptation=AdaptiveFactor):
+    """Adaptive robust filter: R or P over a factor that falls with a statistic of the innovation.
+
+    Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
+    differential Kalman filtering*, PLoS One 21(2), 2026.
+    """
+
+
+@register("adkf-paper")
+class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=None, c1=None, together=0)):
+    """Adaptive robust filter with the statistics and thresholds as its paper prints them.
+
+    Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
+    differential Kalman filtering*, PLoS One 21(2), 2026.
+    """
+
+
+@register("igg3")
+class Igg3(_Adaptive, adaptation=Igg3Weights):
+    """IGG-III equivalent weights: full weight up to k0 sigma, almost none from k1 sigma on.
+
+    Source: Y. Yang, L. Song and T. Xu, *Robust estimator for correlated observations based on bifactor equivalent
+    weights*, J. Geodesy 76, 2002.
+    """
+
+
+@register("huber-kf")
+class HuberKf(_Adaptive, adaptation=HuberWeights):
+    """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
+
+    Source: P. J. Huber, *Robust estimation of a location parameter*, Annals of Mathematical Statistics 35(1), 1964.
+    """
+
+
+@register("gated-ekf")
+class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
+    """Chi-square gating: measurements that fail the test are left out; a filter that fails for long is doubted.
+
+    Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
+    section 5.4.
+    """
+
+
+@register("fading-ekf")
+class FadingEkf(_Adaptive, adaptation=FadingMemory):
+    """Fading memory: information loses weight with its age.
+
+    Source: D. Simon, *Optimal State Estimation*, 2006, section 7.4.
+    """
+
+
+@register("vb-akf")
+class VbAkf(_Adaptive, adaptation=VariationalBayes):
+    """Variational-Bayes adaptive filter: state and noise variances estimated together.
+
+    Source: S. Särkkä and A. Nummenmaa, *Recursive noise adaptive Kalman filtering by variational Bayesian
+    approximations*, IEEE TAC 54(3), 2009.
+    """
+
+
+@register("mckf")
+class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
+    """Maximum correntropy Kalman filter: residuals weighted by a Gaussian kernel.
+
+    Source: B. Chen, X. Liu, H. Zhao and J. C. Principe, *Maximum correntropy Kalman filter*, Automatica 76, 2017.
+    """
+
+
+@register("imm")
+class Imm(Row, solver=ImmEstimator, model=Suitable):
+    """Interacting multiple models: the noise of each instrument jumps between levels.
+
+    Source: H. A. P. Blom and Y. Bar-Shalom, *The interacting multiple model algorithm for systems with Markovian
+    switching coefficients*, IEEE TAC 33(8), 1988.
+    """

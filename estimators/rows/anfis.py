@@ -1,0 +1,36 @@
+"""The neuro-fuzzy rows: a reconstruction of ANFIS-FGO, and the same adaptation in a filter."""
+
+from simnav.estimator import register
+from simnav.estimators.adaptations.anfis import Anfis
+from simnav.estimators.composition import piece
+from simnav.estimators.rows.kalman import ShipEkf
+from simnav.estimators.rows.windows import ShipFgo
+
+__all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
+
+
+@register("anfis-fgo")
+class AnfisFgo(ShipFgo, adaptation=Anfis):
+    """ANFIS-FGO, a reconstruction: ``ship-fgo``, the noise of each fix chosen by a neuro-fuzzy network.
+
+    The section on the network is missing from the text at hand; see docs/anfis.md. Source: *GNSS/DR integrated
+    navigation for ships*, the paper that proposes ANFIS-FGO.
+    """
+
+
+@register("anfis-fgo-motion")
+class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
+    """ANFIS-FGO, a reconstruction, with a network that sees the ship's motion only: ``anfis-fgo`` but for that.
+
+    The ablation of ``anfis-fgo``. In our simulations GNSS noise knows nothing of the ship's motion, so that this
+    network can learn no more than the mean. Source: *GNSS/DR integrated navigation for ships*, the paper that proposes
+    ANFIS-FGO.
+    """
+
+
+@register("anfis-ekf")
+class AnfisEkf(ShipEkf, adaptation=Anfis):
+    """The network of ``anfis-fgo`` (a reconstruction) in ``ship-ekf``: what it does without the graph.
+
+    Source: *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
+    """

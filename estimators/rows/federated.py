@@ -1,0 +1,27 @@
+"""Carlson's federated filter over the inertial model."""
+
+from simnav.estimator import register
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.federated import FederatedEstimator
+
+__all__ = ["Federated", "FederatedNoReset"]
+
+
+@register("federated")
+class Federated(Row, solver=piece(FederatedEstimator, reset_locals=True), model=InertialModel):
+    """Federated Kalman filter: a local filter for each aiding sensor, fused and reset when the slowest has delivered.
+
+    Every measurement is used, at its own time, in its local filter. Source: N. A. Carlson, *Federated square root
+    filter for decentralized parallel processes*, IEEE Trans. Aerospace and Electronic Systems 26(3), 1990.
+    """
+
+
+@register("federated-no-reset")
+class FederatedNoReset(Row, solver=piece(FederatedEstimator, reset_locals=False), model=InertialModel):
+    """Federated Kalman filter whose local filters are never told what the others saw.
+
+    Its covariance is an upper bound, not the error's: conservative where the sensors differ. Source: N. A. Carlson,
+    *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and Electronic Systems
+    26(3), 1990.
+    """

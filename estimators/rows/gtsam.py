@@ -1,0 +1,45 @@
+"""GTSAM as an independent reference, over an IMU and whatever aids there are.
+
+These rows share our mechanization of the datasheets and our measurement models, and nothing else with the windows of
+`simnav.estimators.solvers.window`: preintegration, linearisation, elimination and marginalisation are GTSAM's. A node
+has 15 states: biases, scale factor and misalignment of the aids count as white noise, the IMU's biases walk at random.
+"""
+
+from simnav.estimator import register
+from simnav.estimators.composition import Row
+from simnav.estimators.solvers.gtsam_solvers import BatchEstimator, FixedLagEstimator, GncEstimator, Isam2Estimator
+
+__all__ = ["GtsamBatch", "GtsamFixedLag", "GtsamGnc", "GtsamIsam2"]
+
+
+@register("gtsam-fixed-lag")
+class GtsamFixedLag(Row, solver=FixedLagEstimator):
+    """GTSAM's incremental fixed-lag smoother over an IMU and whatever aids there are.
+
+    Source: F. Dellaert and others, GTSAM 4.3.
+    """
+
+
+@register("gtsam-isam2")
+class GtsamIsam2(Row, solver=Isam2Estimator):
+    """GTSAM's ISAM2 over the whole run; smoothed: its last estimate of all nodes.
+
+    Source: M. Kaess et al., *iSAM2: incremental smoothing and mapping using the Bayes tree*, IJRR 31(2), 2012.
+    """
+
+
+@register("gtsam-batch")
+class GtsamBatch(Row, solver=BatchEstimator):
+    """In real time ``gtsam-fixed-lag``; smoothed: full-batch Levenberg-Marquardt over the same graph.
+
+    Source: F. Dellaert and others, GTSAM 4.3.
+    """
+
+
+@register("gtsam-gnc")
+class GtsamGnc(Row, solver=GncEstimator):
+    """In real time ``gtsam-fixed-lag``; smoothed: full batch by graduated non-convexity, which leaves outliers out.
+
+    Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
+    IEEE Robotics and Automation Letters 5(2), 2020.
+    """

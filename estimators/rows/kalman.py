@@ -1,0 +1,107 @@
+"""Kalman filters without an adaptation: over the inertial model, the ship model, and GNSS alone."""
+
+from simnav.estimator import register
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.kinematic import KinematicModel
+from simnav.estimators.models.nine_state import NineStateModel
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.unaided import UnaidedModel
+from simnav.estimators.solvers.invariant import InvariantKalmanEstimator
+from simnav.estimators.solvers.iterated import Iteration, poor_heading
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.linear import LinearKalmanEstimator
+
+__all__ = ["Ekf", "Ekf9", "Ekf23", "GnssOnly", "InvariantEkf", "IteratedEkf", "Kf", "Kf23", "PureInertial", "ShipEkf"]
+
+
+@register("ekf", aliases=("eskf",))
+class Ekf(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_heading):
+    """15-state error-state EKF over an IMU and whatever aids there are.
+
+    Position, velocity, attitude and IMU biases, plus calibration states where the datasheets of the aids ask for them.
+    Every measurement is used, at its own time; no gating, no adaptation.
+
+    Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013.
+    """
+
+
+@register("ekf-23", aliases=("ekf-paper-003",))
+class Ekf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, iteration=poor_heading):
+    """23-state EKF: DVL misalignment, lever arm, scale factor and time error beside the 15.
+
+    Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
+    differential Kalman filtering*, PLoS One 21(2), 2026.
+    """
+
+
+@register("ekf-9", aliases=("ekf-paper-000",))
+class Ekf9(Row, solver=KalmanEstimator, model=NineStateModel, iteration=poor_heading):
+    """9-state EKF: position, velocity and attitude, fixed sigmas, no biases.
+
+    Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
+    gradient-adaptive factor graph optimization*, 2026.
+    """
+
+
+@register("iekf", aliases=("iterated-ekf",))
+class IteratedEkf(Row, solver=KalmanEstimator, model=InertialModel, iteration=piece(Iteration, above_deg=0.0)):
+    """Iterated 15-state EKF: each measurement is linearised again until the correction stands still.
+
+    Source: B. M. Bell and F. W. Cathey, *The iterated Kalman filter update as a Gauss-Newton method*, IEEE TAC 38(2),
+    1993.
+    """
+
+
+@register("inekf", aliases=("invariant-ekf",))
+class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
+    """Invariant 15-state EKF on SE_2(3) with biases; finds a heading that is far off.
+
+    Source: A. Barrau and S. Bonnabel, *The invariant extended Kalman filter as a stable observer*, IEEE TAC 62(4),
+    2017.
+    """
+
+
+@register("kf", aliases=("linear-kf",))
+class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
+    """Linear 15-state error-state KF, open loop: free inertial navigation, corrected by its estimated error.
+
+    The states of ``ekf``. It leaves its linear range where free inertial navigation does.
+
+    Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979.
+    """
+
+
+@register("kf-23", aliases=("kf-paper-003",))
+class Kf23(Row, solver=LinearKalmanEstimator, model=DvlCalibrationModel):
+    """Linear 23-state error-state KF, open loop, with the DVL's errors as states.
+
+    Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
+    differential Kalman filtering*, PLoS One 21(2), 2026.
+    """
+
+
+@register("ship-ekf")
+class ShipEkf(Row, solver=KalmanEstimator, model=ShipModel):
+    """EKF on GNSS, compass and log, for a ship without an INS; estimates log and compass bias and the current.
+
+    It uses no IMU. Source: *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
+    """
+
+
+@register("gnss-only", aliases=("gnss",))
+class GnssOnly(Row, solver=KalmanEstimator, model=KinematicModel):
+    """GNSS alone: fixes (and velocities, if any) smoothed by a constant-velocity Kalman filter.
+
+    Between fixes and in an outage the ship goes on as she went. Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan,
+    *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.
+    """
+
+
+@register("inertial", aliases=("pure-inertial",))
+class PureInertial(Row, solver=KalmanEstimator, model=UnaidedModel):
+    """Pure inertial navigation: the strapdown solution from the initial state, with its growing covariance.
+
+    Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013.
+    """

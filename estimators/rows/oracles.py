@@ -1,0 +1,52 @@
+"""Rows that are told of the truth, and are not ranked.
+
+O0, O1, O1 with a smoother, and O3 of the reference literature differ in what they know of the faults:
+
+- ``oracle-clairvoyant`` (O0): what each fault added; it works on the run without faults
+- ``oracle`` (O1): which measurements a fault touched, and the statistics of the faults
+- ``oracle-rts``: the same, smoothed; the reference of the post-processing track
+- ``oracle-mixture`` (O3): how often gross errors come and how large they are, not which measurements they hit
+"""
+
+from simnav.estimator import register
+from simnav.estimators.adaptations.truth import MixtureNoise, NominalNoise, TrueNoise
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.solvers.oracle import OracleEstimator
+from simnav.estimators.solvers.smoother import Smoother
+
+__all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts"]
+
+
+@register("oracle")
+class Oracle(Row, solver=piece(OracleEstimator, restore=False), adaptation=TrueNoise):
+    """EKF that knows each measurement's true noise and faults; what any real-time estimator is measured against.
+
+    It is not ranked. (Oracle O1.) Source: `simnav.estimators.solvers.oracle`, where its rules are.
+    """
+
+
+@register("oracle-clairvoyant")
+class OracleClairvoyant(Row, solver=piece(OracleEstimator, restore=True), adaptation=NominalNoise):
+    """Oracle that takes off each measurement what the faults added; only outages are left of them. (Oracle O0.)
+
+    What an estimator would do on the clean run; the bound ``clean`` is its. Source: `simnav.estimators.solvers.oracle`.
+    """
+
+
+@register("oracle-rts")
+class OracleRts(Oracle, smoother=Smoother):
+    """The oracle with a Rauch-Tung-Striebel smoother behind it; the reference of the post-processing track.
+
+    Source: H. E. Rauch, F. Tung and C. T. Striebel, *Maximum likelihood estimates of linear dynamic systems*, AIAA
+    Journal 3(8), 1965.
+    """
+
+
+@register("oracle-mixture")
+class OracleMixture(Oracle, adaptation=MixtureNoise):
+    """Oracle that knows the density of each measurement's noise, not which measurements a gross error hit. (Oracle O3.)
+
+    The realistic target of robust estimators: the schedule of the faults and their sizes are known, each hit has to be
+    told from the innovation (`simnav.estimators.adaptations.truth.MixtureNoise`). The bound ``mix`` is its. Source:
+    `simnav.estimators.solvers.oracle`.
+    """

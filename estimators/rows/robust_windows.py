@@ -1,0 +1,111 @@
+"""Robust rows of the sliding window: each is ``sw-fgo`` or, without an IMU, ``ship-fgo``, with one weighting."""
+
+from simnav.estimator import register
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.rows.windows import SwFgoPaper
+from simnav.estimators.solvers.window import WindowEstimator
+from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling
+from simnav.estimators.weightings.gradient_adaptive import GradientAdaptive
+from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
+from simnav.estimators.weightings.m_estimators import TunedMEstimator, cauchy, geman_mcclure, huber, tukey
+from simnav.estimators.weightings.max_mixture import MaxMixture
+from simnav.estimators.weightings.switchable_constraints import SwitchableConstraints
+
+__all__ = ["CauchyFgo", "DcsFgo", "GaFgo", "GaFgoPaper", "GmFgo", "GncFgo", "HuberFgo", "MaxMixtureFgo"]
+__all__ += ["SwitchableFgo", "TukeyFgo"]
+
+
+class _Robust(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, every_sample=False), model=Suitable):
+    """The window without its weighting."""
+
+
+@register("huber-fgo")
+class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
+    """Sliding window with Huber's weights: a residual beyond c sigma pulls no harder than one of c sigma.
+
+    Source: P. J. Huber, *Robust Statistics*, 1981.
+    """
+
+
+@register("tukey-fgo")
+class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
+    """Sliding window with Tukey's biweight: a residual beyond c sigma counts for next to nothing.
+
+    Source: A. E. Beaton and J. W. Tukey, *The fitting of power series*, Technometrics 16(2), 1974.
+    """
+
+
+@register("cauchy-fgo")
+class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
+    """Sliding window with Cauchy's weights, which fall with the square of the residual.
+
+    Source: P. W. Holland and R. E. Welsch, *Robust regression using iteratively reweighted least-squares*, 1977.
+    """
+
+
+@register("gm-fgo")
+class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
+    """Sliding window with Geman and McClure's weights, which fall with the fourth power of the residual.
+
+    Source: S. Geman and D. E. McClure, *Statistical methods for tomographic image reconstruction*, 1987.
+    """
+
+
+@register("dcs-fgo")
+class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
+    """Sliding window with dynamic covariance scaling.
+
+    Source: P. Agarwal, G. D. Tipaldi, L. Spinello et al., *Robust map optimization using dynamic covariance scaling*,
+    ICRA 2013.
+    """
+
+
+@register("switchable-fgo")
+class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
+    """Sliding window with switchable constraints, the switches eliminated in closed form.
+
+    Source: N. Sünderhauf and P. Protzel, *Switchable constraints for robust pose graph SLAM*, IROS 2012.
+    """
+
+
+@register("gnc-fgo")
+class GncFgo(
+    _Robust,
+    solver=piece(WindowEstimator, defaults={"tolerance": 0.05, "iterations": 15}, every_sample=False),
+    weighting=GraduatedNonConvexity,
+):
+    """Sliding window with graduated non-convexity: after an outlier the robust cost begins convex and hardens.
+
+    Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
+    IEEE Robotics and Automation Letters 5(2), 2020.
+    """
+
+
+@register("max-mixture-fgo")
+class MaxMixtureFgo(_Robust, weighting=MaxMixture):
+    """Sliding window in which each measurement is of the nominal or of a wide noise, whichever is the more probable.
+
+    Source: E. Olson and P. Agarwal, *Inference on networks of mixtures for robust robot mapping*, IJRR 32(7), 2013.
+    """
+
+
+@register("ga-fgo")
+class GaFgo(
+    _Robust,
+    weighting=piece(GradientAdaptive, defaults={"other": (2.0, 2.0, 0.3)}, preset="default", fewest=5),
+):
+    """Gradient-adaptive factor graph, its residuals whitened and its scales consistent.
+
+    Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
+    gradient-adaptive factor graph optimization*, 2026.
+    """
+
+
+@register("ga-fgo-paper")
+class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, preset="paper", fewest=5)):
+    """Gradient-adaptive factor graph as its paper prints it: 9 states, fixed sigmas, unwhitened norms and their scale.
+
+    Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
+    gradient-adaptive factor graph optimization*, 2026.
+    """

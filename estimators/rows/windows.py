@@ -1,0 +1,99 @@
+"""Factor graphs with every measurement at its nominal noise, or at a noise estimated from innovations."""
+
+from simnav.estimator import register
+from simnav.estimators.adaptations.innovation_based import FixedWindow, InnovationBased
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.nine_state import NineStateModel
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.solvers.full_graph import FullGraph
+from simnav.estimators.solvers.window import WindowEstimator
+
+__all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "ShipFgo", "ShipFgoFull", "SwFgo", "SwFgoPaper"]
+
+_WINDOW = piece(WindowEstimator, every_sample=False)
+
+
+@register("sw-fgo", aliases=("fgo", "fgo-simplified"))
+class SwFgo(Row, solver=_WINDOW, model=InertialModel):
+    """Sliding-window factor graph: preintegrated IMU factors, every measurement with its nominal noise.
+
+    SW-FGO of M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
+    gradient-adaptive factor graph optimization*, 2026; the simplified graph of *Post-processing algorithm based on
+    factor graph optimization for AUV integrated navigation*: a node per measurement, one equivalent IMU factor between.
+    """
+
+
+@register("fgo-unsimplified")
+class FgoUnsimplified(
+    Row, solver=piece(WindowEstimator, defaults={"window": 5}, every_sample=True), model=InertialModel
+):
+    """The sliding window with a node for every IMU sample: the graph without the equivalent IMU factor.
+
+    The same estimate as ``sw-fgo`` at many times its cost, which is what it is for. A shorter window keeps that
+    bearable: 5 epochs are 500 nodes and more. Source: *Post-processing algorithm based on factor graph optimization for
+    AUV integrated navigation*.
+    """
+
+    slow = True
+
+
+@register("fgo-full")
+class FgoFull(Row, solver=FullGraph, model=InertialModel):
+    """The full graph: every step estimates the whole trajectory; after the run, the batch solution is its smoother.
+
+    Source: F. Dellaert and M. Kaess, *Factor graphs for robot perception*, Foundations and Trends in Robotics 6, 2017.
+    """
+
+
+@register("iae-fgo")
+class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
+    """The sliding window with innovation-based estimation of the noise over a window that adapts its length.
+
+    Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
+    optimization*, 2025, eqs. 16-20.
+    """
+
+
+@register("iae-fgo-fixed")
+class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
+    """The sliding window with innovation-based estimation of the measurement noise over a fixed number of innovations.
+
+    IAE-FGO-Fix of G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor
+    graph optimization*, 2025.
+    """
+
+
+@register("sw-fgo-paper")
+class SwFgoPaper(
+    Row, solver=piece(WindowEstimator, defaults={"tolerance": 1e-6}, every_sample=False), model=NineStateModel
+):
+    """Sliding-window factor graph as its paper has it: 9 states, fixed sigmas, no biases.
+
+    See `simnav.estimators.models.nine_state` for what is settled of the print, and how. Source: M. Guo, B. Wang, L. Wei
+    et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on gradient-adaptive factor graph optimization*,
+    2026.
+    """
+
+
+@register("ship-fgo")
+class ShipFgo(Row, solver=_WINDOW, model=ShipModel):
+    """Sliding-window factor graph on GNSS, compass and log, for a ship without an INS: the states of ``ship-ekf``.
+
+    GNSS factors, DR factors (the motion between epochs, driven by log and compass), DR error factors, and the
+    marginalization factor that older epochs leave behind. The DR error factor, a random walk of the log and compass
+    biases in print, is the Gauss-Markov motion of the bias states that the datasheets ask for
+    (`simnav.estimators.models.ship`); a bias that they call constant does not walk. Source: *GNSS/DR integrated
+    navigation for ships*, the paper that proposes ANFIS-FGO.
+    """
+
+
+@register("ship-fgo-full")
+class ShipFgoFull(Row, solver=FullGraph, model=ShipModel):
+    """Full factor graph of a ship without an INS: every epoch since the start is estimated anew at every epoch.
+
+    The graph of ``ship-fgo`` without a window. It begins each epoch where it was at the last one, so that few
+    iterations suffice; its cost still grows with the square of the length. After the run it returns the batch solution.
+    Source: *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
+    """

@@ -1,0 +1,114 @@
+"""A door for filters of filterpy: fill in four small methods, and a `KalmanFilter` or `UnscentedKalmanFilter` is a row.
+
+The adapter works in metres north, east, down of the initial position, takes the measurements in order and each at its
+own time, and reads position, velocity, heading and covariance off the filter's state. It was written against filterpy
+2.0.
+
+filterpy's unscented filter draws its sigma points in `predict` only. The adapter therefore calls `predict` before every
+update, of zero length between measurements of the same time; let the process noise be zero then.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+
+from simnav.earth import displace, relative_position
+from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimators.solvers.admission import Admission
+from simnav.types import (
+    COMPONENTS,
+    KINDS,
+    Array,
+    Datasheet,
+    Estimate,
+    InitialState,
+    Instruments,
+    Measurement,
+    Measurements,
+)
+
+__all__ = ["FilterpyEstimator"]
+
+
+class FilterpyEstimator(Estimator):
+    """Base class of estimators whose filter is filterpy's.
+
+    Attributes
+    ----------
+    components : tuple of str
+        What the first states of the filter are, by their names in `simnav.types.COMPONENTS`; positions in metres from
+        the initial position, ``attitude_down`` the heading. States after these are the filter's own.
+    needs : tuple of str
+        Kinds of instruments without which the scenario is unsuitable.
+    uses : tuple of str
+        Kinds of instruments that it uses besides, or measurement equations (`simnav.kinds.EQUATIONS`), which stand for
+        all kinds that have them.
+    """
+
+    components: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[tuple[str, ...]] = ()
+    uses: ClassVar[tuple[str, ...]] = ()
+
+    @abstractmethod
+    def build(self, start: InitialState, instruments: Instruments) -> Any:
+        """The filter, with ``x`` (1-D) and ``P`` of the initial state; its position is (0, 0, 0)."""
+
+    @abstractmethod
+    def predict(self, kf: Any, dt: float) -> None:
+        """Call ``kf.predict`` for dt >= 0 seconds."""
+
+    @abstractmethod
+    def correct(self, kf: Any, z: Array, sheet: Datasheet) -> None:
+        """Call ``kf.update`` with a measurement; positions come as metres north, east(, down)."""
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
+        for kind in self.needs:
+            if not instruments.of_kind(kind):
+                raise UnsuitableScenario(f"{self.name} needs an instrument of kind {kind}; there is none")
+        self.origin = np.array(start.position, dtype=np.float64)
+        used = (*self.needs, *self.uses)
+        self.sheets = {s.name: s for s in instruments.values() if s.kind in used or s.equation in self.uses}
+        self.kf = self.build(start, instruments)
+        self._time = start.time
+        self._admission = Admission(instruments, self.sheets)
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Run the filter through one step."""
+        for m in self._admission.admit(measurements, self._time):
+            self._advance(m.time)
+            self.correct(self.kf, self._local(m), self.sheets[m.instrument])
+        self._advance(measurements.time)
+        return self._estimate()
+
+    def _advance(self, time: float) -> None:
+        self.predict(self.kf, max(0.0, time - self._time))
+        self._time = max(self._time, time)
+
+    def _local(self, m: Measurement) -> Array:
+        if not KINDS[m.kind].geodetic:
+            return m.value
+        if len(m.value) == 3:
+            return relative_position(m.value, self.origin)
+        return relative_position(np.append(m.value, self.origin[2]), self.origin)[:2]
+
+    def _estimate(self) -> Estimate:
+        at = [COMPONENTS.index(c) for c in self.components]
+        nine, covariance = np.zeros(9), np.zeros((9, 9))
+        nine[at] = np.ravel(self.kf.x)[: len(at)]
+        P = self.kf.P[: len(at), : len(at)]
+        covariance[np.ix_(at, at)] = 0.5 * (P + P.T)
+        estimated = np.zeros(9, dtype=bool)
+        estimated[at] = True
+        return Estimate(
+            self._time,
+            displace(self.origin, nine[:3]),
+            nine[3:6],
+            nine[6:9],
+            covariance,
+            estimated,
+            {"skipped": float(self._admission.skipped)},
+        )

@@ -1,0 +1,86 @@
+"""The EKF that is told the truth: the noise of each measurement and the faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from simnav.estimator import UnsuitableScenario
+from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_faults
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.fault_states import FaultStateModel
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.smoother import Smoother
+from simnav.recording import Recording
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
+
+__all__ = ["OracleEstimator"]
+
+
+class OracleEstimator(KalmanEstimator):
+    """The solver of the module: the inertial model where there is an IMU, the ship model where there is none.
+
+    Of the faults it knows the flags and the statistics, not what they added (`simnav.estimators.adaptations.truth`):
+    gross errors are left out, errors that last, like multipath, are states (`simnav.estimators.models.fault_states`);
+    but a disturbance of the IMU is taken off its samples. On a run without faults it is ``ekf`` or ``ship-ekf``.
+
+    Parameters
+    ----------
+    adaptation : TrueNoise
+        What it is told of the noise.
+    smoother : Smoother, optional
+        As for `KalmanEstimator`.
+    restore : bool
+        Whether what the faults added is taken off each measurement; for the adaptation `NominalNoise`.
+    """
+
+    pieces = ("adaptation", "smoother")
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "model": "it takes the one that suits the instruments, with a state for each fault that lasts",
+    }
+    reference = True
+
+    def __init__(self, adaptation: TrueNoise, smoother: Smoother | None = None, *, restore: bool = False):
+        super().__init__(InertialModel(), adaptation, smoother=smoother)
+        if restore and not isinstance(adaptation, NominalNoise):
+            raise ValueError(f"{type(adaptation).__name__} does not know what the faults added; NominalNoise does")
+        self.truth, self.restore = adaptation, restore
+        self._imu_faults: tuple[Array, Array] | None = None
+        self._revealed = False
+
+    def reveal(self, recording: Recording) -> None:
+        """Take the labels."""
+        self.truth.reveal(recording)
+        self._imu_faults = imu_faults(recording)
+        self._revealed = True
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; needs an IMU or what the ship model needs, and `reveal` before."""
+        if not self._revealed:
+            raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
+        if not instruments:
+            raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
+        super().reset(start, instruments)
+
+    def _chosen(self, instruments: Instruments) -> ErrorModel:
+        inner: ErrorModel = InertialModel() if instruments.imu is not None else ShipModel()
+        states = self.truth.states()
+        return FaultStateModel(inner, states) if states else inner
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step, without what a fault did to the IMU."""
+        imu, aids = measurements.imu, measurements.aids
+        if self.restore and isinstance(self.truth, NominalNoise):
+            aids = [self.truth.restore(m) for m in aids]
+        if imu is not None and len(imu) and self._imu_faults is not None:
+            times, error = self._imu_faults
+            k = int(np.searchsorted(times, imu.time[0] - 1e-9))
+            e = error[k : k + len(imu)]
+            imu = replace(imu, angular_rate=imu.angular_rate - e[:, :3], specific_force=imu.specific_force - e[:, 3:])
+        return super().update(Measurements(measurements.start, measurements.time, imu, aids))

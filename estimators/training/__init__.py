@@ -1,0 +1,1 @@
+"""Training of what an adaptation learns from recordings."""

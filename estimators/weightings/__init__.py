@@ -1,0 +1,1 @@
+"""How much each factor of a window counts."""

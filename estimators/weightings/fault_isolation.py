@@ -1,0 +1,144 @@
+"""Fault isolation in a window: if fixes and logs agree with each other and not with the motion, it is the motion's.
+
+A weighting that gives less weight to what does not fit is lost when it is the motion that is wrong (a disturbed IMU):
+nothing fits, nothing is believed, and nothing brings the window back. As in a filter
+(`simnav.estimators.adaptations.prediction`, after paper 003), suspicion falls on the motion where fixes and logs fail
+their chi-square tests together, several times running. But a filter cannot tell that from two instruments that are
+wrong at once. A window can ask: with the motion of that time all but taken away for one iteration, measurements that
+are right agree with each other, and measurements that are wrong still do not. Only those that agree are then believed
+in full.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.compiled import kernel
+from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.models.roles import fixes_and_logs
+from simnav.estimators.weightings.base import Factors
+from simnav.types import Instruments
+
+__all__ = ["MotionTest"]
+
+#: Weight of motion while the measurements are asked.
+LOOSE = 1e-6
+
+
+@kernel("Tuple((i8, i8))(f8[::1], f8, f8[::1], i8[::1], f8[::1])")
+def _failing(time, tested, norm, components, limits):  # type: ignore[no-untyped-def]
+    """The first measurement after a time, and how many from there on fail the test."""
+    first, failing = time.size, 0
+    while first > 0 and time[first - 1] > tested:
+        first -= 1
+        failing += norm[first] * norm[first] > limits[components[first]]
+    return first, failing
+
+
+class MotionTest:
+    """The test of the module.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    together : int
+        Failures running, of a fix and of a log, that make the motion suspect.
+    recent : float
+        A failure older than this [s] is no company.
+    probability : float
+        Of a good measurement to pass.
+    """
+
+    def __init__(self, instruments: Instruments, together: int = 3, recent: float = 5.0, probability: float = 0.999):
+        self.together, self.recent, self.probability = together, recent, probability
+        self._limits = np.array(chi_square_limits(probability))
+        self._is_fix = fixes_and_logs(instruments)
+        if len(set(self._is_fix.values())) < 2:
+            self._is_fix = {}  # nobody to ask
+        self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
+        self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
+        self._tested = -np.inf
+        self._asking: tuple[float, float] | None = None
+        self._weight = self._motion_weight = np.empty(0)
+        self._fresh = True
+
+    def begin(self, factors: Factors) -> None:
+        """An epoch begins."""
+        if self._asking is not None:  # the last one ended before the answer
+            factors.motion_weight[:] = 1.0
+        self._fresh, self._asking = True, None
+
+    def judge(self, factors: Factors) -> bool:
+        """Let measurements count in full where it is the motion that is at fault, or to find out.
+
+        Returns
+        -------
+        bool
+            False in the iteration in which they are asked: the weights are then not those that are wanted.
+        """
+        if not self._is_fix:
+            return True
+        asked, self._asking = self._asking, None
+        if asked is not None:
+            agreeing = self._agreeing(factors, *asked)
+            if agreeing is None:
+                # What was weighed here took the motion for the outlier: back to where the question was asked.
+                count = min(len(factors.weight), len(self._weight))
+                factors.weight[:count] = self._weight[:count]
+                factors.motion_weight[:] = self._motion_weight
+                return False
+            if self._blamed and asked[0] <= self._blamed[-1][1]:
+                self._blamed.pop()
+            self._blamed.append((*asked, agreeing))
+        suspected = self._suspect(factors) if self._fresh else None
+        self._fresh = False
+        for start, end, agreeing in self._blamed:
+            factors.weight[(factors.time >= start) & (factors.time <= end) & agreeing[factors.instrument]] = 1.0
+        if suspected is None:
+            return True
+        start, end = self._asking = suspected
+        self._weight, self._motion_weight = factors.weight.copy(), factors.motion_weight.copy()
+        factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
+        factors.motion_weight[(factors.motion_time >= start) & (factors.motion_time <= end)] = LOOSE
+        return False
+
+    def _suspect(self, factors: Factors) -> tuple[float, float] | None:
+        """Test the new measurements, as the window fits them with full weight; the time in which motion is suspect."""
+        first, failing_now = _failing(factors.time, self._tested, factors.norm, factors.components, self._limits)
+        new = slice(first, None)
+        if first == len(factors.time):
+            return None
+        self._tested = now = float(factors.time[-1])
+        if not (self._failures or self._blamed or failing_now):
+            return None
+        failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
+        for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
+            name = factors.names[i]
+            if not fails:
+                self._failures.pop(name, None)
+            elif name in self._is_fix:
+                count, since, _ = self._failures.get(name, (0, time, time))
+                self._failures[name] = count + 1, since, time
+        self._blamed = [span for span in self._blamed if span[1] >= factors.time[0]]
+        failing = {n: f for n, f in self._failures.items() if now - f[2] <= self.recent}
+        if self._blamed and now - self._blamed[-1][1] <= self.recent and failing:
+            return self._blamed[-1][0], now
+        failing = {n: f for n, f in failing.items() if f[0] >= self.together}
+        if len({self._is_fix[name] for name in failing}) < 2:
+            return None
+        return min(since for _, since, _ in failing.values()), now
+
+    def _agreeing(self, factors: Factors, start: float, end: float) -> NDArray[np.bool_] | None:
+        """Which instruments fit, as the window is without its motion; None unless a fix and a log are among them."""
+        from scipy.special import chdtri
+
+        asked = (factors.time >= start) & (factors.time <= end)
+        agreeing, kinds = np.zeros(len(factors.names), dtype=bool), set()
+        for i, name in enumerate(factors.names):
+            its = asked & (factors.instrument == i)
+            freedom = int(factors.components[its].sum())
+            if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.probability):
+                agreeing[i] = True
+                kinds.add(self._is_fix.get(name))
+        return agreeing if kinds >= {True, False} else None

@@ -1,0 +1,169 @@
+"""Gradient-adaptive weights of paper 000: residuals over their own robust scale, for motion, GNSS and DVL.
+
+For each type of factor (an instrument, or motion) over the window (eqs. 19-21),
+
+    ``r~ = |r| / (s + epsilon)``,  ``s = kappa median(|r|)``,  ``w = clip(a / (1 + r~^2 / c^2), w_min, 1)``,
+
+and the information is multiplied by w (eq. 24; the print's eqs. 22 and 23 do not agree with it). The window is every
+epoch that holds a measurement (eqs. 18 and 25 differ). The paper names three types; instruments other than GNSS count
+as its DVL.
+
+What is settled otherwise than printed, unless the preset is ``"paper"``:
+
+- |r| is the whitened norm. The print's unwhitened norm of a GNSS residual is mostly that of the Down axis.
+- The print calls ``1.4826 median(|r|)`` MAD and consistent. That holds for one component; of three, it is 2.28 sigma.
+  Here kappa makes s consistent whatever the number of components: 1.4826, 0.849 and 0.650 for 1, 2 and 3.
+- c of the DVL is 2: in units of the consistent scale the print's 1 costs 15 % of the efficiency on Gaussian noise,
+  which in the print's units of 2.28 sigma it does not.
+- epsilon is in units of sigma. The print's 0.1 has the unit of the residual, whichever it is.
+- s is never less than 1, the datasheet's noise. The residuals of a window are smaller than its noise where they fitted
+  it, and a median of few means nothing: with fewer than ``fewest`` s is 1.
+- A motion residual of n components counts by the mean square of its blocks of three (position, velocity, ...), which
+  eq. 25 adds up, so that the same constants fit. In the print, it is the plain norm of metres, m/s and radians.
+
+``a / (1 + r~^2 / c^2)`` is Cauchy's weight, not Geman and McClure's as the text has it; with a > 1 and the clip it is
+1 up to ``r~ = c sqrt(a - 1)``. With ``w_min > 0`` the influence w r is *not* bounded, so the breakdown point of eq. 30
+does not hold: a GNSS outlier of any size keeps half its information. And since the scale is estimated again at each
+iteration, the cost need not fall (eq. 28). A fault that fills the window becomes the scale, and is not suppressed.
+
+Source: M. Guo et al. 2026 (paper 000), section 3.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.weightings.base import Factors, Weighting
+from simnav.kinds import POSITION, VELOCITY
+from simnav.types import Array, Instruments
+
+__all__ = ["GradientAdaptive", "Shape", "medians"]
+
+#: a, c and w_min of eq. 21.
+Shape = tuple[float, float, float]
+
+#: Medians of the chi distribution of 1 to 3 degrees of freedom: the inverses of the consistent kappa.
+_CHI_MEDIAN = np.array([1.0, 0.674490, 1.177410, 1.538172])
+
+
+@kernel("void(f8[::1], i8[::1], i8, f8[::1])")
+def medians(values, group, fewest, out):  # type: ignore[no-untyped-def]
+    """Medians of groups.
+
+    Parameters
+    ----------
+    values : (M,) array
+    group : (M,) array of int
+        Of each value, below G.
+    fewest : int
+        A group of fewer has the median 1; at least 1.
+    out : (G,) array
+        Overwritten.
+    """
+    members = np.empty(values.size)
+    for g in range(out.size):
+        count = 0
+        for i in range(values.size):
+            if group[i] == g:
+                members[count] = values[i]
+                count += 1
+        if count < fewest:
+            out[g] = 1.0
+        else:
+            ordered = np.sort(members[:count])
+            out[g] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
+
+
+@kernel("void(f8[::1], f8[::1], i8[::1], i8[::1], f8[:, ::1], f8, f8, i8, f8[::1], f8[::1])")
+def _adapt(norm, kappa, kind, group, shapes, epsilon, floor, fewest, scales, weight):  # type: ignore[no-untyped-def]
+    """Scales of the groups and weights of the members (eqs. 19-21); kappa is that of a norm's kind."""
+    scaled = np.empty(norm.size)
+    for i in range(norm.size):
+        scaled[i] = kappa[kind[i]] * norm[i]
+    medians(scaled, group, fewest, scales)
+    for g in range(scales.size):
+        scales[g] = max(scales[g], floor)
+    for i in range(norm.size):
+        a, c, least = shapes[group[i], 0], shapes[group[i], 1], shapes[group[i], 2]
+        ratio = norm[i] / (c * (scales[group[i]] + epsilon))
+        weight[i] = min(max(a / (1.0 + ratio * ratio), least), 1.0)
+
+
+class GradientAdaptive(Weighting):
+    """The weighting of the module.
+
+    Parameters
+    ----------
+    preset : "default" or "paper"
+        Whether the norms and scales are as printed.
+    gnss, motion, other : (a, c, w_min)
+        Of eq. 21, for GNSS, the IMU, and the DVL with all other instruments; of the last, None: ``(2, 2, 0.3)``, or
+        ``(2, 1, 0.3)`` with the preset "paper".
+    epsilon : float
+        Of eq. 19; in sigma, or with the preset "paper" in the residual's unit.
+    fewest : int
+        With fewer residuals of a type its scale is the nominal one.
+    """
+
+    def __init__(
+        self,
+        preset: Literal["default", "paper"] = "default",
+        gnss: Shape = (3.0, 1.5, 0.5),
+        motion: Shape = (2.0, 1.0, 0.3),
+        other: Shape | None = None,
+        epsilon: float = 0.1,
+        fewest: int = 5,
+    ):
+        if preset not in ("default", "paper"):
+            raise ValueError(f"preset = {preset!r}: it must be 'default' or 'paper'")
+        other = other or (2.0, 1.0 if preset == "paper" else 2.0, 0.3)
+        for name, shape in (("gnss", gnss), ("motion", motion), ("other", other)):
+            if len(shape) != 3 or not (shape[0] > 0.0 and shape[1] > 0.0 and 0.0 <= shape[2] <= 1.0):
+                raise ValueError(f"{name} = {shape}: it must be a > 0, c > 0 and w_min in [0, 1]")
+        if not epsilon > 0.0:
+            raise ValueError(f"epsilon = {epsilon:g}: it must be above 0")
+        self.preset, self.epsilon, self.fewest = preset, epsilon, fewest
+        self._gnss, self._motion, self._other = gnss, motion, other
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        self._receivers = {sheet.name for sheet in instruments.of_equation(POSITION, VELOCITY)}
+        self._names: tuple[str, ...] = ()
+        self._scales = np.ones(1)
+        paper = self.preset == "paper"
+        self._kappa = np.full(4, 1.4826) if paper else 1.0 / _CHI_MEDIAN
+        self._kappa_motion = np.array([1.4826 if paper else 3.0**-0.5])
+        self._floor, self._least = (0.0, 1) if paper else (1.0, self.fewest)
+
+    def weigh(self, factors: Factors) -> bool:
+        """Set the weights of the measurements and of motion."""
+        if factors.names != self._names:
+            self._names = factors.names
+            shapes = [self._gnss if n in self._receivers else self._other for n in factors.names]
+            self._shapes = np.array([*shapes, self._motion], dtype=np.float64)
+            self._scales = np.ones(len(self._shapes))
+        if self.preset == "paper":
+            norm, motion = _rows(factors.residual), _rows(factors.motion_residual[:, :9])
+        else:
+            norm, motion = factors.norm, factors.motion_norm * (3.0 / factors.motion_residual.shape[1]) ** 0.5
+        constants, scales, zero = self._shapes, self._scales, np.zeros(len(motion), np.int64)
+        settings = self.epsilon, self._floor, self._least
+        _adapt(
+            norm, self._kappa, factors.components, factors.instrument, constants[:-1], *settings, scales[:-1],
+            factors.weight,
+        )  # fmt: skip
+        _adapt(motion, self._kappa_motion, zero, zero, constants[-1:], *settings, scales[-1:], factors.motion_weight)
+        return True
+
+    def diagnostics(self) -> dict[str, float | Array]:
+        """``scale.<instrument>`` and ``scale.motion``: s, in sigma or as the preset has it."""
+        return {f"scale.{name}": s for name, s in zip((*self._names, "motion"), self._scales.tolist())}
+
+
+def _rows(matrix: Array) -> Array:
+    """Euclidean norm of each row."""
+    norm: Array = np.sqrt(np.einsum("ij,ij->i", matrix, matrix))
+    return norm

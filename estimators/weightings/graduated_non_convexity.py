@@ -1,0 +1,118 @@
+"""Graduated non-convexity: the robust cost begins convex and hardens while the window is solved.
+
+H. Yang, P. Antonante, V. Tzoumas and L. Carlone, "Graduated non-convexity for robust spatial perception: from
+non-minimal solvers to global outlier rejection", *IEEE Robotics and Automation Letters* 5(2), 2020. With
+``u^2 = v' R^-1 v / c^2``, the weights are
+
+- truncated least squares (``"tls"``, eq. 14; mu grows from ``1 / (2 u_max^2 - 1)``): 1 where ``u^2 <= mu / (mu + 1)``,
+  0 where ``u^2 >= (mu + 1) / mu``, ``sqrt(mu (mu + 1)) / u - mu`` between;
+- Geman-McClure (``"gm"``, eq. 12; mu falls from ``2 u_max^2`` to 1): ``(mu / (u^2 + mu))^2``.
+
+Here mu moves by a factor at each Gauss-Newton iteration, and a window that slides changes little from epoch to epoch:
+where no new measurement is an outlier (u > 1 once the window has been solved with it), the cost stays as hard as it
+ended. Only an outlier begins a new schedule, in which every measurement of the window is judged again.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from simnav.estimators.weightings.base import Factors
+from simnav.estimators.weightings.m_estimators import constants, geman_mcclure, truncated
+from simnav.estimators.weightings.robust_weighting import RobustWeighting
+from simnav.types import Array, Instruments
+
+__all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncated"]
+
+#: Where truncated least squares counts as hard: weights other than 0 and 1 between u = 0.95 and 1.05 only.
+HARD = 10.0
+
+
+def softened_truncated(square: Array, mu: float) -> Array:
+    """Weights of truncated least squares of u^2, softened by mu (Yang et al. 2020, eq. 14)."""
+    root = np.sqrt(mu * (mu + 1.0) / np.maximum(square, 1e-12)) - mu
+    weight: Array = np.minimum(np.maximum(root, 0.0), 1.0)
+    return weight
+
+
+def softened_geman_mcclure(square: Array, mu: float) -> Array:
+    """Geman-McClure weights of u^2, softened by mu (Yang et al. 2020, eq. 12)."""
+    weight: Array = (mu / (square + mu)) ** 2
+    return weight
+
+
+class GraduatedNonConvexity(RobustWeighting):
+    """The weighting of the module.
+
+    Parameters
+    ----------
+    cost : "tls" or "gm"
+        Truncated least squares, or Geman and McClure's.
+    growth : float
+        Factor of mu from an iteration to the next; 1.4 in the paper, which has time.
+    efficiency : float
+        On Gaussian noise, of the hard cost; c follows. For truncated least squares and 95 %, c^2 is near the 99 %
+        quantile of chi-square.
+    """
+
+    def __init__(
+        self,
+        cost: Literal["tls", "gm"] = "tls",
+        growth: float = 3.0,
+        efficiency: float = 0.95,
+        smallest: float = 1e-3,
+    ):
+        if cost not in ("tls", "gm"):
+            raise ValueError(f"cost = {cost!r}: it must be 'tls' or 'gm'")
+        if not growth > 1.0:
+            raise ValueError(f"growth = {growth:g}: it must be above 1")
+        super().__init__(smallest)
+        self.cost, self.growth = cost, growth
+        tuned = constants(truncated if cost == "tls" else geman_mcclure, efficiency)
+        self._scale = np.array([1.0, *tuned]) ** -2.0
+        self._soft = softened_truncated if cost == "tls" else softened_geman_mcclure
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._mu = self._hard = HARD if self.cost == "tls" else 1.0
+        self._seen = self._newest = -np.inf
+        self._fresh = True
+
+    def begin(self) -> None:
+        """An epoch begins."""
+        self._seen, self._fresh = self._newest, True
+
+    def choose(self, factors: Factors) -> bool:
+        """Set the weights of the measurements; False while the cost hardens."""
+        square = factors.norm * factors.norm * self._scale[factors.components]
+        if self._fresh:
+            self._fresh = False
+            self._soften(factors, square)
+        elif self._mu != self._hard:
+            self._harden()
+        factors.weight[:] = self._soft(square, self._mu)
+        return self._mu == self._hard
+
+    def _soften(self, factors: Factors, square: Array) -> None:
+        """Choose the epoch's first mu."""
+        self._mu = self._hard
+        new = square[np.searchsorted(factors.time, self._seen, side="right") :]
+        if not len(new):
+            return
+        self._newest = float(factors.time[-1])
+        if new.max() > 1.0:
+            largest = float(square.max())
+            self._mu = 1.0 / (2.0 * largest - 1.0) if self.cost == "tls" else max(2.0 * largest, 1.0)
+
+    def _harden(self) -> None:
+        if self.cost == "tls":
+            self._mu = min(self._mu * self.growth, self._hard)
+        else:
+            self._mu = max(self._mu / self.growth, self._hard)
+
+    def diagnostics(self) -> dict[str, float | Array]:
+        """``mu``, as the epoch ended."""
+        return {"mu": self._mu}

@@ -1,0 +1,222 @@
+"""Rows as declarations: their parameters, their documentation, what fits together, and that nothing was lost."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import pickle
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simnav.estimator import EstimatorError, describe, find, make, names, register
+from simnav.estimators.adaptations.adkf import AdaptiveFactor
+from simnav.estimators.adaptations.fading import FadingMemory
+from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.adaptations.innovation_based import InnovationBased
+from simnav.estimators.adaptations.sage_husa import SageHusa
+from simnav.estimators.adaptations.variational_bayes import VariationalBayes
+from simnav.estimators.composition import Row, documented, piece
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_points import InertialPoints
+from simnav.estimators.models.kinematic import KinematicModel
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.rows.kalman import Ekf
+from simnav.estimators.solvers.federated import FederatedEstimator
+from simnav.estimators.solvers.full_graph import FullGraph
+from simnav.estimators.solvers.gtsam_solvers import FixedLagEstimator
+from simnav.estimators.solvers.imm import ImmEstimator
+from simnav.estimators.solvers.invariant import InvariantKalmanEstimator
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.linear import LinearKalmanEstimator
+from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
+from simnav.estimators.solvers.smoother import Smoother
+from simnav.estimators.solvers.window import WindowEstimator
+from simnav.scenario import load
+from simnav.source import record
+from simnav.trial import run_trial
+
+#: Names, aliases, parameters and defaults of the rows before they were declarations.
+RECORDED = json.loads((Path(__file__).parent / "recorded_rows.json").read_text())
+
+
+class Gated(Row, solver=KalmanEstimator, model=InertialModel, adaptation=ChiSquareGate):
+    """A gated filter."""
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_every_name_alias_parameter_and_default_is_still_there(name: str):
+    told, now = RECORDED[name], describe(name)
+    assert sorted(now.aliases) == told["aliases"]
+    assert (now.slow, now.reference) == (told["slow"], told["reference"])
+    defaults = {p.name: list(p.default) if isinstance(p.default, tuple) else p.default for p in now.parameters}
+    assert {n: defaults[n] for n in told["parameters"]} == told["parameters"]
+
+
+def test_the_same_noise_has_the_same_parameters_in_a_filter_and_in_a_window():
+    filters, windows = ({p.name for p in describe(n).parameters} for n in ("iae", "iae-fgo"))
+    noise = set(inspect.signature(InnovationBased).parameters) - {"source"}
+    assert noise <= filters
+    assert noise <= windows
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_every_parameter_is_documented_and_every_row_says_whose_it_is(name: str):
+    cls = find(name)
+    meanings = documented(cls)
+    for parameter in describe(name).parameters:
+        assert meanings[parameter.name][1], parameter.name
+    text = inspect.getdoc(cls)
+    assert re.search(r"(?s)\bSource:|FGO.* of [A-Z]\. ", text)
+    assert not re.search(r"paper 00\d", text.split("Parameters\n")[0])
+
+
+@pytest.mark.parametrize("name", [n for n in RECORDED if "dead" not in n])
+def test_a_row_can_be_pickled(name: str):
+    row = pickle.loads(pickle.dumps(make(name)))
+    assert type(row) is find(name)
+    assert row.solver.row == name
+
+
+def test_a_row_has_what_its_solver_has():
+    row = Ekf(calibrate=False)
+    assert row.model is row.solver.model
+    assert not row.model.calibrate
+    with pytest.raises(AttributeError, match="absent"):
+        _ = row.absent
+
+
+@pytest.mark.usefixtures("clean_registry")
+def test_a_file_registers_and_sets_parameters(tmp_path: Path):
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from simnav import register\n"
+        "from simnav.estimators.composition import Row\n"
+        "from simnav.estimators.adaptations.sage_husa import SageHusa\n"
+        "from simnav.estimators.models.inertial_points import InertialPoints\n"
+        "from simnav.estimators.solvers.sigma_point import SigmaPointEstimator\n\n\n"
+        "class SageHusaUkf(Row, solver=SigmaPointEstimator, model=InertialPoints, adaptation=SageHusa):\n"
+        '    """Sage-Husa noise in an unscented filter."""\n'
+    )
+    made = make(f"{path}:SageHusaUkf", fading="0.9", scope="all", alpha="0.4")
+    assert (made.adaptation.fading, made.adaptation.scope, made.alpha) == (0.9, "all", 0.4)
+    assert describe(str(path)).summary == "Sage-Husa noise in an unscented filter."
+    with pytest.raises(EstimatorError, match="no parameter 'fadin'; did you mean 'fading'"):
+        make(str(path), fadin=0.9)
+    with pytest.raises(EstimatorError, match=r"'scope' of estimator 'sage-husa-ukf' is one of fixes, all"):
+        make(str(path), scope="some")
+    with pytest.raises(EstimatorError, match=r"fading = 2: it must lie in \(0, 1\]"):
+        make(str(path), fading=2.0)
+
+
+def test_a_subclass_exchanges_a_piece_or_adds_a_parameter():
+    class Other(Gated, adaptation=SageHusa):
+        """Another."""
+
+    class More(Gated):
+        def __init__(self, extra: int = 3, **options):
+            super().__init__(**options)
+            self.extra = extra
+
+    assert "probability" not in inspect.signature(Other).parameters
+    assert isinstance(Other(prior=3).adaptation, SageHusa)
+    assert More(probability=0.9).adaptation.probability == 0.9
+
+
+def test_pieces_are_changed_for_a_row():
+    class Changed(
+        Row,
+        solver=piece(WindowEstimator, defaults={"window": 7}, spacing=0.5),
+        model=InertialModel,
+        adaptation=piece(VariationalBayes, rename={"iterations": "noise_iterations"}),
+    ):
+        """Changed."""
+
+    parameters = inspect.signature(Changed).parameters
+    assert "spacing" not in parameters
+    assert (parameters["window"].default, parameters["noise_iterations"].default) == (7, 2)
+    row = Changed(noise_iterations=4, iterations=6)
+    assert (row.window, row.spacing, row.adaptation.iterations, row.iterations) == (7, 0.5, 4, 6)
+    assert Changed().window == 7
+
+
+def test_what_does_not_fit_is_said_where_it_is_declared():
+    with pytest.raises(TypeError, match=r"both have a parameter 'iterations'; rename one: piece\("):
+        type(Row)("Clash", (Row,), {}, solver=WindowEstimator, model=InertialModel, adaptation=VariationalBayes)
+    with pytest.raises(TypeError, match="Wrong: ImmEstimator takes no adaptation: the noise of each measurement is a"):
+        type(Row)("Wrong", (Row,), {}, solver=ImmEstimator, model=Suitable, adaptation=SageHusa)
+    with pytest.raises(TypeError, match="Odd: KalmanEstimator takes no oar: it takes model, adaptation"):
+        type(Row)("Odd", (Row,), {}, solver=KalmanEstimator, model=Suitable, oar=SageHusa)
+    with pytest.raises(TypeError, match="FadingMemory has no parameter 'memroy'; it has memory"):
+        type(Row)("Typo", (Row,), {}, solver=KalmanEstimator, model=Suitable, adaptation=piece(FadingMemory, memroy=1))
+    with pytest.raises(TypeError, match="Gated has no parameter 'limit'; it has probability, patience"):
+        Gated(limit=3.0)
+
+
+@pytest.mark.parametrize("solver", [LinearKalmanEstimator, InvariantKalmanEstimator, SigmaPointEstimator,
+                                    FederatedEstimator, WindowEstimator, FullGraph, FixedLagEstimator])  # fmt: skip
+def test_a_solver_that_cannot_smooth_says_why(solver: type):
+    if solver is FixedLagEstimator:
+        assert solver.refuses["adaptation"]
+        return
+    with pytest.raises(TypeError, match=r"takes no smoother: (?!it takes)"):
+        type(Row)("Smoothed", (Row,), {}, solver=solver, model=InertialModel, smoother=Smoother)
+
+
+@pytest.mark.parametrize("adaptation", [FadingMemory(), AdaptiveFactor(), AdaptiveFactor(target="P")])
+def test_a_window_refuses_what_inflates_a_prediction(adaptation):
+    with pytest.raises(ValueError, match="inflates the covariance of the prediction"):
+        WindowEstimator(InertialModel(), adaptation)
+    WindowEstimator(InertialModel(), AdaptiveFactor(together=0))
+
+
+def test_a_model_without_a_chain_makes_no_graph():
+    with pytest.raises(TypeError, match="KinematicModel has no chain, so that no graph can be made of it"):
+        WindowEstimator(KinematicModel())
+
+
+FILTERS = {
+    "kalman": (KalmanEstimator, InertialModel),
+    "linear": (LinearKalmanEstimator, InertialModel),
+    "invariant": (InvariantKalmanEstimator, InertialModel),
+    "sigma-point": (SigmaPointEstimator, InertialPoints),
+    "federated": (FederatedEstimator, InertialModel),
+    "window": (WindowEstimator, InertialModel),
+    "full": (FullGraph, InertialModel),
+}
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return record(load("harbour-multipath").model_copy(update={"duration": 20.0}), 3)
+
+
+@pytest.mark.parametrize("noise", [SageHusa, InnovationBased, ChiSquareGate])
+@pytest.mark.parametrize("solver", FILTERS)
+def test_any_adaptation_works_with_any_solver(recording, solver: str, noise: type):
+    """It is asked (it changes the estimate's report of sigmas), and the estimate stays sound."""
+    make_solver, model = FILTERS[solver]
+    row = type(Row)("Any", (Row,), {}, solver=make_solver, model=model, adaptation=noise)
+    trial = run_trial(row(), recording)
+    assert trial.status == "ok", trial.reason
+    assert np.isfinite(trial.diagnostics["sigma_north.gnss"]).all()
+    plain = run_trial(type(Row)("Plain", (Row,), {}, solver=make_solver, model=model)(), recording)
+    assert "sigma_north.gnss" not in plain.diagnostics
+    assert np.linalg.norm(trial.velocity - plain.velocity, axis=1).max() < 3.0
+
+
+@pytest.mark.usefixtures("clean_registry")
+def test_a_new_row_is_short():
+    """Every declaration of ours, its docstring aside, has at most ten lines."""
+    for name in names():
+        body = re.sub(r'"""(?s:.*?)"""', "", inspect.getsource(find(name)))
+        assert len([line for line in body.splitlines() if line.strip()]) <= 10, name
+
+
+@pytest.mark.usefixtures("clean_registry")
+def test_a_declaration_in_a_module_is_registered_with_its_place():
+    registered = register("a-gated-one")(Gated)
+    assert describe("a-gated-one").line > 0
+    assert registered.name == "a-gated-one"
