@@ -85,7 +85,7 @@ class WindowEstimator(Solver):
         Most steps an epoch.
     spacing : float
         Measurements at times closer to the newest node than this [s] get no node of their own (`Chain`, folds), unless
-        they are the last of their step. 0: every time of a measurement is a node.
+        they are the last of their step. 0, and with ``every_sample``: every time of a measurement is a node.
     every_sample : bool
         A node for every IMU sample, instead of one preintegrated factor between measurements: the graph of the
         post-processing paper without its equivalent IMU factor.
@@ -213,7 +213,7 @@ class WindowEstimator(Solver):
             self._admission.skipped += 1
         if noise is None:
             return False
-        if chain.ahead > 0.0 and (last or chain.ahead >= self.spacing):
+        if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
             self._extend()
         chain.attach(m, noise)
         return True
