@@ -353,6 +353,7 @@ class Activity:
     Parameters
     ----------
     spec : FaultSpec
+        The fault, with its intervals or how they are drawn.
     rng : numpy.random.Generator
         For random intervals.
     """
@@ -409,9 +410,11 @@ class FaultLayer:
     Parameters
     ----------
     spec : FaultSpec
+        What the scenario says of the fault.
     index : int
-        First bit.
+        First bit of the fault in the labels of measurements.
     seed : int
+        Seed of the run.
     key : str
         Of its random streams.
 
@@ -448,6 +451,7 @@ class FaultLayer:
         Parameters
         ----------
         stream : AidStream
+            Measurements of one of the fault's instruments, with what earlier faults did to them.
 
         Returns
         -------
@@ -462,7 +466,9 @@ class FaultLayer:
         Parameters
         ----------
         samples : ImuSamples
+            Samples, with what earlier faults did to them.
         labels : ImuLabels or None
+            Labels of these samples; None where no fault of the scenario touches the IMU.
 
         Returns
         -------
