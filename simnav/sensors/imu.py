@@ -233,7 +233,9 @@ class Imu:
     Parameters
     ----------
     spec : ImuSpec
+        Rate and error parameters, from the scenario.
     seed : int
+        Seed of the run.
     """
 
     def __init__(self, spec: ImuSpec, seed: int):
