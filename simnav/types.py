@@ -101,7 +101,9 @@ class ImuDatasheet:
     rate : float
         Nominal sample rate [Hz].
     gyroscope, accelerometer : TriadDatasheet
+        Error parameters of the two triads.
     name : str
+        Name of the instrument.
     """
 
     rate: float
@@ -184,6 +186,7 @@ class Instruments(Mapping[str, Datasheet]):
     Parameters
     ----------
     aids : sequence of Datasheet
+        Datasheets of the aiding instruments, each with a name of its own.
     imu : ImuDatasheet or None
         None for a vessel without an IMU.
     step : float
@@ -302,6 +305,7 @@ class InitialState:
     Attributes
     ----------
     time : float
+        Time of validity [s].
     position, velocity, attitude : (3,) array
         Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad].
     covariance : (9, 9) array
@@ -322,6 +326,7 @@ class Estimate:
     Attributes
     ----------
     time : float
+        Time of validity [s]: the end of the step.
     position, velocity, attitude : (3,) array or None
         None for what is not estimated.
     covariance : (9, 9) array or None
@@ -357,7 +362,9 @@ class NavigationStates:
     Attributes
     ----------
     time : (n,) array
+        Times of validity [s].
     position, velocity, attitude : (n, 3) array
+        Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad].
     """
 
     time: Array
