@@ -75,6 +75,7 @@ def spectrum(sea: Sea, omega: Array) -> Array:
     Parameters
     ----------
     sea : Sea
+        Significant height, peak period and shape of the spectrum.
     omega : (n,) array
         Angular frequency [rad/s], positive.
 
@@ -107,6 +108,7 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     sea : Sea or None
         None is a flat sea.
     seed : int
+        Seed of the run: it fixes frequencies, directions and phases.
 
     Returns
     -------
