@@ -121,7 +121,7 @@ class Candidate:
     Attributes
     ----------
     factory : callable
-        See above.
+        The argument of the same name.
     name : str
         Registered name, or the name of the class.
     """
