@@ -85,6 +85,7 @@ class EstimatorAgent:
         Parameters
         ----------
         observation : dict
+            What the environment gave for the step.
 
         Returns
         -------
