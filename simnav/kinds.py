@@ -264,6 +264,7 @@ class Kind:
         Parameters
         ----------
         value, reference : (..., d) array
+            Measured values, and those that they are compared with; components as in `values`.
 
         Returns
         -------
