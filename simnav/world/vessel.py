@@ -25,7 +25,7 @@ class Start(Spec):
     depth : float
         The same, positive down; one of the two [m].
     heading : float
-        [rad]
+        Direction of the bow, clockwise from north [rad].
     speed : float
         Through the water [m/s].
     """
