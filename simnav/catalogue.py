@@ -46,7 +46,7 @@ class Header:
     tags : tuple of str
         Words by which lists are filtered; ``long`` is left out of quick campaigns.
     path : Path
-        Of the TOML file.
+        Path of the TOML file.
     """
 
     name: str

@@ -209,7 +209,7 @@ def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report
     estimator : str or callable
         Name or path, as for `simnav.estimator.make`; or what makes a new instance when called.
     **parameters
-        Of the estimator, if it is a name or path.
+        Parameters of the estimator, if it is a name or path.
 
     Returns
     -------

@@ -66,7 +66,7 @@ class TriadDatasheet:
         Stationary sigma of the in-run (first-order Gauss-Markov) bias [x]; where
         ``correlation_time`` is infinite it is a random walk of this many x per sqrt(s).
     correlation_time : float
-        Of the in-run bias [s].
+        Correlation time of the in-run bias [s].
     random_walk : float
         White noise density [x/sqrt(Hz)] (angle or velocity random walk).
     rate_random_walk : float
@@ -309,7 +309,7 @@ class InitialState:
     position, velocity, attitude : (3,) array
         Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad].
     covariance : (9, 9) array
-        Of the errors, in the order of `COMPONENTS`.
+        Covariance of the errors, in the order of `COMPONENTS`.
     """
 
     time: float
@@ -386,7 +386,7 @@ class TapStates(NavigationStates):
     Attributes
     ----------
     angular_rate : (n, 3) array
-        Of the body relative to the Earth, body axes [rad/s].
+        Angular rate of the body relative to the Earth, body axes [rad/s].
     water_velocity : (n, 3) array
         The current at the vessel, north-east-down [m/s].
     """

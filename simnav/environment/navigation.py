@@ -164,7 +164,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         Parameters
         ----------
         seed : int, optional
-            Of the run; without one, a fresh one is drawn from `np_random`.
+            Seed of the run; without one, a fresh one is drawn from `np_random`.
         options : dict, optional
             None is known; ignored.
 

@@ -144,6 +144,7 @@ class Chart:
         Parameters
         ----------
         time : float
+            End of the step [s].
         truth, estimate : (3,) array
             Geodetic [rad, rad, m].
         """

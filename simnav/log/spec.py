@@ -250,7 +250,7 @@ class RecordedSpec(Spec):
     reference : ReferenceSpec
         The trajectory that estimates are scored against.
     origin : OriginSpec or None
-        Of local Cartesian positions.
+        Origin of local Cartesian positions.
     skip : float
         Seconds to leave out at the beginning.
     """

@@ -138,7 +138,7 @@ class ImuSpec(Spec):
         Parameters
         ----------
         seed : int
-            Of the run.
+            Seed of the run.
         """
         return Imu(self, seed)
 

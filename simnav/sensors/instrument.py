@@ -159,7 +159,7 @@ class AidSpec(Spec):
         Parameters
         ----------
         name : str
-            Of the instrument in its scenario.
+            Name of the instrument in its scenario.
         """
         return Datasheet(
             name,
@@ -182,9 +182,9 @@ class AidSpec(Spec):
         Parameters
         ----------
         name : str
-            Of the instrument in its scenario; it names the random streams.
+            Name of the instrument in its scenario; it names the random streams.
         seed : int
-            Of the run.
+            Seed of the run.
         water_depth : float, optional
             Below the mean sea surface [m], for instruments that need the bottom.
         """

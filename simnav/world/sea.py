@@ -33,7 +33,7 @@ class Sea(Spec):
     spectrum : str
         ``jonswap`` or ``pierson_moskowitz`` (which is JONSWAP with peakedness 1).
     significant_height, peak_period : float
-        Of the waves [m], [s].
+        Significant height of the waves [m], and period of the spectral peak [s].
     peakedness : float
         JONSWAP's gamma.
     direction : float

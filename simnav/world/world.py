@@ -52,7 +52,7 @@ class World:
     rate : float
         Samples of the ideal IMU per second [Hz].
     seed : int
-        Of the wave components.
+        Seed of the wave components.
     """
 
     def __init__(

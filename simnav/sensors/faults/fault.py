@@ -98,7 +98,7 @@ def size_by_component(sizes: Mapping[str, Any], stem: str, kind: str) -> Array |
     stem : str
         As in ``FaultSpec.stems``.
     kind : str
-        Of the instrument.
+        Kind of the instrument.
 
     Returns
     -------
@@ -281,7 +281,7 @@ class FaultSpec(Spec):
         Parameters
         ----------
         duration : float
-            Of the run [s]; labels are cut off there.
+            Length of the run [s]; labels are cut off there.
         instruments : mapping
             Name to kind.
         """
@@ -299,7 +299,7 @@ class FaultSpec(Spec):
         index : int
             Its first bit.
         seed : int
-            Of the run.
+            Seed of the run.
         occurrence : int, optional
             Tells faults of the same name apart (`build_layers` counts them); by default the index.
         """
@@ -416,11 +416,12 @@ class FaultLayer:
     seed : int
         Seed of the run.
     key : str
-        Of its random streams.
+        Name of its random streams.
 
     Attributes
     ----------
     spec : FaultSpec
+        What the scenario says of the fault.
     activity : Activity
         When it acts.
     """
