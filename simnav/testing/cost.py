@@ -48,7 +48,7 @@ class Cost:
     Attributes
     ----------
     estimator : str
-        Label.
+        Label: name and parameters.
     status : str
         ``ok``, ``unsuitable`` (it needs other instruments) or ``error``; NaN stands for what was not measured.
     reason : str
@@ -110,7 +110,7 @@ def measure(
     >>> from simnav import load, make, record
     >>> sea = record(load("ship-straight"))
     >>> (cost,) = measure({"gnss-only": lambda: make("gnss-only")}, sea, epochs=20, rounds=1)
-    >>> cost.status, cost.update_median < 0.1, cost.peak_memory > 0
+    >>> cost.status, cost.update_median > 0.0, cost.peak_memory > 0.0
     ('ok', True, True)
     """
     steps = list(itertools.islice(recording.steps(), max(epochs, 0)))
