@@ -219,10 +219,15 @@ class _Traced:
     """What Python and NumPy hold [B], from entry to exit."""
 
     def __enter__(self) -> None:
-        tracemalloc.start()
+        self._others = tracemalloc.is_tracing()  # whoever began it goes on after us
+        if not self._others:
+            tracemalloc.start()
+        tracemalloc.reset_peak()
+        self._before = tracemalloc.get_traced_memory()[0]
 
     def __exit__(self, *_: object) -> None:
-        tracemalloc.stop()
+        if not self._others:
+            tracemalloc.stop()
 
     def look(self) -> None:
         """Nothing to do: Python keeps the peak itself."""
@@ -230,11 +235,11 @@ class _Traced:
     def settled(self) -> int:
         """What is held once the interpreter has dropped what it keeps for reuse (lists of free tuples and floats)."""
         gc.collect()
-        return tracemalloc.get_traced_memory()[0]
+        return tracemalloc.get_traced_memory()[0] - self._before
 
     def peak(self) -> int:
         """The most that was held."""
-        return tracemalloc.get_traced_memory()[1]
+        return tracemalloc.get_traced_memory()[1] - self._before
 
 
 class _GivenOut:

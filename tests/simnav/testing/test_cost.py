@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from functools import partial
 from time import process_time
 
@@ -123,6 +124,19 @@ def test_what_fails_is_named(recording: Recording):
     assert idle.status == "ok"
     assert told[0] == (0, 5, "time, round 1")
     assert told[-1] == (5, 5, "")
+
+
+def test_a_trace_that_is_under_way_goes_on(recording: Recording):
+    (alone,) = measure({"hoarder": Hoarder}, recording, epochs=10, rounds=1)
+    tracemalloc.start()
+    try:
+        held = np.zeros(10_000_000, dtype=np.uint8)
+        (cost,) = measure({"hoarder": Hoarder}, recording, epochs=10, rounds=1)
+        assert tracemalloc.is_tracing()
+        assert tracemalloc.get_traced_memory()[0] >= held.nbytes
+    finally:
+        tracemalloc.stop()
+    assert cost.peak_memory == pytest.approx(alone.peak_memory, rel=0.1)
 
 
 @pytest.mark.parametrize(("options", "says"), [({"epochs": 1}, "epochs: 1 "), ({"rounds": 0}, "rounds: 0 ")])
