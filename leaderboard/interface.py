@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.single_run import RunReport
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.bounds import BoundReport
+    from simnav.leaderboard.ranking.costs import CostReport
     from simnav.leaderboard.ranking.ranking import Ranking
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.results.result import Result
@@ -41,6 +42,7 @@ __all__ = [
     "RequestError",
     "ScenarioLike",
     "Scenarios",
+    "bench",
     "bound",
     "campaign",
     "check",
@@ -127,6 +129,66 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     from simnav.contract_check import check
 
     return check(one_request(estimator, parameters).make)
+
+
+def bench(
+    estimators: Estimators,
+    *,
+    against: Estimators = None,
+    scenario: ScenarioLike = "open-sea",
+    seed: int = 0,
+    epochs: int = 120,
+    rounds: int = 3,
+    parameters: Mapping[str, Any] | None = None,
+    progress: Callable[..., None] | None = None,
+) -> CostReport:
+    """Measure time and memory of an epoch, in this process, beside estimators that come with simnav.
+
+    All take turns, so that what else the machine does slows all of them; see `simnav.testing.cost`.
+
+    Parameters
+    ----------
+    estimators : estimators
+        Those in question.
+    against : estimators, optional
+        Rows beside them; default: one of each family.
+    scenario : str, Path or Scenario
+        What is recorded and run.
+    seed : int
+        Seed of the recording.
+    epochs : int
+        Epochs that are run, from the start; fewer if the scenario has fewer.
+    rounds : int
+        Runs over them; an epoch counts with its least time.
+    parameters : mapping, optional
+        Parameters of those in question; of several each gets those that it has.
+    progress : callable, optional
+        Called with how many of how many parts are done, and ``note=`` what is next.
+
+    Returns
+    -------
+    CostReport
+        With a reason in place of figures for each estimator that fails or does not suit the scenario.
+
+    Raises
+    ------
+    ValueError
+        On an unknown estimator, parameter or scenario, or too few epochs.
+    """
+    from simnav.leaderboard.ranking.costs import BESIDE, costs_of
+
+    if not estimators:
+        raise RequestError("no estimator was asked for; name those that should be measured")
+    mine = requests(estimators, parameters)
+    with mistakes():
+        for r in mine:
+            r.make()  # a mistake in a file's name or in a parameter is no result
+    labels = [r.label for r in mine]
+    beside = [r for r in requests(list(BESIDE) if against is None else against) if r.label not in labels]
+    chosen = scenario_of(scenario)
+    with mistakes(ValueError, FileNotFoundError):
+        recording = record(chosen, seed)
+    return costs_of(mine, beside, chosen.id, recording, epochs, rounds, progress)
 
 
 def run(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.interface import (
         RequestError,
+        bench,
         bound,
         campaign,
         check,
@@ -77,6 +78,7 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "bench",
     "bound",
     "campaign",
     "check",
@@ -126,6 +128,7 @@ _HOMES = {
     ),
     "leaderboard.interface": (
         "RequestError",
+        "bench",
         "bound",
         "campaign",
         "check",

@@ -36,14 +36,17 @@ class Header:
     Attributes
     ----------
     name : str
-        Kebab-case.
+        Name of the scenario, in kebab-case.
     version : int
+        Raised by every change that alters the numbers of a run.
     title : str
+        One line for tables.
     duration : float
-        Of a run [s].
+        Length of a run [s].
     tags : tuple of str
+        Words by which lists are filtered; ``long`` is left out of quick campaigns.
     path : Path
-        Of the TOML file.
+        Path of the TOML file.
     """
 
     name: str

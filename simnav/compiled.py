@@ -79,10 +79,12 @@ class Kernel:
     Parameters
     ----------
     function : callable
+        The plain Python function that is compiled.
     signature : str or None
         Numba signature; with it the kernel is compiled for these types and no others, ahead of
         its first call. Small helpers that only other kernels call have none.
     fastmath : bool or set of str
+        Liberties with floating-point arithmetic, handed to Numba.
     """
 
     def __init__(self, function: types.FunctionType, signature: str | None, fastmath: bool | set[str]):
@@ -291,7 +293,7 @@ def prune(older_than: float = KEEP) -> int:
     Parameters
     ----------
     older_than : float
-        Seconds.
+        Time since the last use from which on a kernel is deleted [s].
     """
     import shutil
 

@@ -1,7 +1,8 @@
-"""The contract test for estimators: what `simnav check` runs.
+"""The contract test for estimators: the checks that `simnav check` and `simnav.testing` run.
 
-A minute of a simulated voyage with every kind of instrument is given to the estimator in several forms; see `check` for
-what is looked at. It says nothing of accuracy.
+A minute of a simulated voyage with every kind of instrument is given to the estimator in several forms. Each demand of
+the contract is one `Check`, a function whose first sentence says what is demanded; `CHECKS` has all of them in the
+order of the report. The checks say nothing of accuracy.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
     from simnav.sensors import AidSpec
 
-__all__ = ["Finding", "Report", "check"]
+__all__ = ["CHECKS", "Candidate", "Check", "Finding", "Report", "check", "contract_recording"]
 
 #: The scenario of the contract test, but for the aiding instruments: one of every kind (`_contract_scenario`).
 SCENARIO = """
@@ -60,17 +62,22 @@ accelerometer = { bias_ug = 200.0, random_walk_ug_sqrt_hz = 50.0 }
 _HALF = 30.0  # s
 
 Factory = Callable[[], Estimator]
+_Function = Callable[["Candidate", Recording], tuple[bool, str]]
+_checks: list[Check] = []
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What one part of the test found.
+    """What one check found.
 
     Attributes
     ----------
     name : str
+        Name of the check.
     ok : bool
+        Whether the estimator keeps this part of the contract.
     sentence : str
+        What was seen: how the contract is kept, or where it is broken.
     """
 
     name: str
@@ -85,9 +92,11 @@ class Report:
     Attributes
     ----------
     estimator : str
+        Registered name, or the name of the class.
     findings : tuple of Finding
+        One for each check that was run, in the order of `CHECKS`.
     passed : bool
-        Whether all are ok.
+        Whether all findings are ok.
     """
 
     estimator: str
@@ -99,6 +108,93 @@ class Report:
         bad = sum(not f.ok for f in self.findings)
         verdict = "passes the contract test" if self.passed else f"fails the contract test ({bad} findings)"
         return "\n".join([*lines, f"{self.estimator} {verdict}"])
+
+
+class Candidate:
+    """An estimator that is tested, and what its checks share.
+
+    Parameters
+    ----------
+    factory : callable
+        Makes a new instance when called. It is called once here.
+
+    Attributes
+    ----------
+    factory : callable
+        The argument of the same name.
+    name : str
+        Registered name, or the name of the class.
+    """
+
+    def __init__(self, factory: Factory):
+        self.factory = factory
+        self._first = factory()
+        self.name = self._first.name or type(self._first).__name__
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The recording of the contract test; each check gets a copy."""
+        return contract_recording(0)
+
+    @cached_property
+    def trial(self) -> Trial:
+        """The first run over the recording."""
+        return run_trial(self._first, self.recording)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One demand of the contract.
+
+    Attributes
+    ----------
+    name : str
+        Name in reports and in the ids of tests.
+    sentence : str
+        What is demanded.
+    function : callable
+        ``function(candidate, recording)`` returns whether the demand is met, and what was seen.
+    """
+
+    name: str
+    sentence: str
+    function: Callable[[Candidate, Recording], tuple[bool, str]]
+
+    def __call__(self, candidate: Candidate) -> Finding:
+        """Run the check; an exception of the estimator is a finding, too.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            The estimator. What it does to its input in this check does not reach other checks.
+        """
+        try:
+            return Finding(self.name, *self.function(candidate, copy.deepcopy(candidate.recording)))
+        except Exception as error:
+            return Finding(self.name, False, f"it raised {type(error).__name__}: {error}")
+
+    def left_out(self, candidate: Candidate) -> str:
+        """Why the check would say nothing new about an estimator; empty if it would.
+
+        Where the output is not valid, the other checks would only repeat this. The exception is ``units`` of an
+        estimator that diverges, because wrong units may be the reason.
+        """
+        if self.name == "output" or _output(candidate, candidate.recording)[0]:
+            return ""
+        if self.name == "units" and candidate.trial.status == "diverged":
+            return ""
+        return "the check 'output' fails, and this check would only repeat it"
+
+
+def _demand(name: str) -> Callable[[_Function], _Function]:
+    """Add a function to `CHECKS`; the first paragraph of its docstring says what is demanded."""
+
+    def add(function: _Function) -> _Function:
+        sentence = " ".join((function.__doc__ or "").partition("\n\n")[0].split())
+        _checks.append(Check(name, sentence, function))
+        return function
+
+    return add
 
 
 def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report:
@@ -113,7 +209,7 @@ def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report
     estimator : str or callable
         Name or path, as for `simnav.estimator.make`; or what makes a new instance when called.
     **parameters
-        Of the estimator, if it is a name or path.
+        Parameters of the estimator, if it is a name or path.
 
     Returns
     -------
@@ -131,17 +227,9 @@ def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report
             return make(name_or_path, **parameters)
     else:
         factory = estimator
-    first = factory()
-    name = first.name or type(first).__name__
-    recording = contract_recording(0)
-    trial = run_trial(first, recording)
-    findings = [_output(trial)]
-    if trial.status == "diverged":
-        findings.append(_guarded(_units, factory, recording))  # they may be why
-    if findings[0].ok:  # otherwise the other tests would only repeat what was said
-        tests = (_units, _determinism, _reset, _causality, _input, _aliasing, _silence, _missing)
-        findings += [_guarded(test, factory, recording) for test in tests]
-    return Report(name, tuple(findings), all(f.ok for f in findings))
+    candidate = Candidate(factory)
+    findings = tuple(c(candidate) for c in CHECKS if not c.left_out(candidate))
+    return Report(candidate.name, findings, all(f.ok for f in findings))
 
 
 def contract_recording(seed: int) -> Recording:
@@ -183,30 +271,29 @@ def _contract_scenario(specs: Sequence[type[AidSpec]]) -> Scenario:
     return Scenario.from_toml(table, source="the contract test")
 
 
-def _guarded(test: Callable[[Factory, Recording], Finding], factory: Factory, recording: Recording) -> Finding:
-    try:
-        return test(factory, recording)
-    except Exception as error:
-        name = test.__name__.removeprefix("_").replace("_", " ")
-        return Finding(name, False, f"it raised {type(error).__name__}: {error}")
-
-
-def _output(trial: Trial) -> Finding:
+@_demand("output")
+def _output(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """Every step returns a valid `Estimate`: right time and shapes, finite values, a valid covariance."""
+    trial = candidate.trial
     if trial.status == "unsuitable":
         said = f"it said: {trial.reason}" if trial.reason else "it did not say why"
-        return Finding("output", False, f"it is not suited even where every kind of instrument is there; {said}")
+        return False, f"it is not suited even where every kind of instrument is there; {said}"
     if trial.status != "ok":
-        return Finding("output", False, f"{trial.status}: {trial.reason}")
+        return False, f"{trial.status}: {trial.reason}"
     vectors = [v for v in ("position", "velocity", "attitude") if np.isfinite(getattr(trial, v)).any()]
     if not vectors:
-        return Finding("output", False, "it estimates nothing: position, velocity and attitude are all None")
+        return False, "it estimates nothing: position, velocity and attitude are all None"
     covariance = "with" if trial.covariance is not None else "without"
-    return Finding("output", True, f"{len(trial)} valid estimates of {', '.join(vectors)}, {covariance} covariance")
+    return True, f"{len(trial)} valid estimates of {', '.join(vectors)}, {covariance} covariance"
 
 
-def _units(factory: Factory, recording: Recording) -> Finding:
-    """Wrong units are off by a factor of 57 or more, or by a whole Earth: coarse limits will do."""
-    first = _run(factory(), recording)[0]
+@_demand("units")
+def _units(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """Estimates are in SI units and radians; positions are latitude, longitude and height.
+
+    Wrong units are off by a factor of 57 or more, or by a whole Earth, so that coarse limits are enough.
+    """
+    first = _run(candidate.factory(), recording)[0]
     start = recording.start
     wrong: list[str] = []
     mask = first.mask()
@@ -224,81 +311,98 @@ def _units(factory: Factory, recording: Recording) -> Finding:
         turn = np.remainder(first.attitude[2] - start.attitude[2] + np.pi, 2.0 * np.pi) - np.pi
         if abs(first.attitude[2]) > 2.0 * np.pi or abs(turn) > 1.0:
             wrong.append(f"yaw {first.attitude[2]:g} is over a radian from the start's, {start.attitude[2]:g} rad")
-    return Finding("units", not wrong, "; ".join(wrong) or "the first estimate is near the initial state")
+    return not wrong, "; ".join(wrong) or "the first estimate is near the initial state"
 
 
-def _determinism(factory: Factory, recording: Recording) -> Finding:
-    where = _difference(_run(factory(), recording), _run(factory(), recording))
-    return Finding("determinism", where is None, where or "two instances agree bit for bit on the same recording")
+@_demand("determinism")
+def _determinism(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """Two instances give the same estimates on the same recording, bit for bit."""
+    where = _difference(_run(candidate.factory(), recording), _run(candidate.factory(), recording))
+    return where is None, where or "two instances agree bit for bit on the same recording"
 
 
-def _reset(factory: Factory, recording: Recording) -> Finding:
-    fresh = _run(factory(), recording)
-    used = factory()
+@_demand("reset")
+def _reset(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """After a run, `reset` leaves nothing behind: the next run is that of a new instance."""
+    fresh = _run(candidate.factory(), recording)
+    used = candidate.factory()
     _run(used, contract_recording(1))
     where = _difference(fresh, _run(used, recording))
     sentence = (
         "after a run and a reset it is as good as new" if where is None else f"a run before reset() shows: {where}"
     )
-    return Finding("reset", where is None, sentence)
+    return where is None, sentence
 
 
-def _causality(factory: Factory, recording: Recording) -> Finding:
-    """All that comes after half of the run is changed; nothing before may notice."""
+@_demand("causality")
+def _causality(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """An estimate depends on nothing that comes after it.
+
+    All that comes after half of the run is changed; the estimates before it must stay.
+    """
     changed = _altered(recording, _HALF)
     n = int(np.searchsorted(recording.data.truth.time, _HALF + 1e-6))
-    where = _difference(_run(factory(), recording)[:n], _run(factory(), changed)[:n])
+    where = _difference(_run(candidate.factory(), recording)[:n], _run(candidate.factory(), changed)[:n])
     ok = where is None
-    return Finding("causality", ok, "estimates do not know later data" if ok else f"later data change it: {where}")
+    return ok, "estimates do not know later data" if ok else f"later data change it: {where}"
 
 
-def _input(factory: Factory, recording: Recording) -> Finding:
-    mine = copy.deepcopy(recording)
-    before = _digests(mine)
-    _run(factory(), mine)
-    after = _digests(mine)
+@_demand("input")
+def _input(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """The estimator does not write into its input."""
+    before = _digests(recording)
+    _run(candidate.factory(), recording)
+    after = _digests(recording)
     spoilt = [name for name in before if before[name] != after[name]]
     ok = not spoilt
-    return Finding("input", ok, "it leaves its input alone" if ok else f"it writes into: {', '.join(spoilt)}")
+    return ok, "it leaves its input alone" if ok else f"it writes into: {', '.join(spoilt)}"
 
 
-def _aliasing(factory: Factory, recording: Recording) -> Finding:
-    estimator = factory()
+@_demand("estimates")
+def _aliasing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """An estimate that was returned is not changed by later steps."""
+    estimator = candidate.factory()
     kept: list[tuple[Estimate, Estimate]] = []
     for estimate in _steps(estimator, recording):
         kept.append((estimate, copy.deepcopy(estimate)))
     where = _difference([a for a, _ in kept], [b for _, b in kept])
     ok = where is None
-    return Finding(
-        "estimates", ok, "later steps leave them alone" if ok else f"a later step writes into one (copy it): {where}"
-    )
+    return ok, "later steps leave them alone" if ok else f"a later step writes into one (copy it): {where}"
 
 
-def _silence(factory: Factory, recording: Recording) -> Finding:
-    """Every aiding instrument falls silent at half of the run; then the IMU, too."""
+@_demand("silence")
+def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """The estimator goes on when instruments fall silent.
+
+    Every aiding instrument falls silent at half of the run; then the IMU does, too.
+    """
     for what, imu in (("every aiding instrument", True), ("every instrument", False)):
-        trial = run_trial(factory(), _silenced(recording, _HALF, imu))
+        trial = run_trial(candidate.factory(), _silenced(recording, _HALF, imu))
         if trial.status != "ok":
-            return Finding("silence", False, f"when {what} falls silent: {trial.status}: {trial.reason}")
-    return Finding("silence", True, "it carries on when the instruments fall silent")
+            return False, f"when {what} falls silent: {trial.status}: {trial.reason}"
+    return True, "it carries on when the instruments fall silent"
 
 
-def _missing(factory: Factory, recording: Recording) -> Finding:
+@_demand("missing instruments")
+def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
+    """Without an instrument the estimator works, or raises `UnsuitableScenario` and says what it needs."""
     names = list(recording.instruments)
     needed: list[str] = []
     for absent in (["imu"], *([n] for n in names), names, [*names, "imu"]):
-        trial = run_trial(factory(), _without(recording, absent))
+        trial = run_trial(candidate.factory(), _without(recording, absent))
         label = absent[0] if len(absent) == 1 else "all" if "imu" in absent else "all but the IMU"
         if trial.status not in ("ok", "unsuitable"):
-            return Finding("missing instruments", False, f"without {label}: {trial.status}: {trial.reason}")
+            return False, f"without {label}: {trial.status}: {trial.reason}"
         if trial.status == "unsuitable" and not trial.reason:
-            return Finding(
-                "missing instruments", False, f"without {label}: UnsuitableScenario does not say what is needed"
-            )
+            return False, f"without {label}: UnsuitableScenario does not say what is needed"
         if trial.status == "unsuitable":
             needed.append(label)
     sentence = f"without {', '.join(needed)} it says what it needs" if needed else "it works without any of them"
-    return Finding("missing instruments", True, sentence)
+    return True, sentence
+
+
+#: All checks, in the order of the report.
+CHECKS = tuple(_checks)
 
 
 def _steps(estimator: Estimator, recording: Recording) -> Iterable[Estimate]:

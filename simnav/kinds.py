@@ -76,7 +76,7 @@ class NavigationPoint(NamedTuple):
     Attributes
     ----------
     time : float
-        Of the measurement [s].
+        Time of validity of the measurement [s].
     position : (3,) array
         Latitude, longitude [rad], height [m].
     velocity : (3,) array
@@ -84,7 +84,7 @@ class NavigationPoint(NamedTuple):
     dcm : (3, 3) array
         Turns body vectors into north-east-down.
     angular_rate : (3,) array
-        Of the body relative to the Earth, body axes [rad/s].
+        Angular rate of the body relative to the Earth, body axes [rad/s].
     """
 
     time: float
@@ -107,7 +107,7 @@ class Component:
     Attributes
     ----------
     name : str
-        Of the value, as in ``latitude``.
+        Name of the value, as in ``latitude``.
     unit : str
         In which people read the value, a key of `simnav.spec.UNITS`; arrays hold SI units and radians.
     error, error_unit : str
@@ -159,7 +159,7 @@ class Kind:
         What it is to a navigator: "fix" (a position), "velocity", "heading", "range" (to something known), "depth" or
         "other".
     components : tuple of Component
-        Of a measurement's value, one to three.
+        Components of a measurement's value, one to three.
     equation : str, callable or None
         How a navigation filter predicts a reading: a key of `EQUATIONS`, whose equations come compiled, or an
         `Observation`. None: filters leave the kind out.
@@ -264,6 +264,7 @@ class Kind:
         Parameters
         ----------
         value, reference : (..., d) array
+            Measured values, and those that they are compared with; components as in `values`.
 
         Returns
         -------

@@ -44,9 +44,9 @@ def import_file(
     Parameters
     ----------
     path : Path
-        Absolute.
+        Absolute path of the file.
     error : type
-        What is raised.
+        Class of the exception that is raised.
     before : callable, optional
         Called with the path before the code of the file runs.
 
@@ -100,6 +100,7 @@ def load_plugin(path: str | Path) -> None:
     Parameters
     ----------
     path : str or Path
+        The Python file; ``~`` is the home directory.
 
     Raises
     ------

@@ -71,7 +71,9 @@ class AidStream:
     Attributes
     ----------
     name, kind : str
+        Name of the instrument in its scenario, and its kind.
     time : (k,) array
+        Times of validity [s], ascending.
     value : (k, d) array
         As delivered; components as in ``KINDS[kind].values``.
     faults : (k,) uint32 array
@@ -127,10 +129,13 @@ class Block:
     Attributes
     ----------
     start, end : float
+        Limits of the stretch [s].
     imu : ImuSamples or None
+        Samples within the stretch; None for a vessel without an IMU.
     imu_labels : ImuLabels or None
         None where no fault of the scenario touches the IMU.
     aids : dict of str to AidStream
+        Measurements of each aiding instrument, by its name.
     truth : NavigationStates
         At the ends of the steps within the stretch.
     """
@@ -168,6 +173,7 @@ class Recording:
     scenario : str
         Versioned id, e.g. ``open-sea-v1``.
     seed : int
+        Seed that the run was made with.
     instruments : Instruments
         The datasheets; ``instruments.step`` is the step of the run [s].
     initial_truth : NavigationStates
@@ -175,6 +181,7 @@ class Recording:
     start : InitialState
         What an estimator is told of it.
     faults : tuple of FaultLabel
+        Labels of the faults: number j has bit j in ``AidStream.faults``.
     data : Block
         From time 0 to the end; ``data.truth`` holds the ends of all steps.
     note : str
@@ -255,6 +262,7 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
     Parameters
     ----------
     data : Block
+        Measurements, IMU samples included.
     ends : (n,) array
         End of each step [s], ascending; the first step begins at ``data.start``.
 

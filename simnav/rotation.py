@@ -45,6 +45,7 @@ def skew(vector: Array) -> Array:
     Parameters
     ----------
     vector : (..., 3) array
+        The left factors of the cross products.
 
     Returns
     -------
@@ -63,7 +64,7 @@ def dcm_from_rpy(rpy: Array) -> Array:
     Parameters
     ----------
     rpy : (..., 3) array
-        [rad].
+        Roll, pitch, yaw [rad].
 
     Returns
     -------
@@ -86,6 +87,7 @@ def rpy_from_dcm(dcm: Array) -> Array:
     Parameters
     ----------
     dcm : (..., 3, 3) array
+        Rotation matrices, body to north-east-down.
 
     Returns
     -------
@@ -105,7 +107,7 @@ def dcm_from_rotation_vector(vector: Array) -> Array:
     Parameters
     ----------
     vector : (..., 3) array
-        [rad].
+        Axis times angle of the rotation [rad].
 
     Returns
     -------
@@ -127,6 +129,7 @@ def rotation_vector_from_dcm(dcm: Array) -> Array:
     Parameters
     ----------
     dcm : (..., 3, 3) array
+        Rotation matrices.
 
     Returns
     -------
@@ -176,6 +179,7 @@ def quaternion_from_dcm(dcm: Array) -> Array:
     Parameters
     ----------
     dcm : (..., 3, 3) array
+        Rotation matrices.
 
     Returns
     -------

@@ -282,6 +282,7 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> S
     Parameters
     ----------
     text : str
+        The whole text of the file.
     source : str
         What messages call it.
     folder : Path, optional

@@ -36,9 +36,9 @@ def sample_times(rate: float, phase: float, start: float, end: float) -> Array:
     Parameters
     ----------
     rate, phase : float
-        [Hz], [s]
+        Sample rate [Hz], and time of the first sample [s].
     start, end : float
-        [s]
+        Limits of the interval [s]; the end belongs to it.
 
     Returns
     -------
@@ -82,18 +82,22 @@ class Simulator:
     scenario : Scenario
         A simulated one.
     seed : int
-        Of the run, non-negative.
+        Seed of the run, non-negative.
     truth : WorldBlock, optional
         The truth of the whole run, where several runs share one (`simulate_many`).
 
     Attributes
     ----------
     instruments : Instruments
+        The datasheets.
     initial_truth : NavigationStates
+        One state: the truth at time 0.
     start : InitialState
+        What an estimator is told of the state at time 0.
     faults : tuple of FaultLabel
+        The faults of the run.
     duration, step, time : float
-        [s]
+        Length of the run, length of one step, and time that was reached [s].
     note : str
         Empty; a log says here which recording it is.
 
@@ -191,7 +195,9 @@ def simulate(scenario: Scenario, seed: int) -> Recording:
     Parameters
     ----------
     scenario : Scenario
+        A simulated one.
     seed : int
+        Seed of the run, non-negative.
 
     Returns
     -------
@@ -225,6 +231,7 @@ def ideal(scenario: Scenario, seed: int) -> Recording:
     scenario : Scenario
         A simulated one.
     seed : int
+        Seed of the run, non-negative.
 
     Returns
     -------

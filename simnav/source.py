@@ -19,11 +19,15 @@ class Source(Protocol):
     Attributes
     ----------
     instruments : Instruments
+        The datasheets.
     start : InitialState
+        What an estimator is told of the state at time 0.
     initial_truth : NavigationStates
+        One state: the truth at time 0.
     faults : tuple of FaultLabel
+        The faults of the run.
     duration, step : float
-        [s]
+        Length of the run, and of one step [s].
     note : str
         What is to be known of the run; empty for a simulated one.
     """
@@ -47,7 +51,9 @@ def open_source(scenario: Scenario, seed: int) -> Source:
     Parameters
     ----------
     scenario : Scenario
+        A simulated or a recorded one.
     seed : int
+        Seed of the run, non-negative.
 
     Raises
     ------
@@ -69,7 +75,9 @@ def record(scenario: Scenario, seed: int) -> Recording:
     Parameters
     ----------
     scenario : Scenario
+        A simulated or a recorded one.
     seed : int
+        Seed of the run, non-negative.
 
     Returns
     -------

@@ -100,6 +100,7 @@ def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
     Parameters
     ----------
     unit : str
+        Unit in TOML, which is also the end of the key: ``rate_hz``.
     default : float or tuple, optional
         In SI; a field without one is required.
     **kwargs

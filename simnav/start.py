@@ -22,7 +22,7 @@ def draw_start(truth: NavigationStates, covariance: Array, seed: int) -> Initial
     covariance : (9, 9) array
         Of the errors, over `simnav.types.COMPONENTS`.
     seed : int
-        Of the run.
+        Seed of the run.
 
     Returns
     -------

@@ -77,6 +77,7 @@ def mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt):
     Parameters
     ----------
     position, velocity : (3,) arrays
+        Geodetic [rad, rad, m] and north-east-down [m/s]; updated.
     dcm : (3, 3) array
         Body to north-east-down.
     memory : (6,) array
@@ -161,7 +162,7 @@ def mechanize(position, velocity, dcm, memory, angular_rate, specific_force, int
     angular_rate, specific_force : (n, 3) arrays
         Means over the intervals [rad/s], [m/s^2].
     interval : (n,) array
-        [s].
+        Length of the interval that each sample covers [s].
     """
     for k in range(interval.size):
         mechanize_step(
@@ -195,6 +196,7 @@ def integrate(position: Array, velocity: Array, attitude: Array, samples: ImuSam
     position, velocity, attitude : (3,) arrays
         The state at the start of the first interval; roll, pitch, yaw.
     samples : ImuSamples
+        The n samples, in order of time.
 
     Returns
     -------
@@ -232,6 +234,7 @@ def sample_from_motion(latitude, height, v, w, c, d, memory, dt):  # type: ignor
     memory : (6,) array
         Increments of the interval before; updated.
     dt : float
+        Length of the interval [s].
 
     Returns
     -------

@@ -19,7 +19,7 @@ def stream(seed: int, *names: str) -> np.random.Generator:
     Parameters
     ----------
     seed : int
-        Of the run, non-negative.
+        Seed of the run, non-negative.
     *names : str
         What the process is, from the general to the particular: ``"instrument", "dvl", "noise"``.
 

@@ -66,7 +66,7 @@ class TriadDatasheet:
         Stationary sigma of the in-run (first-order Gauss-Markov) bias [x]; where
         ``correlation_time`` is infinite it is a random walk of this many x per sqrt(s).
     correlation_time : float
-        Of the in-run bias [s].
+        Correlation time of the in-run bias [s].
     random_walk : float
         White noise density [x/sqrt(Hz)] (angle or velocity random walk).
     rate_random_walk : float
@@ -101,7 +101,9 @@ class ImuDatasheet:
     rate : float
         Nominal sample rate [Hz].
     gyroscope, accelerometer : TriadDatasheet
+        Error parameters of the two triads.
     name : str
+        Name of the instrument.
     """
 
     rate: float
@@ -184,6 +186,7 @@ class Instruments(Mapping[str, Datasheet]):
     Parameters
     ----------
     aids : sequence of Datasheet
+        Datasheets of the aiding instruments, each with a name of its own.
     imu : ImuDatasheet or None
         None for a vessel without an IMU.
     step : float
@@ -302,10 +305,11 @@ class InitialState:
     Attributes
     ----------
     time : float
+        Time of validity [s].
     position, velocity, attitude : (3,) array
         Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad].
     covariance : (9, 9) array
-        Of the errors, in the order of `COMPONENTS`.
+        Covariance of the errors, in the order of `COMPONENTS`.
     """
 
     time: float
@@ -322,6 +326,7 @@ class Estimate:
     Attributes
     ----------
     time : float
+        Time of validity [s]: the end of the step.
     position, velocity, attitude : (3,) array or None
         None for what is not estimated.
     covariance : (9, 9) array or None
@@ -357,7 +362,9 @@ class NavigationStates:
     Attributes
     ----------
     time : (n,) array
+        Times of validity [s].
     position, velocity, attitude : (n, 3) array
+        Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad].
     """
 
     time: Array
@@ -379,7 +386,7 @@ class TapStates(NavigationStates):
     Attributes
     ----------
     angular_rate : (n, 3) array
-        Of the body relative to the Earth, body axes [rad/s].
+        Angular rate of the body relative to the Earth, body axes [rad/s].
     water_velocity : (n, 3) array
         The current at the vessel, north-east-down [m/s].
     """

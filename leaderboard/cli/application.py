@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from simnav.leaderboard.cli import (
+    bench,
     bound,
     campaign,
     check,
@@ -70,7 +71,9 @@ def root(
                 raise typer.BadParameter(str(error), param_hint="--plugin") from None
 
 
-for _module in (list_, run, simulate, check, new_estimator, evaluate, campaign, leaderboard, warmup, bound, reproduce):
+for _module in (
+    list_, run, simulate, check, bench, new_estimator, evaluate, campaign, leaderboard, warmup, bound, reproduce,
+):  # fmt: skip
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)
 

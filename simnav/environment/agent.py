@@ -19,7 +19,7 @@ def unpack(observation: Mapping[str, Any], instruments: Instruments) -> Measurem
     Parameters
     ----------
     observation : dict
-        Of a `NavigationEnv`.
+        Observation of a `NavigationEnv`.
     instruments : Instruments
         From the info of `NavigationEnv.reset`.
 
@@ -85,6 +85,7 @@ class EstimatorAgent:
         Parameters
         ----------
         observation : dict
+            What the environment gave for the step.
 
         Returns
         -------

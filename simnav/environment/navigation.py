@@ -109,6 +109,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
     closed_loop : bool
         The vessel steers by the estimate: a wrong one puts it off its track. Simulated scenarios only.
     render_mode : {"human", "rgb_array"}, optional
+        Show the chart in a window, or return it as an array; default: no chart.
 
     Raises
     ------
@@ -163,7 +164,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         Parameters
         ----------
         seed : int, optional
-            Of the run; without one, a fresh one is drawn from `np_random`.
+            Seed of the run; without one, a fresh one is drawn from `np_random`.
         options : dict, optional
             None is known; ignored.
 

@@ -85,8 +85,9 @@ class Chart:
     Parameters
     ----------
     title : str
+        Title above the picture.
     duration : float
-        Of the run [s].
+        Length of the run [s].
     human : bool
         Show it in a window, where there is a display.
     """
@@ -132,6 +133,7 @@ class Chart:
         position : (k, 2) array
             Latitude and longitude [rad].
         faulty : (k,) bool array
+            Which of them a fault has touched.
         """
         if len(position) and not self._silent:
             self._pending.append((position, faulty))
@@ -142,6 +144,7 @@ class Chart:
         Parameters
         ----------
         time : float
+            End of the step [s].
         truth, estimate : (3,) array
             Geodetic [rad, rad, m].
         """

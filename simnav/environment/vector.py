@@ -32,8 +32,9 @@ def spawn_seeds(seed: int, n: int) -> list[int]:
     Parameters
     ----------
     seed : int
-        Non-negative.
+        Base seed, non-negative.
     n : int
+        Number of runs.
 
     Returns
     -------
@@ -54,7 +55,9 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
     Parameters
     ----------
     scenario : Scenario, str or path
+        A scenario, its name in the catalogue, or a TOML file.
     num_envs : int
+        Number n of runs.
     **options
         As for `NavigationEnv`.
     """

@@ -27,14 +27,19 @@ class Description:
     Attributes
     ----------
     name : str
+        Registered name.
     aliases : tuple of str
+        Other names under which it is found.
     summary : str
         First line of the docstring.
     file : str
+        Path of the file where the class is defined.
     line : int
-        Where the class is defined.
+        Line of the class in this file.
     reference, slow : bool
+        As in `Estimator`: it is told the truth; it takes several milliseconds an epoch or more.
     parameters : tuple of Parameter
+        Parameters of its constructor.
     """
 
     name: str

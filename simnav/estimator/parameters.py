@@ -22,6 +22,7 @@ class Parameter:
     Attributes
     ----------
     name : str
+        Name of the keyword argument.
     default : object
         `inspect.Parameter.empty` where it has none.
     annotation : str

@@ -52,6 +52,7 @@ class Series:
     time : (n,) array
         On the clock of the log [s].
     value : (n, d) array
+        The measurements.
     line : (n,) int array
         Line in the file.
     """
@@ -69,6 +70,7 @@ class ImuSeries:
     Attributes
     ----------
     source : str
+        File (and sentence), for messages.
     edge : (n + 1,) array
         Ends of the intervals, on the clock of the log [s].
     mean : (n, 6) array
@@ -215,10 +217,13 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     Parameters
     ----------
     spec : RecordedSpec
+        The ``[log]`` table.
     channel : ChannelSpec
+        Where in the files the values are, and in which units.
     what : str
         Key of `KINDS`, or ``position``, ``velocity`` or ``attitude`` of the reference.
     recording : str
+        Name of the recording; it takes the place of ``{recording}`` in paths.
 
     Returns
     -------
@@ -345,7 +350,9 @@ def geodetic_from_local(value: Array, origin: OriginSpec, frame: str) -> Array:
     value : (n, 3) array
         East, north, up or north, east, down [m].
     origin : OriginSpec
+        Geodetic position of the origin of the frame.
     frame : {"enu", "ned"}
+        Order of the components of ``value``: east, north, up or north, east, down.
 
     Returns
     -------

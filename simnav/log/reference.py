@@ -58,7 +58,9 @@ class Reference:
     Parameters
     ----------
     position : Series
+        Geodetic positions [rad, rad, m].
     velocity, attitude : Series or None
+        North-east-down [m/s]; roll, pitch, yaw [rad]. None where the log has none.
     max_gap : float or None
         Longest hole that is interpolated [s]; default one and a half times the usual spacing.
     lever_arm : sequence of 3 floats
@@ -69,7 +71,7 @@ class Reference:
     Attributes
     ----------
     time : (n,) array
-        Times of the positions, on the clock of the log.
+        Times of the positions, on the clock of the log [s].
     """
 
     def __init__(

@@ -212,6 +212,7 @@ class ReferenceSpec(Spec):
     Attributes
     ----------
     position : ChannelSpec
+        Positions, geodetic or local Cartesian.
     velocity, attitude : ChannelSpec or None
         North-east-down; roll, pitch, yaw. Where absent they are not scored, and the start is made from the positions
         (velocity, heading along the course) and from the accelerometers (roll, pitch).
@@ -241,12 +242,15 @@ class RecordedSpec(Spec):
         Names that take the place of ``{recording}`` in the paths, or a pattern (``"*"``) to find them with. Seed s
         takes recording s modulo their number, in sorted order where they were found by a pattern.
     files : dict of FileSpec
+        How each file of a recording is read, by a name that channels use.
     imu : LogImuSpec or None
+        The channel of the IMU; None for a log without one.
     instruments : dict of LogInstrumentSpec
         By the names of the scenario's instruments.
     reference : ReferenceSpec
+        The trajectory that estimates are scored against.
     origin : OriginSpec or None
-        Of local Cartesian positions.
+        Origin of local Cartesian positions.
     skip : float
         Seconds to leave out at the beginning.
     """

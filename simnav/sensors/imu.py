@@ -138,7 +138,7 @@ class ImuSpec(Spec):
         Parameters
         ----------
         seed : int
-            Of the run.
+            Seed of the run.
         """
         return Imu(self, seed)
 
@@ -233,7 +233,9 @@ class Imu:
     Parameters
     ----------
     spec : ImuSpec
+        Rate and error parameters, from the scenario.
     seed : int
+        Seed of the run.
     """
 
     def __init__(self, spec: ImuSpec, seed: int):

@@ -74,6 +74,7 @@ def turn_to_ned(attitude: Array, vector: Array) -> Array:
     attitude : (n, 3) array
         Roll, pitch, yaw [rad].
     vector : (n, 3) or (3,) array
+        Vectors on body axes (forward, starboard, down); one for all attitudes, or one each.
 
     Returns
     -------
@@ -158,7 +159,7 @@ class AidSpec(Spec):
         Parameters
         ----------
         name : str
-            Of the instrument in its scenario.
+            Name of the instrument in its scenario.
         """
         return Datasheet(
             name,
@@ -181,9 +182,9 @@ class AidSpec(Spec):
         Parameters
         ----------
         name : str
-            Of the instrument in its scenario; it names the random streams.
+            Name of the instrument in its scenario; it names the random streams.
         seed : int
-            Of the run.
+            Seed of the run.
         water_depth : float, optional
             Below the mean sea surface [m], for instruments that need the bottom.
         """
@@ -253,18 +254,22 @@ class Instrument(ABC):
     Parameters
     ----------
     spec : AidSpec
+        Rate, mounting and error parameters, from the scenario.
     name : str
+        Name of the instrument in the scenario; it names the random streams.
     seed : int
+        Seed of the run.
 
     Attributes
     ----------
     definition : Kind
+        What its kind measures.
     sigma, bias : (d,) array
         White noise, and the bias of this run.
     scale : float
         Scale-factor error of this run [-].
     lever_arm : (3,) array
-        [m]
+        Position of the instrument on body axes (forward, starboard, down) [m].
     levered : bool
         Whether the lever arm is not zero.
     """

@@ -82,6 +82,7 @@ class GaussMarkov:
     correlation_time : float
         T [s].
     rng : numpy.random.Generator
+        Random stream of this process alone.
     """
 
     def __init__(self, sigma: Array | float, correlation_time: float, rng: np.random.Generator):
@@ -135,11 +136,13 @@ class HeldGaussMarkov:
     Parameters
     ----------
     sigma : (d,) array
+        Stationary sigma of each component, as in `GaussMarkov`.
     correlation_time : float
         T [s], as in `GaussMarkov`.
     hold : float
         h [s].
     rng : numpy.random.Generator
+        Random stream of this process alone.
     """
 
     def __init__(self, sigma: Array | float, correlation_time: float, hold: float, rng: np.random.Generator):

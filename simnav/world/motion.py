@@ -243,7 +243,7 @@ def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force
     index : (4,) int array
         Sample, segment, waypoint, whether the segment has begun; updated.
     p : (11,) array
-        Parameters.
+        Constants of the vessel, the water and the step, at the places that this module names.
     rows, points : arrays
         The manoeuvre table.
     phase, table : arrays

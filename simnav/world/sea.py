@@ -33,7 +33,7 @@ class Sea(Spec):
     spectrum : str
         ``jonswap`` or ``pierson_moskowitz`` (which is JONSWAP with peakedness 1).
     significant_height, peak_period : float
-        Of the waves [m], [s].
+        Significant height of the waves [m], and period of the spectral peak [s].
     peakedness : float
         JONSWAP's gamma.
     direction : float
@@ -75,6 +75,7 @@ def spectrum(sea: Sea, omega: Array) -> Array:
     Parameters
     ----------
     sea : Sea
+        Significant height, peak period and shape of the spectrum.
     omega : (n,) array
         Angular frequency [rad/s], positive.
 
@@ -107,6 +108,7 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     sea : Sea or None
         None is a flat sea.
     seed : int
+        Seed of the run: it fixes frequencies, directions and phases.
 
     Returns
     -------

@@ -25,7 +25,7 @@ class Start(Spec):
     depth : float
         The same, positive down; one of the two [m].
     heading : float
-        [rad]
+        Direction of the bow, clockwise from north [rad].
     speed : float
         Through the water [m/s].
     """
@@ -57,7 +57,7 @@ class Vessel(Spec):
     kind : str
         ``ship`` stays on the surface; ``uuv`` follows dive commands and feels less of the waves the deeper it is.
     speed_time_constant, turn_time_constant, climb_time_constant : float
-        Of speed, yaw rate and flight-path angle [s].
+        Time constants of speed, yaw rate and flight-path angle [s].
     turn_rate : float
         Limit of the autopilot's yaw rate [rad/s].
     heel : float

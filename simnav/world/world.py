@@ -40,14 +40,19 @@ class World:
     Parameters
     ----------
     start : Start
+        State of the vessel at time 0.
     vessel : Vessel
+        How the vessel answers to commands and to waves.
     manoeuvres : sequence of Manoeuvre
+        Commands, one after the other.
     sea : Sea or None
+        Wave spectrum; None is a flat sea.
     current : Current or None
+        Movement of the water; None is still water.
     rate : float
         Samples of the ideal IMU per second [Hz].
     seed : int
-        Of the wave components.
+        Seed of the wave components.
     """
 
     def __init__(

@@ -70,8 +70,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 #: What depends on the moment, not on what was asked for.
-_TIMES = {"seconds", "simulation_seconds", "update_median", "update_mean", "update_p95", "peak_memory", "plot",
-          "computed", "site", "generated"}  # fmt: skip
+_TIMES = {"seconds", "simulation_seconds", "update_median", "update_mean", "update_p95", "peak_memory", "memory_growth",
+          "plot", "computed", "site", "generated"}  # fmt: skip
 
 
 def timeless(value: Any) -> Any:
@@ -122,6 +122,13 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
     ),
     "simulate": (["simulate", "pond.toml", "-o", "theirs.npz", "--seed", "4"], call_simulate),
     "check": (["check", "gnss-only:acceleration=0.5"], call_check),
+    "bench": (
+        ["bench", "gnss-only:acceleration=0.5", "--against", "ship-ekf", "-s", "pond.toml", "--epochs", "20",
+         "--rounds", "1", "--seed", "3"],
+        lambda: simnav.bench(
+            "gnss-only:acceleration=0.5", against="ship-ekf", scenario="pond.toml", seed=3, epochs=20, rounds=1
+        ).to_dict(),
+    ),
     "new-estimator": (["new-estimator", "theirs"], lambda: {"name": write_estimator("mine")[0]}),
     "evaluate": (
         ["evaluate", "gnss-only:acceleration=0.5", "gnss-only:acceleration=2", "-s", "pond.toml", "-n", "3",
@@ -232,9 +239,10 @@ def test_what_comes_back_is_a_frame_and_a_figure() -> None:
     run = simnav.run("pond.toml", two)
     evaluation = simnav.evaluate("gnss-only", "pond.toml", runs=2, against=two, workers=1, results="kept")
     bound = simnav.bound("open-sea", runs=1)
+    costs = simnav.bench("gnss-only", against="ship-ekf", scenario="pond.toml", epochs=20, rounds=1)
     assert evaluation.folder is not None
     ranking = simnav.rank(evaluation.folder)
-    for report, rows in ((run, 2), (evaluation, 4), (ranking, 2), (bound, len(bound.time))):
+    for report, rows in ((run, 2), (evaluation, 4), (ranking, 2), (costs, 2), (bound, len(bound.time))):
         table = report.to_frame()
         assert len(table) == rows
         assert isinstance(report.plot(), Figure)
@@ -272,6 +280,9 @@ class Unfinished(Estimator):
         (lambda: simnav.run("pond.toml", "ekf", parameters={"nothing": 1}), "no parameter 'nothing'"),
         (lambda: simnav.run("pond.toml", "ekf,ukf", parameters={"nothing": 1}), "nothing: none of the estimators"),
         (lambda: simnav.make("ekf,ukf"), "names 2 estimators"),
+        (lambda: simnav.bench("nobody.py"), "nobody.py"),
+        (lambda: simnav.bench([]), "no estimator was asked for"),
+        (lambda: simnav.bench("gnss-only", scenario="pond.toml", epochs=1), "at least 2 are wanted"),
         (lambda: simnav.evaluate([], "pond.toml"), "no estimator was asked for"),
         (lambda: simnav.evaluate("nobody.py", "pond.toml", runs=2, against="gnss-only"), "nobody.py"),
         (lambda: simnav.campaign("pond.toml", "gnss-only", runs=1, output="."), "other files"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.contract_check import check, contract_recording
+from simnav.contract_check import CHECKS, Candidate, check, contract_recording
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.types import KINDS, Estimate
 
@@ -160,6 +160,36 @@ def test_each_breach_is_found(cls: type[Estimator], finding: str, words: str):
     assert finding in failed, str(report)
     assert words in failed[finding], failed[finding]
     assert "FAIL" in str(report)
+
+
+def test_each_check_has_a_name_and_a_sentence():
+    report = check(Good)
+    assert [c.name for c in CHECKS] == [f.name for f in report.findings]
+    assert len({c.sentence for c in CHECKS}) == len(CHECKS)
+    for c in CHECKS:
+        assert c.sentence[0].isupper()
+        assert c.sentence.endswith(".")
+        assert "\n" not in c.sentence
+
+
+def test_a_check_on_its_own_finds_what_the_report_finds():
+    (causality,) = (c for c in CHECKS if c.name == "causality")
+    (found,) = (f for f in check(Prophet).findings if f.name == "causality")
+    assert causality(Candidate(Prophet)) == found
+    assert not found.ok
+
+
+def test_what_a_check_lets_an_estimator_spoil_does_not_reach_the_next():
+    candidate = Candidate(Vandal)
+    depth = candidate.recording.data.aids["depth"].value.copy()
+    assert not all(c(candidate).ok for c in CHECKS)
+    np.testing.assert_array_equal(candidate.recording.data.aids["depth"].value, depth)
+
+
+def test_checks_that_would_repeat_a_bad_output_are_left_out():
+    short = Candidate(WrongShape)
+    assert [c.name for c in CHECKS if not c.left_out(short)] == ["output"]
+    assert [c.name for c in CHECKS if not c.left_out(Candidate(Degrees))] == ["output", "units"]
 
 
 def test_a_name_with_parameters():

@@ -73,7 +73,9 @@ def build_layers(faults: Sequence[FaultSpec], seed: int) -> tuple[FaultLayer, ..
     Parameters
     ----------
     faults : sequence of FaultSpec
+        The faults of the scenario, in its order.
     seed : int
+        Seed of the run.
 
     Returns
     -------
@@ -97,8 +99,9 @@ def labels(faults: Sequence[FaultSpec], duration: float, instruments: Mapping[st
     Parameters
     ----------
     faults : sequence of FaultSpec
+        The faults of the scenario, in its order.
     duration : float
-        Of the run [s].
+        Length of the run [s].
     instruments : mapping
         Name to kind.
     """

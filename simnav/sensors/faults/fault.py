@@ -98,7 +98,7 @@ def size_by_component(sizes: Mapping[str, Any], stem: str, kind: str) -> Array |
     stem : str
         As in ``FaultSpec.stems``.
     kind : str
-        Of the instrument.
+        Kind of the instrument.
 
     Returns
     -------
@@ -281,7 +281,7 @@ class FaultSpec(Spec):
         Parameters
         ----------
         duration : float
-            Of the run [s]; labels are cut off there.
+            Length of the run [s]; labels are cut off there.
         instruments : mapping
             Name to kind.
         """
@@ -299,7 +299,7 @@ class FaultSpec(Spec):
         index : int
             Its first bit.
         seed : int
-            Of the run.
+            Seed of the run.
         occurrence : int, optional
             Tells faults of the same name apart (`build_layers` counts them); by default the index.
         """
@@ -353,6 +353,7 @@ class Activity:
     Parameters
     ----------
     spec : FaultSpec
+        The fault, with its intervals or how they are drawn.
     rng : numpy.random.Generator
         For random intervals.
     """
@@ -409,15 +410,18 @@ class FaultLayer:
     Parameters
     ----------
     spec : FaultSpec
+        What the scenario says of the fault.
     index : int
-        First bit.
+        First bit of the fault in the labels of measurements.
     seed : int
+        Seed of the run.
     key : str
-        Of its random streams.
+        Name of its random streams.
 
     Attributes
     ----------
     spec : FaultSpec
+        What the scenario says of the fault.
     activity : Activity
         When it acts.
     """
@@ -448,6 +452,7 @@ class FaultLayer:
         Parameters
         ----------
         stream : AidStream
+            Measurements of one of the fault's instruments, with what earlier faults did to them.
 
         Returns
         -------
@@ -462,7 +467,9 @@ class FaultLayer:
         Parameters
         ----------
         samples : ImuSamples
+            Samples, with what earlier faults did to them.
         labels : ImuLabels or None
+            Labels of these samples; None where no fault of the scenario touches the IMU.
 
         Returns
         -------

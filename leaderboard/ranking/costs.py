@@ -1,0 +1,108 @@
+"""What an epoch of several estimators costs, on one scenario: time and memory side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.figures.panels import Bar, bars
+from simnav.leaderboard.figures.plots import Style
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.errors import mistakes
+from simnav.leaderboard.results.frame import frame
+from simnav.testing.cost import Cost, measure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+    from simnav.recording import Recording
+
+__all__ = ["BESIDE", "CostReport", "cost_table", "costs_of"]
+
+#: The rows that an estimator is measured beside, if no others are asked for: one of each family.
+BESIDE = ("dead-reckoning", "gnss-only", "ship-ekf", "ekf", "ukf", "sw-fgo", "ekf-rts")
+
+
+@dataclass(frozen=True)
+class CostReport:
+    """What an epoch costs.
+
+    Attributes
+    ----------
+    scenario : str
+        Versioned id.
+    seed : int
+        Seed of the recording.
+    epochs, rounds : int
+        Epochs that were run, and how often.
+    estimators : tuple of str
+        Labels of those in question; the other rows are what they are measured beside.
+    costs : tuple of simnav.testing.Cost
+        One for each estimator: those in question first.
+    """
+
+    scenario: str
+    seed: int
+    epochs: int
+    rounds: int
+    estimators: tuple[str, ...]
+    costs: tuple[Cost, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav bench --json`` prints."""
+        return asdict(self)
+
+    def to_frame(self) -> Any:
+        """A row an estimator; see `simnav.leaderboard.results.frame.frame`."""
+        return frame([asdict(cost) for cost in self.costs])
+
+    def plot(self) -> Figure:
+        """Median time and peak memory of each estimator that could be measured."""
+        measured = [cost for cost in self.costs if cost.status == "ok"]
+
+        def panel(values: list[float]) -> list[Bar]:
+            return [Bar(c.estimator, v, math.nan, math.nan, ()) for c, v in zip(measured, values, strict=True)]
+
+        panels = {
+            "Median time of an epoch [ms]": panel([1e3 * c.update_median for c in measured]),
+            "Peak memory [kB]": panel([c.peak_memory / 1024.0 for c in measured]),
+        }
+        title = f"{self.scenario}: what an epoch costs, {self.epochs} epochs"
+        return bars(panels, Style([c.estimator for c in measured]), title=title)
+
+
+def costs_of(
+    mine: Sequence[EstimatorRequest], beside: Sequence[EstimatorRequest], scenario: str, recording: Recording,
+    epochs: int, rounds: int, progress: Callable[..., None] | None = None,
+) -> CostReport:  # fmt: skip
+    """Measure the costs; see `simnav.leaderboard.interface.bench`."""
+    everyone = {r.label: r.make for r in [*mine, *beside]}
+    with mistakes(ValueError):
+        costs = measure(everyone, recording, epochs=epochs, rounds=rounds, progress=progress)
+        run = min(epochs, sum(1 for _ in recording.steps()))
+    labels = tuple(r.label for r in mine)
+    return CostReport(scenario, recording.seed, run, rounds, labels, tuple(costs))
+
+
+def cost_table(report: CostReport) -> Table:
+    """The report for people; times beside the first of the estimators in question."""
+    first = report.costs[0].update_median
+    rows = []
+    for cost in report.costs:
+        if cost.status != "ok":
+            rows.append([cost.estimator, *5 * [tables.MISSING], cost.status])
+            continue
+        times = "" if math.isnan(first) else tables.number(cost.update_median / first)
+        milliseconds = [tables.number(1e3 * t) for t in (cost.update_median, cost.update_mean, cost.update_p95)]
+        growth = cost.memory_growth / 1024.0
+        grows = tables.number(growth) if abs(growth) >= 0.05 else "0"
+        rows.append([cost.estimator, *milliseconds, times, tables.number(cost.peak_memory / 1024.0), grows])
+    heads = ["estimator", "median [ms]", "mean [ms]", "95 % [ms]", "times the first", "peak [kB]", "growth [kB/epoch]"]
+    title = f"{report.scenario}: what an epoch costs, {report.epochs} epochs, least of {report.rounds} runs in turns"
+    return tables.table(
+        title, heads, rows, strong=[i for i, c in enumerate(report.costs) if c.estimator in report.estimators]
+    )
