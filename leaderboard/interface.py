@@ -244,6 +244,7 @@ def campaign(
     workers: int = 2,
     time_limit: float | None = None,
     memory_limit: float = 2048.0,
+    retry: bool = False,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run scenarios x estimators x seeds; started again, it goes on where it was.
@@ -260,6 +261,9 @@ def campaign(
         Of what was not asked for by name, leave out what is long or slow.
     seed, parameters, workers, time_limit, memory_limit, progress
         As for `evaluate`.
+    retry : bool
+        Run failures again that are in the folder. A run that a shorter time limit or a smaller memory limit than
+        today's ended is run again in any case.
 
     Returns
     -------
@@ -274,7 +278,8 @@ def campaign(
     if quick and estimators is None:
         estimators = quick_estimators()
     chosen, folder = scenarios_of(scenarios, quick=quick), _absolute(output)
-    summary = _run(chosen, requests(estimators, parameters), seeds, folder, workers, time_limit, memory_limit, progress)
+    everyone = requests(estimators, parameters)
+    summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry)
     results = results_of(folder)
     return CampaignReport(results, rank(results), summary)
 
@@ -467,7 +472,7 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
 
 def _run(
     scenarios: Sequence[Scenario], everyone: Sequence[EstimatorRequest], seeds: range, folder: Path, workers: int,
-    time_limit: float | None, memory_limit: float, progress: CampaignProgress,
+    time_limit: float | None, memory_limit: float, progress: CampaignProgress, *, retry: bool = False,
 ) -> Summary:  # fmt: skip
     from simnav.leaderboard.campaign.campaign import run_campaign
     from simnav.leaderboard.results.store import StoreError, create
@@ -476,5 +481,5 @@ def _run(
         create(folder)
     return run_campaign(
         scenarios, everyone, seeds, folder, workers=workers, timeout=time_limit,
-        memory=int(memory_limit * 2**20), progress=progress,
+        memory=int(memory_limit * 2**20), retry=retry, progress=progress,
     )  # fmt: skip

@@ -118,6 +118,8 @@ class Unit:
             key=key,
             recording=self.recording,
             simnav=self.simulator,
+            time_limit=self.timeout,
+            memory_limit=self.memory,
         )
 
 

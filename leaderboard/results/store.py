@@ -24,16 +24,39 @@ import os
 import time
 import uuid
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeVar
 
-from simnav.leaderboard.results.result import BATCH, FORMAT, Result, batches, rows, schema, to_table, write_tables
+from simnav.leaderboard.results.result import (
+    BATCH,
+    FORMAT,
+    READABLE,
+    Result,
+    batches,
+    rows,
+    schema,
+    to_table,
+    write_tables,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["FORMAT", "Result", "StoreError", "StoreWarning", "compact", "create", "keys", "load", "select", "write"]
+__all__ = [
+    "FORMAT",
+    "Ending",
+    "Result",
+    "StoreError",
+    "StoreWarning",
+    "compact",
+    "create",
+    "drop",
+    "keys",
+    "load",
+    "select",
+    "write",
+]
 
 _MARKER = "simnav-results.json"
 _LOOSE, _COMPACTED = "results", "compacted"
@@ -42,6 +65,23 @@ _STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
 
 
 T = TypeVar("T")
+
+
+class Ending(NamedTuple):
+    """How a stored run ended.
+
+    Attributes
+    ----------
+    status : str
+    time_limit : float
+        That it ran under [s]; 0 where it is not known.
+    memory_limit : int
+        [bytes]; 0 where it is not known.
+    """
+
+    status: str
+    time_limit: float
+    memory_limit: int
 
 
 class StoreError(RuntimeError):
@@ -90,7 +130,7 @@ def _check(path: Path) -> bool:
             return False
         raise StoreError(f"{path} holds other files and no results of simnav; name an empty or a new folder")
     content = _read_marker(path)
-    if content["format"] != FORMAT:
+    if content["format"] not in READABLE:
         raise StoreError(
             f"the results in {path} have format {content['format']} (simnav {content.get('simnav', 'unknown')}), this "
             f"version reads format {FORMAT}: name another folder, or use the version that wrote them"
@@ -280,20 +320,58 @@ def write(folder: str | os.PathLike[str], result: Result) -> None:
         write_tables(file, iter([table]))
 
 
-def keys(folder: str | os.PathLike[str]) -> dict[str, str]:
-    """Key -> status of every result that is there and whole; damaged files are set aside."""
+def keys(folder: str | os.PathLike[str]) -> dict[str, Ending]:
+    """How each result that is there and whole ended, by key; damaged files are set aside."""
     path = _opened(folder)
     _sweep(path)
 
-    def scan() -> dict[str, str]:
-        found: dict[str, str] = {}
+    def scan() -> dict[str, Ending]:
+        found: dict[str, Ending] = {}
         for tables in _scan(path):  # all columns: to know that the file is whole
             for table in tables:
-                columns = (table.column(name).to_pylist() for name in ("key", "status"))
-                found = dict(zip(*columns, strict=True)) | found
+                key, *columns = (table.column(name).to_pylist() for name in ("key", *Ending._fields))
+                found = dict(zip(key, map(Ending._make, zip(*columns, strict=True)), strict=True)) | found
         return found
 
     return _steadily(scan)
+
+
+def drop(folder: str | os.PathLike[str], keys: Collection[str]) -> None:
+    """Take results out of a folder, because they are to be computed again.
+
+    Each file is replaced as a whole or deleted, so that other results are safe whatever happens.
+
+    Parameters
+    ----------
+    folder : path
+    keys : collection of str
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written or deleted.
+    """
+
+    def without(table: pa.Table) -> pa.Table:
+        import pyarrow as pa
+
+        return table.filter(pa.array([key not in keys for key in table.column("key").to_pylist()]))
+
+    path = _opened(folder)
+    for key in keys:
+        (path / _LOOSE / f"{key}.parquet").unlink(missing_ok=True)
+    _rewrite(path, keys, without)
+
+
+def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.Table]) -> None:
+    """Write the files that hold some of the keys again, each whole or not at all."""
+    for file in _files(path):
+        with contextlib.suppress(_DamagedError, FileNotFoundError):
+            if not any(key in keys for table in _read(file, ["key"]) for key in table.column("key").to_pylist()):
+                continue
+            tables = [change(table) for table in _read(file)]
+            with _atomic(file) as target:
+                write_tables(target, iter(tables))
 
 
 def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]:
