@@ -24,10 +24,12 @@ from typing import TYPE_CHECKING
 from simnav.estimator import EstimatorError, find
 from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
 from simnav.leaderboard.campaign.isolation import isolate
+from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.session_class import carry, is_session
 from simnav.leaderboard.campaign.worker import Entrant, Unit, run_unit
-from simnav.leaderboard.results import store
+from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
@@ -125,6 +127,8 @@ def run_campaign(
     timeout: float | None = None,
     memory: int = MEMORY,
     retry: bool = False,
+    keep_trials: bool = False,
+    covariance_interval: float = 0.0,
     progress: Callable[[Progress], None] | None = None,
     backend: str = "loky",
     scheduler: str | None = None,
@@ -148,6 +152,11 @@ def run_campaign(
     retry : bool
         Run failures again (errors, timeouts, out of memory, diverged, invalid output). Without it, only those runs are
         that could not be recorded, or that a shorter time limit or a smaller memory limit than today's ended.
+    keep_trials : bool
+        Keep the estimates, covariances, diagnostics and flags, so that any score can be computed later
+        (`simnav.leaderboard.campaign.rescoring`): about 190 bytes an epoch.
+    covariance_interval : float
+        Least time between two covariances that are kept [s]; 0 keeps all.
     progress : callable, optional
         Called with a `Progress` now and then.
     backend : {"loky", "dask"}
@@ -180,6 +189,8 @@ def run_campaign(
         raise RequestError(f"timeout = {timeout:g} s should be greater than 0")
     if memory < 16 << 20:
         raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
+    if not covariance_interval >= 0.0:
+        raise RequestError(f"covariance_interval = {covariance_interval:g} s should not be negative")
     for seed in seeds:
         if not 0 <= seed < 2**63:
             raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
@@ -201,17 +212,47 @@ def run_campaign(
     current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
     store.select(path, current)
 
+    scores, scoring = own_scores(), scoring_code()
+    stale = {
+        key
+        for labels in variants.values()
+        for key in (f"{v}-{seed}" for v in labels.values() for seed in seeds)
+        if key in endings and scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
+    }
+    if stale:  # a score was edited: the trials that were kept have all that it needs
+        rescore_results(path, scenarios=scenarios, keys=stale)
+        endings = store.keys(path)
     units: list[Unit] = []
     again: set[str] = set()
     for seed in seeds:
         for scenario in scenarios:
             limit = time_limit(scenario) if timeout is None else timeout
             keyed = [(e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants]
-            missing = tuple((e, k) for e, k in keyed if k not in endings or _again(endings[k], limit, memory, retry))
+            missing = tuple(
+                (e, k)
+                for e, k in keyed
+                if k not in endings
+                or _again(endings[k], limit, memory, retry)
+                or scoring_differs(endings[k].scoring, scoring)
+            )
             again.update(key for _, key in missing if key in endings)
             if missing:
                 units.append(
-                    Unit(scenario, seed, missing, recordings[scenario.id], simulator, path, limit, memory, os.getpid())
+                    Unit(
+                        scenario,
+                        seed,
+                        missing,
+                        recordings[scenario.id],
+                        simulator,
+                        path,
+                        limit,
+                        memory,
+                        os.getpid(),
+                        scores,
+                        scoring,
+                        keep_trials,
+                        covariance_interval,
+                    )
                 )
     total = len(seeds) * len(scenarios) * len(entrants)
     skipped = total - sum(len(u.entrants) for u in units)
@@ -219,6 +260,8 @@ def run_campaign(
     if units:
         if again:
             store.drop(path, again)
+            for key in again:
+                trials.discard(path, key)
         _compile(report)
         run_started = time.monotonic()
         weight, left = 0.0, sum(u.weight for u in units)

@@ -22,6 +22,7 @@ from simnav.leaderboard.cli import (
     list_,
     new_estimator,
     reproduce,
+    rescore,
     run,
     simulate,
     train,
@@ -56,7 +57,7 @@ def root(
     ] = False,
     plugin: Annotated[
         list[Path] | None,
-        typer.Option(help="Python file that registers instruments or faults of others; may be given several times."),
+        typer.Option(help="Python file that registers instruments, faults or scores of others; repeatable."),
     ] = None,
 ) -> None:
     """The open benchmark for marine integrated navigation: simulate, estimate, score, rank."""
@@ -70,7 +71,20 @@ def root(
                 raise typer.BadParameter(str(error), param_hint="--plugin") from None
 
 
-for _module in (list_, run, simulate, check, new_estimator, evaluate, campaign, leaderboard, warmup, bound, reproduce):
+for _module in (
+    list_,
+    run,
+    simulate,
+    check,
+    new_estimator,
+    evaluate,
+    campaign,
+    leaderboard,
+    warmup,
+    bound,
+    reproduce,
+    rescore,
+):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)
 

@@ -26,8 +26,8 @@ BATCH = 256
 #: Statuses that say nothing about the estimator.
 NO_TRIAL = ("unsuitable", "no-recording")
 
-#: Columns that format 1 does not have; there they are 0, not known.
-_SINCE_2 = ("time_limit", "memory_limit")
+#: Columns that format 1 does not have, and what stands there: not known.
+_SINCE_2 = {"time_limit": 0.0, "memory_limit": 0, "scoring": ""}
 
 Series = NDArray[np.float32]
 
@@ -69,6 +69,8 @@ class Result:
         That the estimator ran under [s]; 0 where it is not known.
     memory_limit : int
         That it ran under [bytes]; 0 where it is not known.
+    scoring : str
+        With which code it was scored: JSON, digests by module. Empty where it is not known.
     """
 
     scenario: str
@@ -88,6 +90,7 @@ class Result:
     simnav: str = ""
     time_limit: float = 0.0
     memory_limit: int = 0
+    scoring: str = ""
 
     @property
     def variant(self) -> str:
@@ -124,6 +127,7 @@ def schema() -> pa.Schema:
             ("simnav", pa.string()),
             ("time_limit", pa.float64()),
             ("memory_limit", pa.int64()),
+            ("scoring", pa.string()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )
@@ -164,8 +168,8 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         for batch in file.iter_batches(batch_size=BATCH, columns=there, use_threads=False):
             table = pa.Table.from_batches([batch])
             for name in (n for n in names if n in wanted and n not in there):
-                zeros = pa.array(np.zeros(len(table)), schema().field(name).type)
-                table = table.append_column(schema().field(name), zeros)
+                unknown = pa.array([_SINCE_2[name]] * len(table), schema().field(name).type)
+                table = table.append_column(schema().field(name), unknown)
             yield table.replace_schema_metadata(schema().metadata)
 
 

@@ -5,6 +5,7 @@ A results folder holds::
     simnav-results.json      format of the folder, and which results are current
     results/KEY.parquet      one result, fresh from a worker
     compacted/part-*.parquet many results
+    trials/KEY.parquet       what the estimator gave, where trials are kept (`simnav.leaderboard.results.trials`)
 
 A result's key names everything that decides it (`simnav.leaderboard.campaign.fingerprint`), so a campaign that was
 killed goes on where it was. Whatever moment it was killed at: a file is either whole or not there
@@ -25,6 +26,7 @@ import time
 import uuid
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeVar
 
@@ -49,17 +51,19 @@ __all__ = [
     "Result",
     "StoreError",
     "StoreWarning",
+    "atomic",
     "compact",
     "create",
     "drop",
     "keys",
     "load",
+    "rescore",
     "select",
     "write",
 ]
 
 _MARKER = "simnav-results.json"
-_LOOSE, _COMPACTED = "results", "compacted"
+_LOOSE, _COMPACTED, _TRIALS = "results", "compacted", "trials"
 _MOST_PARTS = 16  # more are merged into one
 _STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
 
@@ -77,11 +81,14 @@ class Ending(NamedTuple):
         That it ran under [s]; 0 where it is not known.
     memory_limit : int
         [bytes]; 0 where it is not known.
+    scoring : str
+        With which code it was scored, as in `Result`.
     """
 
     status: str
     time_limit: float
     memory_limit: int
+    scoring: str
 
 
 class StoreError(RuntimeError):
@@ -167,7 +174,7 @@ def _write_marker(path: Path, current: Mapping[str, Any]) -> None:
     from importlib.metadata import version
 
     content = {"format": FORMAT, "simnav": version("simnav"), "current": current}
-    with _atomic(path / _MARKER) as file:
+    with atomic(path / _MARKER) as file:
         file.write(json.dumps(content, indent=1, sort_keys=True).encode())
 
 
@@ -196,7 +203,7 @@ def select(folder: str | os.PathLike[str], current: Mapping[str, tuple[str, Mapp
 
 
 @contextlib.contextmanager
-def _atomic(path: Path) -> Iterator[BinaryIO]:
+def atomic(path: Path) -> Iterator[BinaryIO]:
     """Write a file whole or not at all."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -279,7 +286,8 @@ def _steadily(scan: Callable[[], T]) -> T:
 
 def _sweep(path: Path) -> None:
     """Delete temporary files that a killed process left."""
-    for temporary in [*path.glob(".*.tmp"), *(path / _LOOSE).glob(".*.tmp"), *(path / _COMPACTED).glob(".*.tmp")]:
+    folders = (path, *(path / name for name in (_LOOSE, _COMPACTED, _TRIALS)))
+    for temporary in [file for folder in folders for file in folder.glob(".*.tmp")]:
         with contextlib.suppress(OSError):
             if time.time() - temporary.stat().st_mtime > _STALE:
                 temporary.unlink()
@@ -316,7 +324,7 @@ def write(folder: str | os.PathLike[str], result: Result) -> None:
         If it cannot be written, e.g. because the disk is full; nothing is left behind.
     """
     table = to_table(result)
-    with _atomic(Path(folder) / _LOOSE / f"{result.key}.parquet") as file:
+    with atomic(Path(folder) / _LOOSE / f"{result.key}.parquet") as file:
         write_tables(file, iter([table]))
 
 
@@ -363,6 +371,38 @@ def drop(folder: str | os.PathLike[str], keys: Collection[str]) -> None:
     _rewrite(path, keys, without)
 
 
+def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, float]], scoring: str) -> None:
+    """Give results other scores.
+
+    Each file is replaced as a whole, so that a result has its old scores or its new ones, whatever happens.
+
+    Parameters
+    ----------
+    folder : path
+    scores : mapping of str to mapping
+        By key: all scores of the result.
+    scoring : str
+        With which code they were computed.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written; then the results in it have their old scores.
+    """
+
+    def changed(table: pa.Table) -> pa.Table:
+        import pyarrow as pa
+
+        if not len(table):
+            return table
+        results = [
+            replace(r, scores=dict(scores[r.key]), scoring=scoring) if r.key in scores else r for r in rows(table)
+        ]
+        return pa.concat_tables([to_table(r) for r in results]).combine_chunks()
+
+    _rewrite(_opened(folder), scores, changed)
+
+
 def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.Table]) -> None:
     """Write the files that hold some of the keys again, each whole or not at all."""
     for file in _files(path):
@@ -370,7 +410,7 @@ def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.
             if not any(key in keys for table in _read(file, ["key"]) for key in table.column("key").to_pylist()):
                 continue
             tables = [change(table) for table in _read(file)]
-            with _atomic(file) as target:
+            with atomic(file) as target:
                 write_tables(target, iter(tables))
 
 
@@ -452,7 +492,7 @@ def compact(folder: str | os.PathLike[str]) -> None:
             yield pa.concat_tables(pending).combine_chunks()
 
     part = path / _COMPACTED / f"part-{uuid.uuid4().hex[:16]}.parquet"
-    with _atomic(part) as file:
+    with atomic(part) as file:
         write_tables(file, tables())
     try:
         for old in done:

@@ -40,6 +40,7 @@ def result(seed: int, label: str = "ekf", scenario: str = "bay-v1", recording: s
         simnav="0.1.0",
         time_limit=60.0,
         memory_limit=1 << 30,
+        scoring="{}",
     )
     return dataclasses.replace(made, **changes)
 
@@ -83,7 +84,7 @@ def test_what_is_written_is_read(folder: Path) -> None:
         assert len(loaded) == len(written)
         for a, b in zip(written, loaded, strict=True):
             same(a, b)
-        assert store.keys(folder) == {r.key: ("ok", 60.0, 1 << 30) for r in written}
+        assert store.keys(folder) == {r.key: ("ok", 60.0, 1 << 30, "{}") for r in written}
         store.compact(folder)
         assert not loose(folder)
     assert all(not r.series and r.scores for r in store.load(folder, series=False))
@@ -354,11 +355,25 @@ def test_results_of_format_1_are_read(folder: Path) -> None:
     store.write(folder, result(0))
     (path,) = loose(folder)
     new = pq.read_table(path)
-    old = new.drop_columns(["time_limit", "memory_limit"]).replace_schema_metadata({"simnav_results": "1"})
+    old = new.drop_columns(["time_limit", "memory_limit", "scoring"]).replace_schema_metadata({"simnav_results": "1"})
     pq.write_table(old, path)
     marker = folder / "simnav-results.json"
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 1}))
-    assert store.keys(folder) == {"ekfr1-0": ("ok", 0.0, 0)}
+    assert store.keys(folder) == {"ekfr1-0": ("ok", 0.0, 0, "")}
     store.write(folder, result(1))
     store.compact(folder)
     assert [(r.seed, r.time_limit) for r in store.load(folder)] == [(0, 0.0), (1, 60.0)]
+
+
+def test_scores_are_replaced_wherever_they_are(folder: Path) -> None:
+    for seed in range(4):
+        store.write(folder, result(seed))
+        if seed == 1:
+            store.compact(folder)
+    before = store.load(folder)
+    store.rescore(folder, {"ekfr1-1": {"new": 5.0}, "ekfr1-3": {"new": 6.0}}, "code")
+    after = store.load(folder)
+    assert [r.scores.get("new") for r in after] == [None, 5.0, None, 6.0]
+    assert [r.scoring for r in after] == ["{}", "code", "{}", "code"]
+    for old, new in zip(before, after, strict=True):
+        same(dataclasses.replace(old, scores={}, scoring=""), dataclasses.replace(new, scores={}, scoring=""))
