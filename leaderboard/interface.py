@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from simnav.contract_check import Report
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Progress, Summary
+    from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.bounds import BoundReport
@@ -52,6 +53,7 @@ __all__ = [
     "rank",
     "record",
     "reproduce",
+    "rescore",
     "results_of",
     "run",
     "scenario_of",
@@ -306,6 +308,9 @@ def campaign(
     workers: int = 2,
     time_limit: float | None = None,
     memory_limit: float = 2048.0,
+    retry: bool = False,
+    keep_trials: bool = False,
+    covariance_interval: float = 0.0,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run scenarios x estimators x seeds; started again, it goes on where it was.
@@ -322,6 +327,14 @@ def campaign(
         Of what was not asked for by name, leave out what is long or slow.
     seed, parameters, workers, time_limit, memory_limit, progress
         As for `evaluate`.
+    retry : bool
+        Run failures again that are in the folder. A run that a shorter time limit or a smaller memory limit than
+        today's ended is run again in any case.
+    keep_trials : bool
+        Keep what the estimators gave, for `rescore`: about 190 bytes an epoch and run.
+    covariance_interval : float
+        Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
+        the covariance as they are.
 
     Returns
     -------
@@ -336,7 +349,9 @@ def campaign(
     if quick and estimators is None:
         estimators = quick_estimators()
     chosen, folder = scenarios_of(scenarios, quick=quick), _absolute(output)
-    summary = _run(chosen, requests(estimators, parameters), seeds, folder, workers, time_limit, memory_limit, progress)
+    everyone = requests(estimators, parameters)
+    summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
+                   keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results), summary)
 
@@ -358,6 +373,39 @@ def rank(results: str | os.PathLike[str] | Iterable[Result], *, score: str = "ho
     from simnav.leaderboard.ranking.ranking import rank
 
     return rank(results_of(results) if isinstance(results, (str, os.PathLike)) else results, score=score)
+
+
+def rescore(
+    results: str | os.PathLike[str],
+    scores: str | Iterable[str] = (),
+    *,
+    scenarios: Scenarios = None,
+    progress: Callable[..., None] | None = None,
+) -> Rescored:
+    """Compute scores again from the trials that a campaign kept; no estimator runs.
+
+    Parameters
+    ----------
+    results : path
+        Folder that a campaign wrote with ``keep_trials``. Its results get the scores.
+    scores : str or iterable of str
+        Keys of `simnav.scoring.SCORES`; default: all, those of plug-ins too.
+    scenarios : scenarios, optional
+        That are not in the catalogue.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the last.
+
+    Returns
+    -------
+    Rescored
+    """
+    from simnav.leaderboard.campaign.rescoring import rescore_results
+    from simnav.leaderboard.results.store import StoreError
+
+    names = scores.split(",") if isinstance(scores, str) else scores
+    given = [] if scenarios is None else scenarios_of(scenarios)
+    with mistakes(StoreError):
+        return rescore_results(_absolute(results), [n.strip() for n in names if n.strip()], given, progress)
 
 
 def bound(
@@ -529,7 +577,7 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
 
 def _run(
     scenarios: Sequence[Scenario], everyone: Sequence[EstimatorRequest], seeds: range, folder: Path, workers: int,
-    time_limit: float | None, memory_limit: float, progress: CampaignProgress,
+    time_limit: float | None, memory_limit: float, progress: CampaignProgress, **options: Any,
 ) -> Summary:  # fmt: skip
     from simnav.leaderboard.campaign.campaign import run_campaign
     from simnav.leaderboard.results.store import StoreError, create
@@ -538,5 +586,5 @@ def _run(
         create(folder)
     return run_campaign(
         scenarios, everyone, seeds, folder, workers=workers, timeout=time_limit,
-        memory=int(memory_limit * 2**20), progress=progress,
+        memory=int(memory_limit * 2**20), progress=progress, **options,
     )  # fmt: skip

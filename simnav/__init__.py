@@ -30,12 +30,13 @@ if TYPE_CHECKING:
         rank,
         record,
         reproduce,
+        rescore,
         run,
     )
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
-    from simnav.scoring import score
+    from simnav.scoring import register_score, score
     from simnav.sensors import register_fault, register_instrument
     from simnav.source import open_source
     from simnav.trial import Trial, run_trial
@@ -93,7 +94,9 @@ __all__ = [
     "register",
     "register_fault",
     "register_instrument",
+    "register_score",
     "reproduce",
+    "rescore",
     "run",
     "run_trial",
     "score",
@@ -108,7 +111,7 @@ _HOMES = {
     "plugins": ("load_plugin",),
     "recording": ("Recording",),
     "scenario": ("Scenario", "load"),
-    "scoring": ("score",),
+    "scoring": ("register_score", "score"),
     "sensors": ("register_fault", "register_instrument"),
     "source": ("open_source",),
     "trial": ("Trial", "run_trial"),
@@ -137,6 +140,7 @@ _HOMES = {
         "rank",
         "record",
         "reproduce",
+        "rescore",
         "run",
     ),
 }

@@ -1,6 +1,6 @@
-"""How classes of others become known: by a decorator, from the entry points of packages, from single files.
+"""How classes and functions of others become known: by a decorator, from entry points of packages, from single files.
 
-A `Registry` holds the classes of one sort, by name. Entry points are loaded when they are first needed; one that fails
+A `Registry` holds those of one sort, by name. Entry points are loaded when they are first needed; one that fails
 is named in a warning and harms nobody else. simnav's own classes are registered by the same decorators, and first, so
 that a plug-in cannot take their names.
 """
@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 __all__ = ["PluginError", "Registry", "import_file", "is_file_module", "load_plugin", "place_of", "source_digest"]
 
@@ -93,7 +93,7 @@ def is_file_module(name: str) -> bool:
 
 
 def load_plugin(path: str | Path) -> None:
-    """Load a Python file that registers instruments, faults or estimators; a file that is loaded already is left alone.
+    """Load a Python file that registers instruments, faults, scores or estimators; once for each content.
 
     A scenario names such files itself (``plugins = ["beacon.py"]``); packages have entry points instead.
 
@@ -128,8 +128,9 @@ def _digest(source: bytes) -> str:
     return hashlib.blake2b(source, digest_size=16).hexdigest()
 
 
-def place_of(cls: type) -> tuple[str, int]:
-    """File and line of the definition of a class; ``"?"`` and 0 where they are not known."""
+def place_of(cls: Any) -> tuple[str, int]:
+    """File and line of the definition of a class or a function; ``"?"`` and 0 where they are not known."""
+    cls = inspect.unwrap(cls)
     try:
         file = inspect.getsourcefile(cls) or "?"
     except TypeError:  # typed in at a prompt
@@ -141,7 +142,7 @@ def place_of(cls: type) -> tuple[str, int]:
 
 
 class Registry(Generic[C]):
-    """The classes of one sort, by name.
+    """The classes or functions of one sort, by name.
 
     Parameters
     ----------
@@ -150,15 +151,17 @@ class Registry(Generic[C]):
     group : str
         Entry-point group of other packages.
     home : str
-        Module whose import registers the classes of simnav itself.
+        Module whose import registers those of simnav itself.
+    term : str
+        What a name is called in messages.
     """
 
-    def __init__(self, what: str, group: str, home: str):
-        self.what, self.group, self.home = what, group, home
-        self._classes: dict[str, type[C]] = {}
+    def __init__(self, what: str, group: str, home: str, *, term: str = "kind"):
+        self.what, self.group, self.home, self.term = what, group, home, term
+        self._classes: dict[str, C] = {}
         self._discovered = False
 
-    def add(self, name: str, cls: type[C]) -> None:
+    def add(self, name: str, cls: C) -> None:
         """Register a class; a class that is defined again (in a notebook, or in an edited file) replaces itself.
 
         Raises
@@ -168,19 +171,20 @@ class Registry(Generic[C]):
         """
         if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
             raise PluginError(
-                f"kind {name!r} of {self.what} {cls.__qualname__}: a kind is in snake_case, like 'my_kind'"
+                f"{self.term} {name!r} of {self.what} {_label(cls)}: a {self.term} is in snake_case, like "
+                f"'my_{self.term}'"
             )
         other = self._classes.get(name)
         if other is not None and not _same(other, cls):
             file, line = place_of(other)
             raise PluginError(
-                f"kind {name!r} of {self.what} {cls.__qualname__}: the name is taken by {other.__qualname__} "
+                f"{self.term} {name!r} of {self.what} {_label(cls)}: the name is taken by {_label(other)} "
                 f"({file}, line {line})"
             )
         self._classes[name] = cls
 
     @contextlib.contextmanager
-    def adding(self, name: str, cls: type[C]) -> Iterator[None]:
+    def adding(self, name: str, cls: C) -> Iterator[None]:
         """`add` a class, and take it back if the block raises."""
         before = dict(self._classes)
         self.add(name, cls)
@@ -190,13 +194,13 @@ class Registry(Generic[C]):
             self._classes = before
             raise
 
-    def get(self, name: str) -> type[C] | None:
+    def get(self, name: str) -> C | None:
         """The class of a name, or None."""
         if name not in self._classes:
             self.discover()
         return self._classes.get(name)
 
-    def items(self) -> dict[str, type[C]]:
+    def items(self) -> dict[str, C]:
         """All classes by name: those of simnav, then others, each in the order of registration."""
         self.discover()
         return dict(self._classes)
@@ -221,7 +225,11 @@ class Registry(Generic[C]):
                 )
 
 
-def _same(old: type, new: type) -> bool:
+def _label(item: Any) -> str:
+    return str(item.__qualname__)
+
+
+def _same(old: Any, new: Any) -> bool:
     """Whether a class is another version of an old one: of the same name, in the same module or file, or in a copy."""
     if old.__qualname__ != new.__qualname__:
         return False

@@ -24,10 +24,12 @@ from typing import TYPE_CHECKING
 from simnav.estimator import EstimatorError, find
 from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
 from simnav.leaderboard.campaign.isolation import isolate
+from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.session_class import carry, is_session
 from simnav.leaderboard.campaign.worker import Entrant, Unit, run_unit
-from simnav.leaderboard.results import store
+from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
@@ -124,6 +126,9 @@ def run_campaign(
     workers: int = 2,
     timeout: float | None = None,
     memory: int = MEMORY,
+    retry: bool = False,
+    keep_trials: bool = False,
+    covariance_interval: float = 0.0,
     progress: Callable[[Progress], None] | None = None,
     backend: str = "loky",
     scheduler: str | None = None,
@@ -144,6 +149,14 @@ def run_campaign(
         Wall-clock time that an estimator may take for a run [s]; default: `time_limit`.
     memory : int
         Memory that an estimator may take beyond the recording [bytes].
+    retry : bool
+        Run failures again (errors, timeouts, out of memory, diverged, invalid output). Without it, only those runs are
+        that could not be recorded, or that a shorter time limit or a smaller memory limit than today's ended.
+    keep_trials : bool
+        Keep the estimates, covariances, diagnostics and flags, so that any score can be computed later
+        (`simnav.leaderboard.campaign.rescoring`): about 190 bytes an epoch.
+    covariance_interval : float
+        Least time between two covariances that are kept [s]; 0 keeps all.
     progress : callable, optional
         Called with a `Progress` now and then.
     backend : {"loky", "dask"}
@@ -176,6 +189,8 @@ def run_campaign(
         raise RequestError(f"timeout = {timeout:g} s should be greater than 0")
     if memory < 16 << 20:
         raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
+    if not covariance_interval >= 0.0:
+        raise RequestError(f"covariance_interval = {covariance_interval:g} s should not be negative")
     for seed in seeds:
         if not 0 <= seed < 2**63:
             raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
@@ -187,9 +202,9 @@ def run_campaign(
         raise RequestError("backend = 'dask' needs the extra 'distributed': pip install 'simnav[distributed]'")
 
     path = store.create(Path(folder).resolve())
-    there = {key for key, status in store.keys(path).items() if status != "no-recording"}
-    entrants = [_resolve(request) for request in estimators]
+    endings = store.keys(path)
     simulator = simulator_version()
+    entrants = [_resolve(request) for request in estimators]
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     variants = {
         s.id: {e.label: _variant(e, recordings[s.id]) for e in entrants} for s in scenarios
@@ -197,20 +212,56 @@ def run_campaign(
     current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
     store.select(path, current)
 
+    scores, scoring = own_scores(), scoring_code()
+    stale = {
+        key
+        for labels in variants.values()
+        for key in (f"{v}-{seed}" for v in labels.values() for seed in seeds)
+        if key in endings and scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
+    }
+    if stale:  # a score was edited: the trials that were kept have all that it needs
+        rescore_results(path, scenarios=scenarios, keys=stale)
+        endings = store.keys(path)
     units: list[Unit] = []
+    again: set[str] = set()
     for seed in seeds:
         for scenario in scenarios:
-            keyed = ((e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants)
-            missing = tuple((e, key) for e, key in keyed if key not in there)
+            limit = time_limit(scenario) if timeout is None else timeout
+            keyed = [(e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants]
+            missing = tuple(
+                (e, k)
+                for e, k in keyed
+                if k not in endings
+                or _again(endings[k], limit, memory, retry)
+                or scoring_differs(endings[k].scoring, scoring)
+            )
+            again.update(key for _, key in missing if key in endings)
             if missing:
-                limit = time_limit(scenario) if timeout is None else timeout
                 units.append(
-                    Unit(scenario, seed, missing, recordings[scenario.id], simulator, path, limit, memory, os.getpid())
+                    Unit(
+                        scenario,
+                        seed,
+                        missing,
+                        recordings[scenario.id],
+                        simulator,
+                        path,
+                        limit,
+                        memory,
+                        os.getpid(),
+                        scores,
+                        scoring,
+                        keep_trials,
+                        covariance_interval,
+                    )
                 )
     total = len(seeds) * len(scenarios) * len(entrants)
     skipped = total - sum(len(u.entrants) for u in units)
     statuses: Counter[str] = Counter()
     if units:
+        if again:
+            store.drop(path, again)
+            for key in again:
+                trials.discard(path, key)
         _compile(report)
         run_started = time.monotonic()
         weight, left = 0.0, sum(u.weight for u in units)
@@ -229,6 +280,17 @@ def run_campaign(
     else:
         report(Progress("run", total, total))
     return Summary(path, total, skipped, dict(statuses), time.monotonic() - started)
+
+
+def _again(ending: store.Ending, time_limit: float, memory_limit: int, retry: bool) -> bool:
+    """Whether a run that is stored should be run again, under these limits [s, bytes]."""
+    if ending.status == "no-recording":
+        return True
+    if retry and ending.status not in ("ok", "unsuitable"):
+        return True
+    return (ending.status == "timeout" and ending.time_limit < time_limit) or (
+        ending.status == "out-of-memory" and ending.memory_limit < memory_limit
+    )
 
 
 def _unique(what: str, labels: list[str]) -> None:
@@ -258,6 +320,8 @@ def _resolve(request: EstimatorRequest) -> Entrant:
         _import_estimators()
         with mistakes(EstimatorError):
             cls = request.cls or find(name)
+        with contextlib.suppress(Exception):  # the isolated process says what is wrong
+            estimator_source(cls)  # files that are parsed here need not be parsed in every process
         if request.cls is not None or is_session(cls.__module__):
             code = carry(cls)
     entrant = Entrant(name, dict(request.parameters), request.label, False, "", code)
@@ -311,11 +375,11 @@ def _outcomes(
                 yield left.pop(index), outcome
             return
         except BrokenProcessPool:
-            there = store.keys(units[0].folder)  # some of it was finished, and could not be told any more
+            endings = store.keys(units[0].folder)  # some of it was finished, and could not be told any more
             for index, unit in list(left.items()):
-                finished = tuple(entrant for entrant in unit.entrants if entrant[1] in there)
+                finished = tuple(entrant for entrant in unit.entrants if entrant[1] in endings)
                 if finished:
-                    yield replace(unit, entrants=finished), Counter(there[key] for _, key in finished)
+                    yield replace(unit, entrants=finished), Counter(endings[key].status for _, key in finished)
                     left[index] = replace(unit, entrants=tuple(e for e in unit.entrants if e not in finished))
                     if not left[index].entrants:
                         del left[index]

@@ -1,74 +1,55 @@
-"""Digests of all that decides a result: scenario, data, simulator, estimator.
+"""Digests of all that decides a result: scenario, data, simulator, estimator. Nothing else counts.
 
-A result's key is ``VARIANT-SEED``. The variant hashes the recording's digest (scenario, log files,
-sources of simnav) and the estimator's (name, label, parameters, sources).
+A result's key is ``VARIANT-SEED``. The variant hashes the recording's digest (scenario, log files, the code of the
+simulator) and the estimator's (name, label, parameters, the files that they name, code). Code is what
+`simnav.leaderboard.campaign.sources` finds by following imports; comments and docstrings are not in it. The scores are
+not in the key: each result says with which code it was scored.
 """
 
 from __future__ import annotations
 
-import ast
-import hashlib
 import importlib.util
-import inspect
 import json
 import os
 import sys
 import sysconfig
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from functools import partial
 from pathlib import Path
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
-import simnav
 from simnav.leaderboard.campaign.session_class import is_session, source_of
+from simnav.leaderboard.campaign.sources import digest, files_digest, followed
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.scenario import Scenario
 
-__all__ = ["digest", "estimator_source", "recording_digest", "simulator_version", "variant"]
+__all__ = ["digest", "estimator_source", "named_files", "recording_digest", "simulator_version", "variant"]
+
+#: What makes recordings, and what runs an estimator over them: the imports are followed from here.
+SIMULATOR = ("simnav.source", "simnav.simulator", "simnav.log.source", "simnav.sensors")
+RUNNER = ("simnav.trial",)
 
 
-#: The library, and the folders in it that are packages of the floors above: they do not decide a recording.
-LIBRARY = Path(simnav.__file__).parent
-UPPER_FLOORS = ("estimators", "scenarios", "leaderboard")
-
-OUR_ESTIMATORS = "simnav.estimators"
+def _code_digest(code: Mapping[str, str]) -> str:
+    return digest(*(part for item in code.items() for part in item))
 
 
-def digest(*parts: str) -> str:
-    """Hexadecimal digest of texts (their boundaries count)."""
-    h = hashlib.blake2b(digest_size=12)
-    for part in parts:
-        data = part.encode(errors="surrogatepass")
-        h.update(f"{len(data)}:".encode() + data)
-    return h.hexdigest()
-
-
-def _files_digest(files: Iterable[tuple[str, Path]]) -> str:
-    """Digest of the names and contents of files; one that is absent counts as absent."""
-    parts = []
-    for name, path in files:
-        try:
-            with open(path, "rb") as file:
-                content = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
-        except OSError:
-            content = "absent"
-        parts += [name, content]
-    return digest(*parts)
-
-
-def _package_digest(folder: Path) -> str:
-    """Digest of all files of a package, but for what Python makes of them; of simnav, the library alone."""
+def _package_code(folder: Path) -> str:
+    """Digest of all files of a package, but for what Python makes of them, and of what it imports of simnav."""
     found = []
     for place, folders, names in os.walk(folder):
         folders[:] = [f for f in folders if f != "__pycache__" and not f.startswith(".")]
-        if folder == LIBRARY and place == str(folder):
-            folders[:] = [f for f in folders if f not in UPPER_FLOORS]
         found += [Path(place, n) for n in names if not n.startswith(".") and not n.endswith((".pyc", "~"))]
-    return _files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
+    files = files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
+    code = followed(files=sorted(p for p in found if p.suffix == ".py"))
+    return digest(files, _code_digest({name: c for name, c in code.items() if _in_simnav(name)}))
 
 
-def _installed_digest(package: str) -> str:
+def _installed_code(package: str) -> str:
     """Digest of an importable package or module, by its top-level name."""
     module = sys.modules.get(package)
     origin = getattr(module, "__file__", None)
@@ -78,19 +59,27 @@ def _installed_digest(package: str) -> str:
     if origin is None:
         return digest(package, "no file")
     path = Path(origin)
-    return _package_digest(path.parent) if path.name == "__init__.py" else _files_digest([(package, path)])
+    return _package_code(path.parent) if path.name == "__init__.py" else _code_digest(followed(files=[path]))
 
 
 def simulator_version() -> str:
-    """Version of simnav with a digest of its sources."""
+    """Version of simnav with a digest of the code that makes recordings."""
     from importlib.metadata import version
 
-    return f"{version('simnav')}+{_installed_digest('simnav')[:12]}"
+    return f"{version('simnav')}+{_code_digest(followed(SIMULATOR))[:12]}"
 
 
 def recording_digest(scenario: Scenario, simulator: str) -> str:
-    """Digest of all that decides the recordings of a scenario, but the seed."""
-    return digest(scenario.id, scenario.content_hash(), simulator, _log_digest(scenario))
+    """Digest of all that decides the recordings of a scenario, but the seed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    simulator : str
+        As from `simulator_version`; of it only the digest of the code counts, not the number of the version.
+    """
+    code = simulator.rpartition("+")[2]
+    return digest(scenario.id, scenario.content_hash(), code, _log_digest(scenario))
 
 
 def _log_digest(scenario: Scenario) -> str:
@@ -106,89 +95,130 @@ def _log_digest(scenario: Scenario) -> str:
                 files.append((f"{recording}/{file.path}", path))
     except (ValueError, OSError):  # absent data: every run says so
         return "absent"
-    return _files_digest(files)
+    return files_digest(files)
 
 
 def estimator_source(cls: type[Estimator]) -> str:
-    """Digest of the sources of an estimator.
+    """Digest of the code of an estimator, and of what runs it.
 
-    Of a class in an installed package: all files of the package. Of a class in a file: this file and those
-    beside it that it imports, directly or not. Of a class in a session: its text, what it uses of the session,
-    and the files of the user's own that it uses. Base classes count likewise.
+    Of a class of simnav: its module, those of its bases and of the pieces that it is made of, and what these import.
+    Of a class in a file: likewise, with the files beside it that it imports. Of a class in an installed package: all
+    files of the package, and what it imports of simnav. Of a class in a session: its text, what it uses of the
+    session, and the files of the user's own that it uses. The content of a file that a default of its parameters names
+    counts, too.
     """
-    parts = []
+    from simnav.estimator.parameters import parameters_of
+
+    parts, ours = list[str](), set(RUNNER)
+    for module in dict.fromkeys(_homes(cls)):
+        if _in_simnav(module):
+            ours.add(module)
+            continue
+        package = module.partition(".")[0]
+        if is_session(module) and not module.startswith("simnav_file_"):
+            continue  # below
+        if package in sys.stdlib_module_names or package == "numpy":
+            continue
+        loaded = sys.modules.get(module)
+        file = getattr(loaded, "__file__", None)
+        if file is not None and "." not in module and not hasattr(loaded, "__path__"):
+            parts.append(_code_digest(followed(files=[Path(file).resolve()])))
+        elif module in {base.__module__ for base in cls.__mro__}:
+            parts.append(_installed_code(package))
     for base in cls.__mro__:
         if is_session(base.__module__) and not base.__module__.startswith("simnav_file_"):
             text, modules = source_of(base)
             parts += [digest(text), *filter(None, map(_used_digest, modules))]
-            continue
-        package = base.__module__.partition(".")[0]
-        if _is_ours(base.__module__):
-            package = OUR_ESTIMATORS
-        elif package in sys.stdlib_module_names or package in ("simnav", "numpy"):
-            continue  # the simulator's version has simnav
-        module = sys.modules.get(base.__module__)
-        path = Path(inspect.getfile(base)).resolve()
-        if "." not in base.__module__ and not hasattr(module, "__path__") and path.name != "__init__.py":
-            parts.append(_closure_digest(path))
-        else:
-            parts.append(_installed_digest(package))
-    return digest(*dict.fromkeys(parts))  # a package counts once, however many bases it has
+            ours.update(filter(_in_simnav, modules))
+    parts += [content for _, content in named_files(p.default for p in parameters_of(cls))]
+    return digest(_code_digest(followed(sorted(ours))), *dict.fromkeys(parts))
 
 
-def _closure_digest(start: Path) -> str:
-    """Digest of a file and of the files beside it that it imports; our estimators, if it builds on them."""
-    folder, todo, found, ours = start.parent, [start], dict[Path, None](), False
-    while todo:
-        path = todo.pop()
-        if path in found:
-            continue
-        found[path] = None
-        for name in _imports(path):
-            first = name.partition(".")[0]
-            ours = ours or _is_ours(name)
-            for place in {folder, path.parent}:
-                beside = place / f"{first}.py"
-                if beside.is_file():
-                    todo.append(beside)
-                elif (place / first / "__init__.py").is_file() and first != "simnav":
-                    todo += sorted((place / first).rglob("*.py"))
-    files = sorted((os.path.relpath(p, folder), p) for p in found)
-    return digest(_files_digest(files), _installed_digest(OUR_ESTIMATORS) if ours else "")
+def _homes(item: Any, depth: int = 3) -> Iterator[str]:
+    """Names of the modules that hold a class, its bases, and what their attributes are made of."""
+    if isinstance(item, type):
+        for base in item.__mro__:
+            yield base.__module__
+            if depth and base.__module__.partition(".")[0] not in sys.stdlib_module_names:
+                for value in vars(base).values():
+                    yield from _homes(value, depth - 1)
+    elif isinstance(item, (FunctionType, staticmethod, classmethod)):
+        yield getattr(item, "__module__", None) or ""
+    elif isinstance(item, partial):
+        yield from _homes((item.func, item.args, item.keywords), depth)
+    elif isinstance(item, (tuple, list, set, frozenset)):
+        for value in item:
+            yield from _homes(value, depth)
+    elif isinstance(item, Mapping):
+        for value in item.values():
+            yield from _homes(value, depth)
+    elif is_dataclass(item) and depth:
+        yield type(item).__module__
+        for entry in fields(item):
+            yield from _homes(getattr(item, entry.name, None), depth - 1)
+    elif _in_simnav(type(item).__module__):
+        yield type(item).__module__
 
 
 def _used_digest(module: str) -> str:
-    """Digest of a module that a class of a session uses; empty for one that is installed or in the simulator."""
-    if _is_ours(module):
-        return _installed_digest(OUR_ESTIMATORS)
+    """Digest of a file of the user's own that a class of a session uses; empty for what is installed or of simnav."""
     file = getattr(sys.modules.get(module), "__file__", None)
-    if file is None or module.partition(".")[0] == "simnav":
+    if file is None or _in_simnav(module):
         return ""
     path, installed = Path(file).resolve(), map(Path, sysconfig.get_paths().values())
-    return "" if any(path.is_relative_to(folder.resolve()) for folder in installed) else _closure_digest(path)
+    if any(path.is_relative_to(folder.resolve()) for folder in installed):
+        return ""
+    return _code_digest(followed(files=[path]))
 
 
-def _is_ours(module: str) -> bool:
-    return module == OUR_ESTIMATORS or module.startswith(f"{OUR_ESTIMATORS}.")
+def _in_simnav(module: str) -> bool:
+    return module == "simnav" or module.startswith("simnav.")
 
 
-def _imports(path: Path) -> Iterator[str]:
-    """Names of the modules that a file imports, anywhere in it."""
-    try:
-        tree = ast.parse(path.read_bytes())
-    except (OSError, SyntaxError, ValueError):
-        return
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield node.module or ""
-            if node.module and not node.level:  # "from simnav import estimators"
-                yield from (f"{node.module}.{alias.name}" for alias in node.names)
-            if node.level:  # "from . import x"
-                yield from (alias.name for alias in node.names)
+def named_files(values: Iterable[Any]) -> list[tuple[str, str]]:
+    """The files among the values of parameters, and what is in them.
+
+    Parameters
+    ----------
+    values : iterable
+        A text or a path that names an existing file counts, also inside a list, a tuple or a mapping.
+
+    Returns
+    -------
+    list of (str, str)
+        What named the file, and the digest of its content.
+    """
+    found = []
+    for value in values:
+        if isinstance(value, (str, os.PathLike)):
+            try:
+                path = Path(value).expanduser()
+                there = path.is_file()
+            except (OSError, ValueError, RuntimeError, TypeError):  # too long for a path, a zero byte, bytes
+                continue
+            if there:
+                found.append((str(value), files_digest([("", path)])))
+        elif isinstance(value, Mapping):
+            found += named_files(value.values())
+        elif isinstance(value, (list, tuple)):
+            found += named_files(value)
+    return found
 
 
 def variant(recording: str, label: str, name: str, parameters: Mapping[str, Any], source: str) -> str:
-    """Digest of all that decides the results of an estimator on a scenario, but the seed."""
-    return digest(recording, label, name, json.dumps(dict(parameters), sort_keys=True, default=str), source)
+    """Digest of all that decides the results of an estimator on a scenario, but the seed.
+
+    Parameters
+    ----------
+    recording : str
+        From `recording_digest`.
+    label, name : str
+        Of the estimator.
+    parameters : mapping
+        That were set. Where one names a file, its content counts.
+    source : str
+        From `estimator_source`.
+    """
+    values = json.dumps(dict(parameters), sort_keys=True, default=str)
+    files = [text for pair in named_files(parameters.values()) for text in pair]
+    return digest(recording, label, name, values, source, *files)

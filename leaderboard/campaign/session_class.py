@@ -46,8 +46,8 @@ def is_session(module: str) -> bool:
     return not os.path.samefile(here, origin)  # another module of the same name
 
 
-def carry(cls: type) -> bytes:
-    """A class as bytes; of its session everything that it uses goes with it.
+def carry(cls: Any) -> bytes:
+    """A class or a function as bytes; of its session everything that it uses goes with it.
 
     Raises
     ------

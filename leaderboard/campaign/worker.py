@@ -11,14 +11,15 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.isolation import Outcome, isolate
+from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.request import enlist
 from simnav.leaderboard.campaign.session_class import receive
-from simnav.leaderboard.results import store
+from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.result import Result
 
 if TYPE_CHECKING:
@@ -87,6 +88,14 @@ class Unit:
         Of an estimator [bytes].
     parent : int
         Process that runs the campaign.
+    scores : OwnScores
+        Scores of others that workers must be sent.
+    scoring : str
+        As in `Result`.
+    keep_trials : bool
+        Keep what the estimators gave (`simnav.leaderboard.results.trials`).
+    covariance_interval : float
+        Least time between two covariances that are kept [s].
     """
 
     scenario: Scenario
@@ -98,6 +107,10 @@ class Unit:
     timeout: float
     memory: int
     parent: int
+    scores: OwnScores = field(default_factory=OwnScores)
+    scoring: str = ""
+    keep_trials: bool = False
+    covariance_interval: float = 0.0
 
     @property
     def weight(self) -> float:
@@ -118,6 +131,9 @@ class Unit:
             key=key,
             recording=self.recording,
             simnav=self.simulator,
+            time_limit=self.timeout,
+            memory_limit=self.memory,
+            scoring="{}",  # nothing is scored yet
         )
 
 
@@ -144,6 +160,7 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     from simnav.source import record
 
     _prepare_worker(unit.parent)
+    unit.scores.register()
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
     try:
@@ -191,11 +208,14 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
         curves = series(trial, recording) if len(trial) else {}
     except Exception as error:
         return replace(blank, status="error", reason=f"it cannot be scored: {type(error).__name__}: {error}")
+    if unit.keep_trials and len(trial):
+        trials.write(unit.folder, key, trial, recording, covariance_interval=unit.covariance_interval)
     return replace(
         blank,
         status=trial.status,
         reason=trial.reason,
         scores=scores,
+        scoring=unit.scoring if scores else blank.scoring,
         series={name: np.asarray(values, dtype=np.float32) for name, values in curves.items()},
     )
 

@@ -23,6 +23,7 @@ from simnav.leaderboard.cli import (
     list_,
     new_estimator,
     reproduce,
+    rescore,
     run,
     simulate,
     train,
@@ -57,7 +58,7 @@ def root(
     ] = False,
     plugin: Annotated[
         list[Path] | None,
-        typer.Option(help="Python file that registers instruments or faults of others; may be given several times."),
+        typer.Option(help="Python file that registers instruments, faults or scores of others; repeatable."),
     ] = None,
 ) -> None:
     """The open benchmark for marine integrated navigation: simulate, estimate, score, rank."""
@@ -72,8 +73,20 @@ def root(
 
 
 for _module in (
-    list_, run, simulate, check, bench, new_estimator, evaluate, campaign, leaderboard, warmup, bound, reproduce,
-):  # fmt: skip
+    list_,
+    run,
+    simulate,
+    check,
+    bench,
+    new_estimator,
+    evaluate,
+    campaign,
+    leaderboard,
+    warmup,
+    bound,
+    reproduce,
+    rescore,
+):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)
 

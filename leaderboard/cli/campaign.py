@@ -36,6 +36,13 @@ def command(
     workers: Workers = 2,
     time_limit: TimeLimit = None,
     memory_limit: MemoryLimit = 2048,
+    retry: Annotated[bool, typer.Option("--retry", help="Run failures again that are in the folder.")] = False,
+    keep_trials: Annotated[
+        bool, typer.Option("--keep-trials", help="Keep what estimators give now, for 'simnav rescore'.")
+    ] = False,
+    covariance_interval: Annotated[
+        float, typer.Option(min=0.0, help="Least seconds between two covariances that are kept. 0 keeps all.")
+    ] = 0.0,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -52,7 +59,8 @@ def command(
         with out.progress("starting") as bar:
             report = interface.campaign(
                 chosen, estimator, runs=runs, seed=seed, output=output, quick=quick, parameters=parameters(set_),
-                workers=workers, time_limit=time_limit, memory_limit=memory_limit, progress=campaign_progress(bar),
+                workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
+                covariance_interval=covariance_interval, progress=campaign_progress(bar),
             )  # fmt: skip
         summary = report.summary
         out.document(report.to_dict())

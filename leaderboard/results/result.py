@@ -14,16 +14,20 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["BATCH", "FORMAT", "NO_TRIAL", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
+__all__ = ["BATCH", "FORMAT", "NO_TRIAL", "READABLE", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
 
-#: Version of the format of results.
-FORMAT = 1
+#: Version of the format of results, and those that can be read.
+FORMAT = 2
+READABLE = (1, FORMAT)
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
 
 #: Statuses that say nothing about the estimator.
 NO_TRIAL = ("unsuitable", "no-recording")
+
+#: Columns that format 1 does not have, and what stands there: not known.
+_SINCE_2 = {"time_limit": 0.0, "memory_limit": 0, "scoring": ""}
 
 Series = NDArray[np.float32]
 
@@ -61,6 +65,12 @@ class Result:
         Digest of scenario and simulator: runs that share it and the seed share the recording.
     simnav : str
         Version and digest of the simulator.
+    time_limit : float
+        That the estimator ran under [s]; 0 where it is not known.
+    memory_limit : int
+        That it ran under [bytes]; 0 where it is not known.
+    scoring : str
+        With which code it was scored: JSON, digests by module. Empty where it is not known.
     """
 
     scenario: str
@@ -78,6 +88,9 @@ class Result:
     key: str = ""
     recording: str = ""
     simnav: str = ""
+    time_limit: float = 0.0
+    memory_limit: int = 0
+    scoring: str = ""
 
     @property
     def variant(self) -> str:
@@ -112,6 +125,9 @@ def schema() -> pa.Schema:
             ("peak_memory", pa.int64()),
             ("recording", pa.string()),
             ("simnav", pa.string()),
+            ("time_limit", pa.float64()),
+            ("memory_limit", pa.int64()),
+            ("scoring", pa.string()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )
@@ -143,10 +159,18 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
     with open(path, "rb") as source:
         file = pq.ParquetFile(source, page_checksum_verification=True)
         found = file.schema_arrow
-        if (found.metadata or {}).get(b"simnav_results") != str(FORMAT).encode() or found.names != schema().names:
+        names = schema().names
+        known = {str(version).encode(): [n for n in names if version > 1 or n not in _SINCE_2] for version in READABLE}
+        if found.names != known.get((found.metadata or {}).get(b"simnav_results", b"")):
             raise ValueError("it was not written by this version of simnav")
-        for batch in file.iter_batches(batch_size=BATCH, columns=columns, use_threads=False):
-            yield pa.Table.from_batches([batch])
+        wanted = names if columns is None else columns
+        there = [n for n in wanted if n in found.names]
+        for batch in file.iter_batches(batch_size=BATCH, columns=there, use_threads=False):
+            table = pa.Table.from_batches([batch])
+            for name in (n for n in names if n in wanted and n not in there):
+                unknown = pa.array([_SINCE_2[name]] * len(table), schema().field(name).type)
+                table = table.append_column(schema().field(name), unknown)
+            yield table.replace_schema_metadata(schema().metadata)
 
 
 def write_tables(file: BinaryIO, tables: Iterator[pa.Table]) -> None:

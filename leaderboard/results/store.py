@@ -5,6 +5,7 @@ A results folder holds::
     simnav-results.json      format of the folder, and which results are current
     results/KEY.parquet      one result, fresh from a worker
     compacted/part-*.parquet many results
+    trials/KEY.parquet       what the estimator gave, where trials are kept (`simnav.leaderboard.results.trials`)
 
 A result's key names everything that decides it (`simnav.leaderboard.campaign.fingerprint`), so a campaign that was
 killed goes on where it was. Whatever moment it was killed at: a file is either whole or not there
@@ -24,24 +25,70 @@ import os
 import time
 import uuid
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeVar
 
-from simnav.leaderboard.results.result import BATCH, FORMAT, Result, batches, rows, schema, to_table, write_tables
+from simnav.leaderboard.results.result import (
+    BATCH,
+    FORMAT,
+    READABLE,
+    Result,
+    batches,
+    rows,
+    schema,
+    to_table,
+    write_tables,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["FORMAT", "Result", "StoreError", "StoreWarning", "compact", "create", "keys", "load", "select", "write"]
+__all__ = [
+    "FORMAT",
+    "Ending",
+    "Result",
+    "StoreError",
+    "StoreWarning",
+    "atomic",
+    "compact",
+    "create",
+    "drop",
+    "keys",
+    "load",
+    "rescore",
+    "select",
+    "write",
+]
 
 _MARKER = "simnav-results.json"
-_LOOSE, _COMPACTED = "results", "compacted"
+_LOOSE, _COMPACTED, _TRIALS = "results", "compacted", "trials"
 _MOST_PARTS = 16  # more are merged into one
 _STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
 
 
 T = TypeVar("T")
+
+
+class Ending(NamedTuple):
+    """How a stored run ended.
+
+    Attributes
+    ----------
+    status : str
+    time_limit : float
+        That it ran under [s]; 0 where it is not known.
+    memory_limit : int
+        [bytes]; 0 where it is not known.
+    scoring : str
+        With which code it was scored, as in `Result`.
+    """
+
+    status: str
+    time_limit: float
+    memory_limit: int
+    scoring: str
 
 
 class StoreError(RuntimeError):
@@ -90,7 +137,7 @@ def _check(path: Path) -> bool:
             return False
         raise StoreError(f"{path} holds other files and no results of simnav; name an empty or a new folder")
     content = _read_marker(path)
-    if content["format"] != FORMAT:
+    if content["format"] not in READABLE:
         raise StoreError(
             f"the results in {path} have format {content['format']} (simnav {content.get('simnav', 'unknown')}), this "
             f"version reads format {FORMAT}: name another folder, or use the version that wrote them"
@@ -127,7 +174,7 @@ def _write_marker(path: Path, current: Mapping[str, Any]) -> None:
     from importlib.metadata import version
 
     content = {"format": FORMAT, "simnav": version("simnav"), "current": current}
-    with _atomic(path / _MARKER) as file:
+    with atomic(path / _MARKER) as file:
         file.write(json.dumps(content, indent=1, sort_keys=True).encode())
 
 
@@ -156,7 +203,7 @@ def select(folder: str | os.PathLike[str], current: Mapping[str, tuple[str, Mapp
 
 
 @contextlib.contextmanager
-def _atomic(path: Path) -> Iterator[BinaryIO]:
+def atomic(path: Path) -> Iterator[BinaryIO]:
     """Write a file whole or not at all."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -239,7 +286,8 @@ def _steadily(scan: Callable[[], T]) -> T:
 
 def _sweep(path: Path) -> None:
     """Delete temporary files that a killed process left."""
-    for temporary in [*path.glob(".*.tmp"), *(path / _LOOSE).glob(".*.tmp"), *(path / _COMPACTED).glob(".*.tmp")]:
+    folders = (path, *(path / name for name in (_LOOSE, _COMPACTED, _TRIALS)))
+    for temporary in [file for folder in folders for file in folder.glob(".*.tmp")]:
         with contextlib.suppress(OSError):
             if time.time() - temporary.stat().st_mtime > _STALE:
                 temporary.unlink()
@@ -276,24 +324,94 @@ def write(folder: str | os.PathLike[str], result: Result) -> None:
         If it cannot be written, e.g. because the disk is full; nothing is left behind.
     """
     table = to_table(result)
-    with _atomic(Path(folder) / _LOOSE / f"{result.key}.parquet") as file:
+    with atomic(Path(folder) / _LOOSE / f"{result.key}.parquet") as file:
         write_tables(file, iter([table]))
 
 
-def keys(folder: str | os.PathLike[str]) -> dict[str, str]:
-    """Key -> status of every result that is there and whole; damaged files are set aside."""
+def keys(folder: str | os.PathLike[str]) -> dict[str, Ending]:
+    """How each result that is there and whole ended, by key; damaged files are set aside."""
     path = _opened(folder)
     _sweep(path)
 
-    def scan() -> dict[str, str]:
-        found: dict[str, str] = {}
+    def scan() -> dict[str, Ending]:
+        found: dict[str, Ending] = {}
         for tables in _scan(path):  # all columns: to know that the file is whole
             for table in tables:
-                columns = (table.column(name).to_pylist() for name in ("key", "status"))
-                found = dict(zip(*columns, strict=True)) | found
+                key, *columns = (table.column(name).to_pylist() for name in ("key", *Ending._fields))
+                found = dict(zip(key, map(Ending._make, zip(*columns, strict=True)), strict=True)) | found
         return found
 
     return _steadily(scan)
+
+
+def drop(folder: str | os.PathLike[str], keys: Collection[str]) -> None:
+    """Take results out of a folder, because they are to be computed again.
+
+    Each file is replaced as a whole or deleted, so that other results are safe whatever happens.
+
+    Parameters
+    ----------
+    folder : path
+    keys : collection of str
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written or deleted.
+    """
+
+    def without(table: pa.Table) -> pa.Table:
+        import pyarrow as pa
+
+        return table.filter(pa.array([key not in keys for key in table.column("key").to_pylist()]))
+
+    path = _opened(folder)
+    for key in keys:
+        (path / _LOOSE / f"{key}.parquet").unlink(missing_ok=True)
+    _rewrite(path, keys, without)
+
+
+def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, float]], scoring: str) -> None:
+    """Give results other scores.
+
+    Each file is replaced as a whole, so that a result has its old scores or its new ones, whatever happens.
+
+    Parameters
+    ----------
+    folder : path
+    scores : mapping of str to mapping
+        By key: all scores of the result.
+    scoring : str
+        With which code they were computed.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written; then the results in it have their old scores.
+    """
+
+    def changed(table: pa.Table) -> pa.Table:
+        import pyarrow as pa
+
+        if not len(table):
+            return table
+        results = [
+            replace(r, scores=dict(scores[r.key]), scoring=scoring) if r.key in scores else r for r in rows(table)
+        ]
+        return pa.concat_tables([to_table(r) for r in results]).combine_chunks()
+
+    _rewrite(_opened(folder), scores, changed)
+
+
+def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.Table]) -> None:
+    """Write the files that hold some of the keys again, each whole or not at all."""
+    for file in _files(path):
+        with contextlib.suppress(_DamagedError, FileNotFoundError):
+            if not any(key in keys for table in _read(file, ["key"]) for key in table.column("key").to_pylist()):
+                continue
+            tables = [change(table) for table in _read(file)]
+            with atomic(file) as target:
+                write_tables(target, iter(tables))
 
 
 def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]:
@@ -374,7 +492,7 @@ def compact(folder: str | os.PathLike[str]) -> None:
             yield pa.concat_tables(pending).combine_chunks()
 
     part = path / _COMPACTED / f"part-{uuid.uuid4().hex[:16]}.parquet"
-    with _atomic(part) as file:
+    with atomic(part) as file:
         write_tables(file, tables())
     try:
         for old in done:

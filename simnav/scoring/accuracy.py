@@ -7,14 +7,16 @@ at 95 % in harbour approaches).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from simnav.earth import relative_position
 from simnav.recording import Recording
-from simnav.scoring.navigation_error import horizontal
+from simnav.scoring.registry import ScoringInput, register_score
 from simnav.types import Array
 
-__all__ = ["accuracy", "distance_travelled", "rms"]
+__all__ = ["distance_travelled", "rms"]
 
 
 def rms(x: Array) -> float:
@@ -53,43 +55,83 @@ def distance_travelled(recording: Recording, epochs: int | None = None) -> float
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
-def accuracy(error: Array, recording: Recording) -> dict[str, float]:
-    """Accuracy scores of a run.
+# --- horizontal position ------------------------------------------------------------------------------
 
-    Parameters
-    ----------
-    error : (T, 9) array
-        From `simnav.scoring.errors`; T may be less than the recording's epochs.
-    recording : Recording
 
-    Returns
-    -------
-    dict
-        Keys and units as in `simnav.scoring.SCORES`; NaN for what was not estimated.
-    """
-    h = horizontal(error)
-    final = float(h[-1]) if len(h) else float("nan")
-    distance = distance_travelled(recording, len(error))
-    scores = {
-        "horizontal_rmse": rms(h),
-        "horizontal_mae": _mean_absolute(h),
-        "horizontal_max": _largest(h),
-        "cep50": _quantile(h, 0.50),
-        "r95": _quantile(h, 0.95),
-    }
-    for name, column in (("north", 0), ("east", 1), ("vertical", 2)):
-        scores[f"{name}_rmse"] = rms(error[:, column])
-        scores[f"{name}_mae"] = _mean_absolute(error[:, column])
-        scores[f"{name}_max"] = _largest(error[:, column])
-    speed = np.hypot(error[:, 3], error[:, 4])
-    scores["velocity_horizontal_rmse"], scores["velocity_horizontal_mae"] = rms(speed), _mean_absolute(speed)
-    for name, column in (("velocity_north", 3), ("velocity_east", 4), ("velocity_vertical", 5)):
-        scores[f"{name}_rmse"] = rms(error[:, column])
-    scores["level_rmse"] = rms(np.hypot(error[:, 6], error[:, 7]))
-    scores["tilt_north_rmse"], scores["tilt_east_rmse"] = rms(error[:, 6]), rms(error[:, 7])
-    scores["heading_rmse"], scores["heading_mae"] = rms(error[:, 8]), _mean_absolute(error[:, 8])
-    scores["final_error"] = final
-    scores["drift"] = 100.0 * final / distance if distance > 0.0 else float("nan")
-    known = np.isfinite(recording.data.truth.position[:, :2]).all(axis=1)
-    scores["availability"] = float(np.isfinite(h).sum() / known.sum()) if known.any() else float("nan")
-    return scores
+@register_score("horizontal_rmse", title="Horizontal RMSE", unit="m", better="lower")
+def _horizontal_rmse(given: ScoringInput) -> float:
+    return rms(given.horizontal)
+
+
+@register_score("horizontal_mae", title="Mean horizontal error", unit="m", better="lower")
+def _horizontal_mae(given: ScoringInput) -> float:
+    return _mean_absolute(given.horizontal)
+
+
+@register_score("horizontal_max", title="Largest horizontal error", unit="m", better="lower")
+def _horizontal_max(given: ScoringInput) -> float:
+    return _largest(given.horizontal)
+
+
+@register_score("cep50", title="CEP50: median horizontal error", unit="m", better="lower")
+def _cep50(given: ScoringInput) -> float:
+    return _quantile(given.horizontal, 0.50)
+
+
+@register_score("r95", title="R95: 95th percentile of the horizontal error", unit="m", better="lower")
+def _r95(given: ScoringInput) -> float:
+    return _quantile(given.horizontal, 0.95)
+
+
+# --- component by component ---------------------------------------------------------------------------
+
+
+def _register_component(
+    name: str, title: str, unit: str, columns: tuple[int, ...], measure: Callable[[Array], float]
+) -> None:
+    """A measure of one component of the error, or of the length of two."""
+
+    @register_score(name, title=title, unit=unit, better="lower")
+    def component(given: ScoringInput) -> float:
+        error = given.error
+        if len(columns) == 2:
+            return measure(np.hypot(error[:, columns[0]], error[:, columns[1]]))
+        return measure(error[:, columns[0]])
+
+
+for _axis, _column in (("north", 0), ("east", 1), ("vertical", 2)):
+    _name = _axis.capitalize()
+    _register_component(f"{_axis}_rmse", f"{_name} RMSE", "m", (_column,), rms)
+    _register_component(f"{_axis}_mae", f"{_name} mean absolute error", "m", (_column,), _mean_absolute)
+    _register_component(f"{_axis}_max", f"{_name} largest error", "m", (_column,), _largest)
+_register_component("velocity_horizontal_rmse", "Horizontal velocity RMSE", "m/s", (3, 4), rms)
+_register_component("velocity_horizontal_mae", "Mean horizontal velocity error", "m/s", (3, 4), _mean_absolute)
+for _axis, _column in (("north", 3), ("east", 4), ("vertical", 5)):
+    _register_component(f"velocity_{_axis}_rmse", f"{_axis.capitalize()} velocity RMSE", "m/s", (_column,), rms)
+_register_component("level_rmse", "Level (roll and pitch) RMSE", "rad", (6, 7), rms)
+_register_component("tilt_north_rmse", "Tilt about north RMSE", "rad", (6,), rms)
+_register_component("tilt_east_rmse", "Tilt about east RMSE", "rad", (7,), rms)
+_register_component("heading_rmse", "Heading RMSE", "rad", (8,), rms)
+_register_component("heading_mae", "Mean heading error", "rad", (8,), _mean_absolute)
+
+
+# --- the end of the run, and how much of it has a position --------------------------------------------
+
+
+@register_score("final_error", title="Horizontal error at the last epoch", unit="m", better="lower")
+def _final_error(given: ScoringInput) -> float:
+    return float(given.horizontal[-1]) if len(given.horizontal) else float("nan")
+
+
+@register_score(
+    "drift", title="Horizontal error at the last epoch, of the distance travelled", unit="%", better="lower"
+)
+def _drift(given: ScoringInput) -> float:
+    distance = distance_travelled(given.recording, len(given.error))
+    return 100.0 * _final_error(given) / distance if distance > 0.0 else float("nan")
+
+
+@register_score("availability", title="Share of all epochs with a horizontal position", unit="-", better="higher")
+def _availability(given: ScoringInput) -> float:
+    known = np.isfinite(given.recording.data.truth.position[:, :2]).all(axis=1)
+    return float(np.isfinite(given.horizontal).sum() / known.sum()) if known.any() else float("nan")

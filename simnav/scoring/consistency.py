@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.trial import Trial
+from simnav.scoring.registry import ScoringInput, register_score
 from simnav.types import Array
 
 __all__ = [
@@ -27,7 +27,6 @@ __all__ = [
     "MARGIN",
     "Badge",
     "badge",
-    "consistency",
     "coverage",
     "nees",
     "nees_band",
@@ -134,34 +133,46 @@ def coverage(nees_horizontal: Array, level: float) -> float:
     return float(np.mean(x <= -2.0 * math.log1p(-level))) if len(x) else float("nan")
 
 
-def consistency(trial: Trial, error: Array) -> dict[str, float]:
-    """Consistency scores of a run; NaN without a covariance.
+def _nees_of(given: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
+    """`nees` of each group; empty without a covariance."""
+    covariance = given.trial.covariance
+    if covariance is None:
+        return {}
+    return {group: nees(given.error, covariance, components) for group, components in GROUPS.items()}
 
-    Parameters
-    ----------
-    trial : Trial
-    error : (T, 9) array
-        From `simnav.scoring.errors`.
 
-    Returns
-    -------
-    dict
-        ``nees_<group>``: mean over the epochs, divided by the degrees of freedom (1 is ideal, at
-        most `LARGEST`); ``coverage_50``, ``coverage_95``.
-    """
-    nothing = float("nan")
-    scores = {f"nees_{group}": nothing for group in GROUPS} | {"coverage_50": nothing, "coverage_95": nothing}
-    if trial.covariance is None:
-        return scores
-    for group, components in GROUPS.items():
-        values, degrees = nees(error, trial.covariance, components)
+def _register_nees(group: str, title: str) -> None:
+    """The mean over the epochs, divided by the degrees of freedom: 1 is ideal, at most `LARGEST`."""
+
+    @register_score(
+        f"nees_{group}", title=f"Mean NEES by degree of freedom, {title}", unit="-", better="one", uses_covariance=True
+    )
+    def mean(given: ScoringInput) -> float:
+        found = given.shared(_nees_of).get(group)
+        if found is None or not (found[1] > 0).any():
+            return float("nan")
+        values, degrees = found
         known = degrees > 0
-        if known.any():
-            scores[f"nees_{group}"] = min(float(values[known].sum() / degrees[known].sum()), LARGEST)
-        if group == "horizontal":
-            flat = np.where(degrees == 2, values, np.nan)
-            scores["coverage_50"], scores["coverage_95"] = coverage(flat, 0.5), coverage(flat, 0.95)
-    return scores
+        return min(float(values[known].sum() / degrees[known].sum()), LARGEST)
+
+
+def _register_coverage(percent: int) -> None:
+    @register_score(
+        f"coverage_{percent}", title=f"Coverage of the {percent} % horizontal ellipse", unit="-", better="nominal",
+        uses_covariance=True,
+    )  # fmt: skip
+    def share(given: ScoringInput) -> float:
+        found = given.shared(_nees_of).get("horizontal")
+        if found is None:
+            return float("nan")
+        values, degrees = found
+        return coverage(np.where(degrees == 2, values, np.nan), percent / 100.0)
+
+
+for _group in GROUPS:
+    _register_nees(_group, "horizontal position" if _group == "horizontal" else _group)
+for _percent in (50, 95):
+    _register_coverage(_percent)
 
 
 def badge(nees_by_run: Array, degrees: int = 2) -> Badge:
@@ -170,7 +181,7 @@ def badge(nees_by_run: Array, degrees: int = 2) -> Badge:
     Parameters
     ----------
     nees_by_run : (M,) array
-        Mean NEES of each run divided by its degrees of freedom, as `consistency` gives it; NaN is left out.
+        Mean NEES of each run divided by its degrees of freedom (the scores ``nees_<group>``); NaN is left out.
     degrees : int
         Of the group: 2 for the horizontal position.
 

@@ -1,28 +1,36 @@
-"""Cost: wall time of an update."""
+"""Cost: wall time of an update.
+
+The first update is left out where there are others: it may load compiled code.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from simnav.trial import Trial
+from simnav.scoring.registry import ScoringInput, register_score
+from simnav.types import Array
 
-__all__ = ["cost"]
+__all__: list[str] = []
 
 
-def cost(trial: Trial) -> dict[str, float]:
-    """Time per epoch of a run.
+def _seconds(given: ScoringInput) -> Array:
+    seconds = given.trial.update_seconds
+    return seconds[1:] if len(seconds) > 1 else seconds
 
-    Returns
-    -------
-    dict
-        ``update_median``, ``update_mean``, ``update_p95`` [s]. The first update is left out where there are others: it
-        may load compiled code.
-    """
-    seconds = trial.update_seconds[1:] if len(trial) > 1 else trial.update_seconds
-    if len(seconds) == 0:
-        return dict.fromkeys(("update_median", "update_mean", "update_p95"), float("nan"))
-    return {
-        "update_median": float(np.median(seconds)),
-        "update_mean": float(np.mean(seconds)),
-        "update_p95": float(np.quantile(seconds, 0.95)),
-    }
+
+@register_score("update_median", title="Time per epoch, median", unit="s", better="lower")
+def _median(given: ScoringInput) -> float:
+    seconds = _seconds(given)
+    return float(np.median(seconds)) if len(seconds) else float("nan")
+
+
+@register_score("update_mean", title="Time per epoch, mean", unit="s", better="lower")
+def _mean(given: ScoringInput) -> float:
+    seconds = _seconds(given)
+    return float(np.mean(seconds)) if len(seconds) else float("nan")
+
+
+@register_score("update_p95", title="Time per epoch, 95th percentile", unit="s", better="lower")
+def _p95(given: ScoringInput) -> float:
+    seconds = _seconds(given)
+    return float(np.quantile(seconds, 0.95)) if len(seconds) else float("nan")

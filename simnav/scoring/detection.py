@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.recording import Recording
+from simnav.scoring.registry import ScoringInput, register_score
 from simnav.trial import Trial
 
 __all__ = ["DETECTABLE", "detection"]
@@ -57,3 +58,17 @@ def detection(trial: Trial, recording: Recording) -> dict[str, float]:
     if clean:
         scores["false_alarm_rate"] = alarms / clean
     return scores
+
+
+def _rates(given: ScoringInput) -> dict[str, float]:
+    return detection(given.trial, given.recording)
+
+
+@register_score("detection_rate", title="Faulty measurements flagged", unit="-", better="higher")
+def _detection_rate(given: ScoringInput) -> float:
+    return given.shared(_rates)["detection_rate"]
+
+
+@register_score("false_alarm_rate", title="Sound measurements flagged", unit="-", better="lower")
+def _false_alarm_rate(given: ScoringInput) -> float:
+    return given.shared(_rates)["false_alarm_rate"]

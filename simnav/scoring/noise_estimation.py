@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.recording import AidStream, Recording
+from simnav.scoring.registry import ScoringInput, register_score
 from simnav.trial import Trial
 from simnav.types import KINDS, Array
 
@@ -71,3 +72,17 @@ def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Arr
     inside = epoch < len(trial)
     true = stream.sigma[inside, names.index(axis)]
     return stream.time[inside], np.asarray(estimate[epoch[inside]] - true)
+
+
+def _rmse(given: ScoringInput) -> dict[str, float]:
+    return noise_estimation(given.trial, given.recording)
+
+
+@register_score("sigma_north_rmse", title="Estimated sigma north, RMSE", unit="m", better="lower")
+def _sigma_north_rmse(given: ScoringInput) -> float:
+    return given.shared(_rmse)["sigma_north_rmse"]
+
+
+@register_score("sigma_east_rmse", title="Estimated sigma east, RMSE", unit="m", better="lower")
+def _sigma_east_rmse(given: ScoringInput) -> float:
+    return given.shared(_rmse)["sigma_east_rmse"]

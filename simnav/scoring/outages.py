@@ -8,6 +8,7 @@ import numpy as np
 
 from simnav.recording import FaultLabel, Recording
 from simnav.scoring.navigation_error import horizontal
+from simnav.scoring.registry import Better, ScoringInput, register_score
 from simnav.sensors.faults import effect_of
 from simnav.types import Array
 
@@ -127,3 +128,19 @@ def outage_scores(error: Array, recording: Recording, *, threshold: float = RECO
         scores["recovery_time"] = float(np.mean([o.recovery_time for o in ended]))
         scores["recovered"] = float(np.mean([o.recovered for o in ended]))
     return scores
+
+
+def _of_run(given: ScoringInput) -> dict[str, float]:
+    return outage_scores(given.error, given.recording)
+
+
+def _register(name: str, title: str, unit: str, better: Better) -> None:
+    @register_score(name, title=title, unit=unit, better=better)
+    def mean(given: ScoringInput) -> float:
+        return given.shared(_of_run)[name]
+
+
+_register("outage_end_error", "Horizontal error at the end of an outage, mean", "m", "lower")
+_register("outage_end_error_max", "Horizontal error at the end of an outage, largest", "m", "lower")
+_register("recovery_time", "Time from the end of an outage to less than 10 m, mean", "s", "lower")
+_register("recovered", "Share of outages recovered from", "-", "higher")

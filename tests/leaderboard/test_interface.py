@@ -150,8 +150,8 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
     "warmup": (["warmup"], lambda: {"kernels": len(__import__("simnav.compiled").compiled.kernels())}),
 }  # fmt: skip
 
-#: Commands whose calls are compared where their own tests are: they take minutes.
-ELSEWHERE = {"reproduce"}
+#: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
+ELSEWHERE = {"reproduce", "rescore"}
 
 
 @pytest.mark.parametrize("name", CALLS)

@@ -315,7 +315,7 @@ class FaultSpec(Spec):
         return f"{self.stream_name}#{index if occurrence is None else occurrence}"
 
 
-FAULTS: Registry[FaultSpec] = Registry("fault", "simnav.faults", "simnav.sensors")
+FAULTS: Registry[type[FaultSpec]] = Registry("fault", "simnav.faults", "simnav.sensors")
 
 F = TypeVar("F", bound=FaultSpec)
 

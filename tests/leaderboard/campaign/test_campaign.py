@@ -314,6 +314,62 @@ def test_an_edit_is_noticed(tmp_path: Path) -> None:
     assert computed(calm, edited, other) == 0  # all of it is still there
 
 
+SLOW = """if measurements.time == 1.0:
+            import pathlib, time
+            time.sleep(float(pathlib.Path({path!r}).read_text()))"""
+
+
+def test_a_stored_timeout_is_run_again_under_a_longer_limit(tmp_path: Path) -> None:
+    sleep, out = tmp_path / "seconds.txt", tmp_path / "out"
+    sleep.write_text("1.5")
+    request, other = estimator(tmp_path, mischief=SLOW.format(path=str(sleep))), estimator(tmp_path, "other")
+
+    def run(timeout: float, *, retry: bool = False) -> tuple[int, str, float]:
+        summary = run_campaign([scenario()], [request, other], [0], out, workers=1, timeout=timeout, retry=retry)
+        found = {r.estimator: r for r in store.load(out)}
+        assert found["other"].status == "ok"
+        return summary.computed, found["last-fix"].status, found["last-fix"].time_limit
+
+    assert run(0.8) == (2, "timeout", 0.8)
+    assert run(0.8) == (0, "timeout", 0.8)
+    assert run(0.5) == (0, "timeout", 0.8)  # a shorter limit would give no more
+    assert run(1.0) == (1, "timeout", 1.0)
+    assert run(1.0, retry=True) == (1, "timeout", 1.0)
+    assert run(30.0) == (1, "ok", 30.0)
+    assert run(60.0, retry=True) == (0, "ok", 30.0)
+
+
+def test_failures_are_run_again_when_asked(tmp_path: Path) -> None:
+    raises = "if __import__('pathlib').Path({!r}).exists(): raise RuntimeError('lost')"
+    flag, out = tmp_path / "flag", tmp_path / "out"
+    flag.touch()
+    request = estimator(tmp_path, mischief=raises.format(str(flag)))
+
+    def run(*, retry: bool) -> tuple[int, str]:
+        summary = run_campaign([scenario()], [request], [0], out, workers=1, retry=retry)
+        (found,) = store.load(out)
+        return summary.computed, found.status
+
+    assert run(retry=False) == (1, "error")
+    flag.unlink()
+    assert run(retry=False) == (0, "error")
+    assert run(retry=True) == (1, "ok")
+    assert run(retry=True) == (0, "ok")
+
+
+def test_out_of_memory_is_run_again_under_a_larger_limit(tmp_path: Path) -> None:
+    request, out = estimator(tmp_path, mischief="self.eaten = bytearray(100 << 20)"), tmp_path / "out"
+
+    def run(mebibytes: int) -> tuple[int, str, int]:
+        summary = run_campaign([scenario()], [request], [0], out, workers=1, memory=mebibytes << 20)
+        (found,) = store.load(out)
+        return summary.computed, found.status, found.memory_limit >> 20
+
+    assert run(64) == (1, "out-of-memory", 64)
+    assert run(64) == (0, "out-of-memory", 64)
+    assert run(512) == (1, "ok", 512)
+
+
 def test_damaged_results_are_computed_again(tmp_path: Path) -> None:
     request, out = estimator(tmp_path), tmp_path / "out"
     run_campaign([scenario()], [request], [0], out, workers=1)

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from simnav import estimator
 from simnav.estimator import find
-from simnav.leaderboard.campaign import fingerprint
+from simnav.leaderboard.campaign import sources
 from simnav.leaderboard.campaign.fingerprint import (
+    RUNNER,
+    SIMULATOR,
     digest,
     estimator_source,
+    named_files,
     recording_digest,
     simulator_version,
     variant,
 )
+from simnav.leaderboard.campaign.sources import followed
 from simnav.scenario import Scenario, load
 
 FILE = """
@@ -37,7 +44,7 @@ def write(path: Path, name: str = "Mine", base: str = "Estimator", imports: str 
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A place for estimator files; what they import from it is forgotten afterwards."""
     monkeypatch.setattr(sys, "path", [*sys.path])
     estimator.names()  # the installed ones are known before
@@ -87,8 +94,8 @@ def test_a_base_class_in_another_file(folder: Path) -> None:
     base = write(folder / "fp_base.py", "Base")
     mine = write(folder / "fp_derived.py", base="fp_base.Base", imports="import fp_base")
     other = write(folder / "fp_alone.py", "Alone")
-    assert changed_by(mine, lambda: base.write_text(base.read_text() + "\n# edited\n")) == [True]
-    assert changed_by(other, lambda: base.write_text(base.read_text() + "\n# again\n")) == [False]
+    assert changed_by(mine, lambda: base.write_text(base.read_text() + "\nEDITED = 1\n")) == [True]
+    assert changed_by(other, lambda: base.write_text(base.read_text() + "\nAGAIN = 1\n")) == [False]
 
 
 def test_an_installed_package_counts_as_a_whole(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,23 +117,137 @@ def test_an_installed_package_counts_as_a_whole(folder: Path, monkeypatch: pytes
     assert estimator_source(cls) != seen
 
 
-def test_our_own_estimators_share_their_sources() -> None:
-    import simnav.estimators
+@pytest.fixture
+def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the library and of our estimators, whose files a test may edit."""
+    copy = tmp_path / "copy" / "simnav"
+    ignored = shutil.ignore_patterns("leaderboard", "scenarios", "__pycache__")
+    shutil.copytree(sources.LIBRARY, copy, ignore=ignored)
+    monkeypatch.setattr(sources, "LIBRARY", copy)
+    return copy
 
-    assert estimator_source(find("pure-inertial")) == estimator_source(find("ekf"))
-    assert Path(simnav.estimators.__file__).parent.name == "estimators"
+
+def edit(path: Path, old: str, new: str) -> None:
+    """Replace a text that is in a file."""
+    text = path.read_text()
+    assert old in text, path
+    path.write_text(text.replace(old, new, 1))
 
 
-def test_building_on_our_estimators_makes_them_count(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mine = write(folder / "fp_ours.py", imports="from simnav.estimators.rows.kalman import Ekf")
+def constant(path: Path) -> None:
+    """Add a constant."""
+    path.write_text(f"{path.read_text()}\nA = 1\n")
+
+
+def comment(path: Path) -> None:
+    """Add a comment, a docstring and an empty line: nothing that decides a number."""
+    path.write_text(f'"""Another docstring."""\n\n# a comment\n{path.read_text()}\n"""And a last word."""\n')
+
+
+def test_a_docstring_and_the_chart_keep_the_recordings_and_a_constant_changes_them(library: Path) -> None:
+    versions = [simulator_version()]
+
+    def after(action: Callable[..., None], *args: object) -> bool:
+        action(*args)
+        versions.append(simulator_version())
+        return versions[-1] != versions[-2]
+
+    assert not after(comment, library / "strapdown.py")
+    assert not after(edit, library / "simulator.py", '"""What happens from now to a time.', '"""Something else.')
+    assert not after(constant, library / "environment" / "rendering.py")
+    assert not after(edit, library / "scoring" / "outages.py", "RECOVERY_THRESHOLD = 10.0", "RECOVERY_THRESHOLD = 11.0")
+    assert not after(edit, library / "trial.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3")
+    assert after(edit, library / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0")
+    assert after(constant, library / "earth.py")  # imported indirectly
+    assert after(constant, library / "log" / "nmea.py")
+    assert after(constant, library / "sensors" / "faults" / "additive.py")
+
+
+@pytest.mark.parametrize("scenario", ["open-sea", "harbour-multipath"])
+def test_what_a_recording_loads_is_in_its_digest(scenario: str) -> None:
+    """The imports that are followed in the text are those that really happen."""
+    code = f"""
+import json, sys
+from simnav.scenario import load
+from simnav.source import record
+record(load({scenario!r}), 0)
+print(json.dumps([name for name in sys.modules if name.partition(".")[0] == "simnav"]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name for name in json.loads(done.stdout) if not (sources._place(name) or Path()).match("__init__.py")}
+    assert len(loaded) > 20
+    assert loaded <= set(followed(SIMULATOR))
+
+
+def test_an_estimator_of_ours_is_known_by_what_it_imports(library: Path) -> None:
+    """By its row, its solver and the files of data that they name; not by other rows, nor by words."""
+    names = ("federated", "ekf", "anfis-ekf")
+
+    def changed(action: Callable[..., None], *args: object) -> list[str]:
+        before = [estimator_source(find(name)) for name in names]
+        action(*args)
+        return [name for name, old in zip(names, before, strict=True) if estimator_source(find(name)) != old]
+
+    ours = library / "estimators"
+    place = {name: library.parent / f"{find(name).__module__.replace('.', '/')}.py" for name in names}
+    data = sorted(ours.rglob("anfis_innovation.json"))
+    assert changed(comment, place["ekf"]) == []
+    assert changed(constant, place["federated"]) == ["federated"]
+    assert changed(edit, library / "trial.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3") == list(names)
+    assert changed(edit, library / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0") == []
+    assert changed(constant, library / "scoring" / "accuracy.py") == []
+    assert changed(edit, data[0], "{", "{ ") == ["anfis-ekf"]
+    assert changed((data[0].parent / "other.json").write_text, "{}") == []
+
+
+def test_building_on_our_estimators_makes_them_count(folder: Path, library: Path) -> None:
+    mine = write(folder / "fp_ours.py", imports="from simnav.estimators.rows.federated import Federated")
     alone = write(folder / "fp_not_ours.py", "Alone")
-    before = [estimator_source(find(str(p))) for p in (mine, alone)]
-    original = fingerprint._installed_digest
-    monkeypatch.setattr(
-        fingerprint, "_installed_digest", lambda p: original(p) + ("*" if p == "simnav.estimators" else "")
-    )
-    after = [estimator_source(find(str(p))) for p in (mine, alone)]
-    assert [a != b for a, b in zip(before, after, strict=True)] == [True, False]
+    row = library.parent / f"{find('federated').__module__.replace('.', '/')}.py"
+    other = library.parent / f"{find('ekf').__module__.replace('.', '/')}.py"
+    assert changed_by(mine, lambda: constant(other)) == [False]
+    assert changed_by(mine, lambda: constant(row)) == [True]
+    assert changed_by(alone, lambda: constant(row)) == [False]
+
+
+def test_names_that_are_reached_through_a_module_count(folder: Path, library: Path) -> None:
+    used = "import simnav\nTURN = simnav.world.sea.Sea\n"
+    mine = write(folder / "fp_attribute.py", imports=used)
+    assert "simnav.world.sea" in followed(files=[mine])
+    assert "simnav.world.sea" not in followed(files=[write(folder / "fp_plain.py", "Plain", imports="import simnav")])
+    assert "simnav.estimator.contract" in followed(files=[mine])  # "from simnav import Estimator" is loaded late
+    assert not any(name.startswith("simnav.leaderboard") for name in followed(RUNNER))
+
+
+def test_words_keep_the_key_of_a_file_of_the_users_own(folder: Path) -> None:
+    mine = write(folder / "fp_words.py", imports="GAIN = 1.0")
+    assert changed_by(
+        mine,
+        lambda: comment(mine),
+        lambda: edit(mine, "GAIN = 1.0", "GAIN = 2.0"),
+    ) == [False, True]
+
+
+def test_the_content_of_files_that_parameters_name_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def made(value: object) -> str:
+        return variant("r", "l", "n", {"weights": value}, "s")
+
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "weights.json"
+    absent = made("weights.json")
+    path.write_text("1")
+    first = [made(value) for value in ("weights.json", path, [path], ("a", str(path)))]
+    assert made("weights.json") == first[0] != absent
+    path.write_text("2")
+    assert all(made(v) != old for v, old in zip(("weights.json", path, [path], ("a", str(path))), first, strict=True))
+    assert named_files(["fast", 3.0, None, str(tmp_path), "x" * 5000, "a\0b", b"weights.json"]) == []
+
+
+def test_a_file_that_a_default_names_counts(folder: Path) -> None:
+    (folder / "table.csv").write_text("1")
+    mine = write(folder / "fp_default.py")
+    edit(mine, "    def reset", f"    def __init__(self, table={str(folder / 'table.csv')!r}): ...\n    def reset")
+    assert changed_by(mine, lambda: (folder / "table.csv").write_text("2")) == [True]
 
 
 def test_recordings_depend_on_scenario_simulator_and_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,6 +255,7 @@ def test_recordings_depend_on_scenario_simulator_and_log(tmp_path: Path, monkeyp
     version = simulator_version()
     assert recording_digest(sea, version) == recording_digest(load("open-sea"), version)
     assert recording_digest(sea, version) != recording_digest(sea, version + "x")
+    assert recording_digest(sea, "0.1.0+abc") == recording_digest(sea, "0.2.0+abc")  # a number alone changes nothing
     longer = sea.model_copy(update={"duration": sea.duration + sea.step})
     assert recording_digest(sea, version) != recording_digest(longer, version)
     assert recording_digest(sea, version) == recording_digest(sea.model_copy(update={"title": "x"}), version)

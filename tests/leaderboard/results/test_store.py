@@ -38,6 +38,9 @@ def result(seed: int, label: str = "ekf", scenario: str = "bay-v1", recording: s
         key=f"{label}{recording}-{seed}",
         recording=recording,
         simnav="0.1.0",
+        time_limit=60.0,
+        memory_limit=1 << 30,
+        scoring="{}",
     )
     return dataclasses.replace(made, **changes)
 
@@ -81,7 +84,7 @@ def test_what_is_written_is_read(folder: Path) -> None:
         assert len(loaded) == len(written)
         for a, b in zip(written, loaded, strict=True):
             same(a, b)
-        assert store.keys(folder) == {r.key: "ok" for r in written}
+        assert store.keys(folder) == {r.key: ("ok", 60.0, 1 << 30, "{}") for r in written}
         store.compact(folder)
         assert not loose(folder)
     assert all(not r.series and r.scores for r in store.load(folder, series=False))
@@ -276,7 +279,7 @@ def test_a_folder_of_another_format_is_left_alone(folder: Path) -> None:
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 99, "simnav": "9.0"}))
     before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()}
     for action in (store.create, store.load, store.compact, store.keys, lambda f: store.select(f, {})):
-        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 1"):
+        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 2"):
             action(folder)
     assert {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()} == before
 
@@ -298,7 +301,7 @@ def test_a_damaged_marker_costs_no_result(folder: Path) -> None:
     (folder / "simnav-results.json").write_text('{"form')
     with pytest.warns(StoreWarning, match=r"simnav-results.json"):
         store.create(folder)
-    assert store.keys(folder) == {"ekfr1-0": "ok"}
+    assert list(store.keys(folder)) == ["ekfr1-0"]
     store.select(folder, {"bay-v1": ("r1", {"ekf": "ekfr1"})})
     assert len(store.load(folder)) == 1
 
@@ -331,3 +334,46 @@ def test_other_recordings_are_not_compared(folder: Path) -> None:
         warnings.simplefilter("error")
         store.select(folder, {"bay-v1": ("r1", {"ekf": "ekfr1", "dr": "drr1"})})
         assert {r.recording for r in store.load(folder)} == {"r1"}
+
+
+def test_results_are_dropped_wherever_they_are(folder: Path) -> None:
+    for seed in range(6):
+        store.write(folder, result(seed))
+        if seed == 3:
+            store.compact(folder)
+    store.drop(folder, {"ekfr1-1", "ekfr1-5", "unknown"})
+    assert [r.seed for r in store.load(folder)] == [0, 2, 3, 4]
+    store.write(folder, result(1, scores={"horizontal_rmse": 9.0}))
+    store.compact(folder)
+    assert [r.scores["horizontal_rmse"] for r in store.load(folder)] == [1.0, 9.0, 3.0, 4.0, 5.0]
+
+
+def test_results_of_format_1_are_read(folder: Path) -> None:
+    """They have no limits."""
+    import pyarrow.parquet as pq
+
+    store.write(folder, result(0))
+    (path,) = loose(folder)
+    new = pq.read_table(path)
+    old = new.drop_columns(["time_limit", "memory_limit", "scoring"]).replace_schema_metadata({"simnav_results": "1"})
+    pq.write_table(old, path)
+    marker = folder / "simnav-results.json"
+    marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 1}))
+    assert store.keys(folder) == {"ekfr1-0": ("ok", 0.0, 0, "")}
+    store.write(folder, result(1))
+    store.compact(folder)
+    assert [(r.seed, r.time_limit) for r in store.load(folder)] == [(0, 0.0), (1, 60.0)]
+
+
+def test_scores_are_replaced_wherever_they_are(folder: Path) -> None:
+    for seed in range(4):
+        store.write(folder, result(seed))
+        if seed == 1:
+            store.compact(folder)
+    before = store.load(folder)
+    store.rescore(folder, {"ekfr1-1": {"new": 5.0}, "ekfr1-3": {"new": 6.0}}, "code")
+    after = store.load(folder)
+    assert [r.scores.get("new") for r in after] == [None, 5.0, None, 6.0]
+    assert [r.scoring for r in after] == ["{}", "code", "{}", "code"]
+    for old, new in zip(before, after, strict=True):
+        same(dataclasses.replace(old, scores={}, scoring=""), dataclasses.replace(new, scores={}, scoring=""))

@@ -1,0 +1,84 @@
+"""Scores of others in a campaign: how workers come to know them, and which code a result was scored with."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from simnav.leaderboard.campaign.session_class import carry, is_session, receive
+from simnav.leaderboard.campaign.sources import digest, followed
+from simnav.plugins import is_file_module, load_plugin, place_of
+
+__all__ = ["OwnScores", "own_scores", "scoring_code", "scoring_differs"]
+
+
+@dataclass(frozen=True)
+class OwnScores:
+    """Scores that another process does not find by itself.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Python files that register them.
+    code : tuple of bytes
+        Scores of a session, packed.
+    """
+
+    files: tuple[str, ...] = ()
+    code: tuple[bytes, ...] = ()
+
+    def register(self) -> None:
+        """Make them known in this process."""
+        from simnav.scoring import SCORES, registry
+
+        for file in self.files:
+            load_plugin(file)
+        for packed in self.code:
+            score = receive(packed)
+            if score.name not in SCORES:
+                registry.add(score)
+
+
+def own_scores() -> OwnScores:
+    """The scores of single files and of the session.
+
+    Raises
+    ------
+    RequestError
+        If a score of the session uses something that cannot be sent.
+    """
+    from simnav.scoring import SCORES
+
+    files, code = [], []
+    for score in SCORES.values():
+        if score.__module__.startswith("simnav."):
+            continue
+        if is_file_module(score.__module__):
+            files.append(str(Path(place_of(score)[0]).resolve()))
+        elif is_session(score.__module__):
+            code.append(carry(score))
+    return OwnScores(tuple(dict.fromkeys(files)), tuple(code))
+
+
+def scoring_code() -> str:
+    """JSON: the modules of simnav that hold scores, with digests of their code and of what they import."""
+    from simnav.scoring import SCORES
+
+    homes = {score.__module__ for score in SCORES.values() if score.__module__.startswith("simnav.")}
+    found = {home: digest(*(part for item in followed([home]).items() for part in item)) for home in sorted(homes)}
+    return json.dumps(found)
+
+
+def scoring_differs(before: str, now: str) -> bool:
+    """Whether scores that a result has would be computed differently now; new ones do not matter.
+
+    >>> scoring_differs('{"a": "1"}', '{"a": "1", "b": "1"}'), scoring_differs('{"a": "1"}', '{"a": "2"}')
+    (False, True)
+    """
+    if before == now:
+        return False
+    if not before:  # not known
+        return True
+    old, new = json.loads(before), json.loads(now)
+    return any(new.get(home) != code for home, code in old.items())

@@ -1,0 +1,155 @@
+"""Scores computed again from the trials that a campaign kept; no estimator runs."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
+from simnav.leaderboard.campaign.own_scores import scoring_code
+from simnav.leaderboard.results import store, trials
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.result import Result
+    from simnav.scenario import Scenario
+
+__all__ = ["Rescored", "rescore_results"]
+
+
+@dataclass(frozen=True)
+class Rescored:
+    """What was scored again.
+
+    Attributes
+    ----------
+    folder : Path
+    scores : tuple of str
+        Names.
+    rescored : int
+        Results that have these scores now.
+    without_trial : int
+        Results that keep what they had, for there is no trial: none was kept, or the run gave nothing.
+    seconds : float
+    """
+
+    folder: Path
+    scores: tuple[str, ...]
+    rescored: int
+    without_trial: int
+    seconds: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav rescore --json`` prints."""
+        return {
+            "results": str(self.folder),
+            "scores": list(self.scores),
+            "rescored": self.rescored,
+            "without_trial": self.without_trial,
+            "seconds": self.seconds,
+        }
+
+
+def rescore_results(
+    folder: str | os.PathLike[str],
+    names: Iterable[str] = (),
+    scenarios: Iterable[Scenario] = (),
+    progress: Callable[..., None] | None = None,
+    keys: Collection[str] | None = None,
+) -> Rescored:
+    """Compute scores of the current results of a folder again, from the trials that were kept.
+
+    Parameters
+    ----------
+    folder : path
+    names : iterable of str
+        Of scores; default: all that are known.
+    scenarios : iterable of Scenario
+        Those that are not in the catalogue.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the next.
+    keys : collection of str, optional
+        Of the results; default: all that have a trial.
+
+    Returns
+    -------
+    Rescored
+
+    Raises
+    ------
+    RequestError
+        If a score or a scenario is unknown, no trial was kept, or a scenario or the simulator has changed since, so
+        that the recording cannot be made again. The results keep what they had.
+    StoreError
+        If the folder or a trial in it cannot be used.
+    """
+    from simnav.scoring import SCORES, score
+    from simnav.source import record
+    from simnav.spec import closest
+
+    started = time.monotonic()
+    path = Path(folder).resolve()
+    chosen = tuple(names) or tuple(SCORES)
+    for name in chosen:
+        if name not in SCORES:
+            raise RequestError(f"there is no score {name!r}{closest(name, list(SCORES))}")
+    results = store.load(path, series=False)
+    kept = [r for r in results if (keys is None or r.key in keys) and trials.is_kept(path, r.key)]
+    if not kept:
+        raise RequestError(f"no trials were kept in {path}; 'simnav campaign --keep-trials' keeps them")
+    by_run: dict[tuple[str, int], list[Result]] = defaultdict(list)
+    for result in kept:
+        by_run[result.scenario, result.seed].append(result)
+    known = _scenarios({scenario: found[0] for (scenario, _), found in by_run.items()}, scenarios)
+    changed: dict[str, Mapping[str, float]] = {}
+    for done, ((scenario, seed), found) in enumerate(sorted(by_run.items(), key=lambda item: item[0])):
+        if progress is not None:
+            progress(done, len(by_run), note=f"{scenario}, seed {seed}")
+        with mistakes(ValueError, FileNotFoundError):
+            recording = record(known[scenario], seed)
+        for result in found:
+            trial, thinned = trials.read(path, result.key, recording)
+            wanted = [n for n in chosen if not (thinned and SCORES[n].uses_covariance and n in result.scores)]
+            changed[result.key] = {**result.scores, **score(trial, recording, wanted)}
+    if progress is not None:
+        progress(len(by_run), len(by_run))
+    _store(path, kept, changed, all_of_them=set(chosen) >= set(SCORES))
+    return Rescored(path, chosen, len(changed), len(results) - len(changed), time.monotonic() - started)
+
+
+def _store(path: Path, kept: list[Result], changed: Mapping[str, Mapping[str, float]], *, all_of_them: bool) -> None:
+    """Write the scores; only where all were computed, the code that they were computed with is today's."""
+    if all_of_them:
+        store.rescore(path, changed, scoring_code())
+        return
+    by_code: dict[str, dict[str, Mapping[str, float]]] = defaultdict(dict)
+    for result in kept:
+        by_code[result.scoring][result.key] = changed[result.key]
+    for code, scores in by_code.items():
+        store.rescore(path, scores, code)
+
+
+def _scenarios(examples: Mapping[str, Result], given: Iterable[Scenario]) -> dict[str, Scenario]:
+    """The scenarios of results, by id, as they were when the results were computed."""
+    from simnav.scenario import load
+
+    found, simulator = {s.id: s for s in given}, simulator_version()
+    for scenario, result in examples.items():
+        if scenario not in found:
+            try:
+                found[scenario] = load(scenario)
+            except ValueError as error:
+                raise RequestError(
+                    f"scenario {scenario} is not in the catalogue; give its file with --scenario"
+                ) from error
+        if recording_digest(found[scenario], simulator) != result.recording:
+            raise RequestError(
+                f"the recordings of {scenario} cannot be made again, for the scenario or the simulator has changed "
+                "since; run the campaign again"
+            )
+    return found

@@ -1,0 +1,16 @@
+"""The scores of simnav: importing this module registers them, in the order in which tables show them."""
+
+from __future__ import annotations
+
+# isort: off
+from simnav.scoring import accuracy
+from simnav.scoring import outages
+from simnav.scoring import consistency
+from simnav.scoring import detection
+from simnav.scoring import noise_estimation
+from simnav.scoring import smoothed
+from simnav.scoring import cost
+
+# isort: on
+
+__all__ = ["accuracy", "consistency", "cost", "detection", "noise_estimation", "outages", "smoothed"]
