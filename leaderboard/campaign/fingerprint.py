@@ -143,7 +143,9 @@ def _homes(item: Any, depth: int = 3) -> Iterator[str]:
                 for value in vars(base).values():
                     yield from _homes(value, depth - 1)
     elif isinstance(item, (FunctionType, staticmethod, classmethod)):
-        yield getattr(item, "__module__", None) or ""
+        module = getattr(item, "__module__", None)
+        if module:  # functions that the interpreter makes have none
+            yield module
     elif isinstance(item, partial):
         yield from _homes((item.func, item.args, item.keywords), depth)
     elif isinstance(item, (tuple, list, set, frozenset)):
