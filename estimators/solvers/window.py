@@ -19,7 +19,7 @@ A large step is taken only if it does not raise the cost. Motion factors are sti
 rotation leaves the motion at second order, and the cost rises though the step is good (the Maratos effect). So a step
 that fails is tried again along the motion (`Chain.along_motion`), and damped only if that raises the cost, too.
 
-A window that cannot explain its measurements says so (`simnav.estimators.solvers.cost_test`): the diagnostic
+A window that cannot explain its measurements says so (`simnav.estimators.solvers.cost_consistency`): the diagnostic
 ``inconsistent`` is 1, and the covariance that it reports is multiplied by the variance factor.
 
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
@@ -50,7 +50,7 @@ from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.admission import Admission
-from simnav.estimators.solvers.cost_test import CostTest
+from simnav.estimators.solvers.cost_consistency import CostTest
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 

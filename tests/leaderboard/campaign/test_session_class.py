@@ -108,7 +108,7 @@ def session(request: pytest.FixtureRequest) -> Any:
 
 def test_what_no_other_process_can_import() -> None:
     assert is_session("__main__")
-    assert not is_session("simnav.estimators.ekf")
+    assert not is_session("simnav.estimators.rows.kalman")
     assert not is_session("json.decoder")
     assert is_session("no_such_module")
 

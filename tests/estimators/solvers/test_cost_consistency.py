@@ -8,7 +8,7 @@ from scipy import stats
 
 import simnav
 from simnav.estimator import make
-from simnav.estimators.solvers.cost_test import PATIENCE, CostTest, chi_square_deviate
+from simnav.estimators.solvers.cost_consistency import PATIENCE, CostTest, chi_square_deviate
 from simnav.scenario import load
 
 

