@@ -20,6 +20,7 @@ from simnav.estimator import Estimator, make
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
+from tests.cases import ROV
 
 #: Epochs that are timed, after the window has filled.
 EPOCHS = 40
@@ -30,7 +31,6 @@ WEIGHTED = (
     "ga-fgo", "huber-fgo", "tukey-fgo", "cauchy-fgo", "gm-fgo", "dcs-fgo", "switchable-fgo", "gnc-fgo",
     "max-mixture-fgo",
 )  # fmt: skip
-ROV = Path(__file__).parents[1] / "cases" / "rov.toml"
 OURS, THEIRS = ("sw-fgo", {"calibrate": False}), ("gtsam-fixed-lag", {})
 
 

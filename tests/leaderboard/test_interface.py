@@ -25,22 +25,7 @@ from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.site.site import build
 from simnav.recording import Recording
-
-POND = """
-name = "pond"
-version = 1
-title = "half a minute on a pond"
-duration_s = 30.0
-[start]
-latitude_deg = 54.0
-longitude_deg = 8.0
-speed_m_s = 2.0
-[[manoeuvre]]
-kind = "hold"
-duration_s = 30.0
-[instruments.gnss_position]
-sigma_m = [1.0, 1.0, 2.0]
-"""
+from tests.cases import POND
 
 
 class LastFix(Estimator):

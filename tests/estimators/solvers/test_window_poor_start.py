@@ -8,7 +8,6 @@ where the EKF has 0.5 m).
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,8 +20,8 @@ from simnav.estimators.solvers.window import WindowEstimator
 from simnav.recording import Recording
 from simnav.scenario import load
 from tests.agreement.voyages import run, voyage
+from tests.cases import ROV
 
-ROV = Path(__file__).parents[2] / "cases" / "rov.toml"
 SEEDS = (0, 3, 4)
 
 

@@ -18,24 +18,10 @@ from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError
 from simnav.plugins import load_plugin
 from simnav.scoring import SCORES, ScoringInput, register_score, registry
+from tests.cases import POND
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
 
-POND = """
-name = "pond"
-version = 1
-title = "half a minute on a pond"
-duration_s = 30.0
-[start]
-latitude_deg = 54.0
-longitude_deg = 8.0
-speed_m_s = 2.0
-[[manoeuvre]]
-kind = "hold"
-duration_s = 30.0
-[instruments.gnss_position]
-sigma_m = [1.0, 1.0, 2.0]
-"""
 BAD = """
 from simnav import Estimator
 

@@ -16,22 +16,7 @@ from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.campaign.session_class import carry, is_session, receive, source_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
-
-POND = """
-name = "pond"
-version = 1
-title = "half a minute on a pond"
-duration_s = 30.0
-[start]
-latitude_deg = 54.0
-longitude_deg = 8.0
-speed_m_s = 2.0
-[[manoeuvre]]
-kind = "hold"
-duration_s = 30.0
-[instruments.gnss_position]
-sigma_m = [1.0, 1.0, 2.0]
-"""
+from tests.cases import POND
 
 # A notebook: its cells are compiled one by one in __main__, with their lines where inspect finds them.
 NOTEBOOK = '''
