@@ -542,7 +542,8 @@ def quick_estimators(note: Callable[[str], None] | None = None) -> list[str]:
 
 
 def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[Result]:
-    """The current results of a folder; ``series`` are what figures need."""
+    """The current results of a folder, all of one version of the benchmark; ``series`` are what charts need."""
+    from simnav.leaderboard.results.provenance import benchmark_of
     from simnav.leaderboard.results.store import StoreError, load
 
     path = _absolute(folder)
@@ -550,6 +551,7 @@ def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[
         results = load(path, series=series)
     if not results:
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
+    benchmark_of(r.provenance for r in results)
     return results
 
 
