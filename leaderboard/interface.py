@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
     from simnav.leaderboard.papers.reproduction import Reproduction
+    from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.bounds import BoundReport
     from simnav.leaderboard.ranking.costs import CostReport
-    from simnav.leaderboard.ranking.ranking import Ranking
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.results.result import Result
     from simnav.recording import Recording
@@ -287,7 +287,7 @@ def evaluate(
     by_scenario = group(found)
     return EvaluationReport(
         found,
-        rank(found),
+        rank(found, tracks={s.id: s.track for s in chosen}),
         tuple(labels),
         tuple(s.id for s in chosen),
         seeds,
@@ -353,26 +353,35 @@ def campaign(
     summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
                    keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
     results = results_of(folder)
-    return CampaignReport(results, rank(results), summary)
+    return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
 
 
-def rank(results: str | os.PathLike[str] | Iterable[Result], *, score: str = "horizontal_rmse") -> Ranking:
+def rank(
+    results: str | os.PathLike[str] | Iterable[Result],
+    *,
+    score: str | None = None,
+    tracks: Mapping[str, str] | None = None,
+) -> Ranking:
     """Rank estimators by their results.
 
     Parameters
     ----------
     results : path or iterable of Result
         Folder that a campaign wrote, or results themselves.
-    score : str
-        Key of `simnav.scoring.SCORES`, one that is better when lower.
+    score : str, optional
+        Key of `simnav.scoring.SCORES`, one that is better when lower. Default: the horizontal error, and for
+        post-processing the smoothed one.
+    tracks : mapping of str to str, optional
+        Track of scenarios that are not in the catalogue, by versioned id.
 
     Returns
     -------
-    Ranking
+    simnav.leaderboard.ranking.board.Ranking
     """
     from simnav.leaderboard.ranking.ranking import rank
 
-    return rank(results_of(results) if isinstance(results, (str, os.PathLike)) else results, score=score)
+    given = results_of(results) if isinstance(results, (str, os.PathLike)) else results
+    return rank(given, score=score, tracks=tracks)
 
 
 def rescore(

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 #: Probability of all intervals.
 LEVEL = 0.95
-#: Fewest runs of which an interval is given. Of five, even the smallest and the largest hold the median in 93.75 % only.
+#: Fewest runs of which an interval is given. Of five, the smallest and the largest hold the median in 93.75 % only.
 FEWEST = 6
 #: Ratio to the reference figure that stands for a failed run, and that no run exceeds.
 FAILURE = 1000.0

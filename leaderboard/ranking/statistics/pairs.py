@@ -45,8 +45,8 @@ def compare(a: Mapping[Hashable, float], b: Mapping[Hashable, float]) -> Compari
     ----------
     a, b : mapping of seed to float
         The error by seed (or by any key of an independent run); positive. Only runs that both have are compared.
-        Infinity stands for a failed run, NaN for one to leave out. One that failed, while the other did not, has a ratio
-        of `FAILURE`, and no pair has more.
+        Infinity stands for a failed run, NaN for one to leave out. One that failed, while the other did not, has a
+        ratio of `FAILURE`, and no pair has more.
 
     Returns
     -------

@@ -10,8 +10,8 @@ differences between rows become by chance alone.
   the clusters' contributions. Flips do not change the denominator, so that this is as good as Student's t.
 - **All pairs at once.** The p-value of a pair is the share of the flips in which the largest statistic of any pair
   that is not more extreme reaches the pair's own: the free step-down procedure with maxima of Westfall and Young
-  (*Resampling-based multiple testing*, Wiley 1993). The probability that any two equal rows are separated is at most 5 %,
-  whatever the other rows are, if differences are distributed symmetrically.
+  (*Resampling-based multiple testing*, Wiley 1993). The probability that any two equal rows are separated is at most
+  5 %, whatever the other rows are, if differences are distributed symmetrically.
 - **Rank intervals** follow from the pairs: a row's best possible rank is 1 plus the number of rows that are separated
   from it and better (Mogstad, Romano, Shaikh and Wilhelm, *Inference for ranks with applications to mobility across
   neighborhoods and academic achievement across countries*, Review of Economic Studies 2024).
@@ -141,7 +141,7 @@ def _codes(items: Sequence[Hashable]) -> NDArray[np.int64]:
 
 @lru_cache(maxsize=8)
 def _signs(clusters: int, flips: int) -> NDArray[np.float32]:
-    """(B, clusters) signs; the first row changes nothing. The sign of the first cluster is free, for only sizes count."""
+    """(B, clusters) signs; the first row changes nothing. One sign is free, for only sizes count."""
     if clusters <= _FEW:
         bits = np.arange(2 ** (clusters - 1))[:, None] >> np.arange(clusters) & 1
     else:
