@@ -177,7 +177,7 @@ def test_names_load_with_their_first_use() -> None:
         "assert set(simnav.__all__) <= set(dir(simnav))\n"
         "simnav.run, simnav.check, simnav.load\n"
         "assert not {'gtsam', 'matplotlib', 'pyarrow', 'scipy', 'typer'} & set(sys.modules)\n"
-        "import simnav.contract_check\n"
+        "import simnav.testing.contract_check\n"
         "assert callable(simnav.check)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
