@@ -62,10 +62,10 @@ class Distribution:
         """Read a table like ``{ uniform = [0, 1] }``; SpecError (without the file's name) if it is none."""
         kinds = [k for k in table if k in _KINDS]
         kind = kinds[0]
-        allowed = {kind, "weights"} if kind == "choice" else {kind}
+        allowed = {kind, "weights", "present"} if kind == "choice" else {kind}
         extra = [k for k in table if k not in allowed]
         if extra:
-            raise SpecError(f"{where} = {dict(table)!r}: beside {kind!r} there is no key {extra[0]!r}")
+            raise SpecError(f"{where}: beside {kind!r} there is no key {extra[0]!r}")
         values = table[kind]
         if kind == "choice":
             return cls(kind, *_options(values, table.get("weights"), where))
@@ -218,6 +218,7 @@ class Template:
             found = self.distributions.setdefault(where, Distribution.read(value, where))
             for i, option in enumerate(found.values if found.kind == "choice" else ()):
                 self._collect(option, f"{where}.choice[{i}]")
+            self._collect(value.get("present", True), f"{where}.present")
         elif isinstance(value, Mapping):
             if _is_reference(value):
                 _check_reference(value, where, self._named)
@@ -292,11 +293,9 @@ def _check_reference(value: Mapping[str, Any], where: str, named: Mapping[str, A
         raise SpecError(f"{where}.draw = {name!r}: there is no such draw in [draw]{closest(name, list(named))}")
     extra = [k for k in value if k not in ("draw", "times", "plus", "cases")]
     if extra:
-        raise SpecError(
-            f"{where} = {dict(value)!r}: beside 'draw' there is no key {extra[0]!r}; valid here: cases, plus, times"
-        )
+        raise SpecError(f"{where}: beside 'draw' there is no key {extra[0]!r}; valid here: cases, plus, times")
     if "cases" in value and len(value) > 2:
-        raise SpecError(f"{where} = {dict(value)!r}: 'cases' goes without 'times' and 'plus'")
+        raise SpecError(f"{where}: 'cases' goes without 'times' and 'plus'")
     if "cases" in value and not isinstance(value["cases"], Mapping):
         raise SpecError(f"{where}.cases = {value['cases']!r} should be a table, a value for each case")
 
@@ -326,13 +325,13 @@ class _Resolution:
         return self._values[name]
 
     def _value(self, value: Any, where: str) -> Any:
+        if isinstance(value, Mapping) and "present" in value and not self._present(value["present"], where):
+            return _DROPPED
         if _is_distribution(value):
             return self._drawn(Distribution.read(value, where), where)
         if _is_reference(value):
             return self._reference(value, where)
         if isinstance(value, Mapping):
-            if "present" in value and not self._present(value["present"], where):
-                return _DROPPED
             inner = {
                 key: self._value(v, f"{where}.{key}" if where else str(key))
                 for key, v in value.items()

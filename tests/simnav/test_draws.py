@@ -113,7 +113,9 @@ def test_a_run_has_draws_of_its_own_and_every_draw_a_stream(scenario: Scenario):
 def test_references_cases_and_presence(scenario: Scenario):
     runs = [scenario.drawn(k) for k in range(60)]
     for s in runs:
-        assert s.start is not None and s.vessel is not None and s.imu is not None
+        assert s.start is not None
+        assert s.vessel is not None
+        assert s.imu is not None
         assert s.imu.gyroscope.bias == pytest.approx(10.0 / 60.0 * s.imu.gyroscope.random_walk)
         assert ("depth" in s.instruments) == (s.vessel.kind == "uuv")
         assert (s.start.speed == 1.5) == (s.vessel.kind == "uuv")
@@ -222,7 +224,7 @@ def test_a_scenario_without_draws_has_none():
         ("[0.1, 1.0]", "[1.0, 0.1]", "f.toml: draw.grade.log_uniform = [1.0, 0.1]: the lowest should be less than"),
         ("[0.1, 1.0]", "[0, 1.0]", "draw.grade.log_uniform = [0, 1.0]: the lowest should be greater than 0"),
         ("[0.1, 1.0]", "[1.0]", "draw.grade.log_uniform = [1.0] should be [lowest, highest], two finite numbers"),
-        ("integers = [1, 4]", "integers = [1.5, 4]", "instruments.gnss.rate_hz.integers = [1.5, 4] should be two whole"),
+        ("integers = [1, 4]", "integers = [1.5, 4]", "rate_hz.integers = [1.5, 4] should be two whole"),
         ("normal = [5, 1]", "normal = [5, 0]", "sigma_m.normal = [5, 0]: the sigma should be greater than 0"),
         ("weights = [3, 1]", "weights = [3]", "draw.vessel.weights = [3] should be 2 numbers, one an option"),
         ("weights = [3, 1]", "weight = [3, 1]", "beside 'choice' there is no key 'weight'"),
@@ -232,9 +234,9 @@ def test_a_scenario_without_draws_has_none():
         ("ship = false", 'ship = "no"', "instruments.depth.present = 'no' should be true or false"),
         ("begin = { uniform = [10, 20] }", 'begin = { draw = "begin" }', "draw.begin refers to itself"),
         ('draw = "grade", times = 10.0', 'draw = "vessel", times = 10.0', "draw.vessel = 'ship' should be a number"),
-        ("uniform = [-60, 60]", "unifrom = [-60, 60]", "should be a number, or a distribution like { uniform = [1, 2] }"),
+        ("uniform = [-60, 60]", "unifrom = [-60, 60]", "a number, or a distribution like { uniform = [1, 2] }"),
         # Only some draws are wrong: the message says which.
-        ("uniform = [5, 20]", "uniform = [-5, 20]", "the fault ends (5.0 s) before it starts (10.0 s) (for some draws: "),
+        ("uniform = [5, 20]", "uniform = [-5, 20]", "(5.0 s) before it starts (10.0 s) (for some draws: "),
         ("uniform = [10, 20]", "uniform = [10, 60]", "it starts at 60 s, but duration_s = 40 (for some draws: "),
         ("normal = [5, 1]", "normal = [5, 2]", "sigma_m is not negative (for some draws: "),
         ("uniform = [-60, 60]", "uniform = [-60, 95]", "should be less than 89 (for some draws: "),
