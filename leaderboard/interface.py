@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.costs import CostReport
     from simnav.leaderboard.ranking.ranking import Ranking
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
+    from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.recording import Recording
     from simnav.testing.contract_check import Report
@@ -47,6 +48,7 @@ __all__ = [
     "bound",
     "campaign",
     "check",
+    "cite",
     "evaluate",
     "make",
     "quick_estimators",
@@ -406,6 +408,28 @@ def rescore(
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return rescore_results(_absolute(results), [n.strip() for n in names if n.strip()], given, progress)
+
+
+def cite(results: str | os.PathLike[str] | None = None) -> Citation:
+    """How to cite this version of simnav, or results.
+
+    Parameters
+    ----------
+    results : path, optional
+        Folder that a campaign wrote; default: simnav itself.
+
+    Returns
+    -------
+    Citation
+
+    Examples
+    --------
+    >>> print(cite().bibtex.splitlines()[0])
+    @software{simnav,
+    """
+    from simnav.leaderboard.results.citation import citation
+
+    return citation(None if results is None else [r.provenance for r in results_of(results)])
 
 
 def bound(

@@ -132,6 +132,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         ["bound", "open-sea", "-n", "1"],
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
+    "cite": (["cite"], lambda: simnav.cite().to_dict()),
     "warmup": (["warmup"], lambda: {"kernels": len(__import__("simnav.compiled").compiled.kernels())}),
 }  # fmt: skip
 
