@@ -545,27 +545,33 @@ def scenario_of(given: ScenarioLike) -> Scenario:
 
 
 def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str], None] | None = None) -> list[Scenario]:
-    """The scenarios that were asked for; where none was, all of the catalogue but logs whose files are not here.
+    """The scenarios that were asked for; where none was, those of the catalogue.
+
+    Of the catalogue, families for training are left out, and logs whose files are not here.
 
     Parameters
     ----------
     given : scenarios
-        A text may name several, separated by commas.
+        A text may name several, separated by commas. The name of a track stands for its scenarios.
     quick : bool
         Of the catalogue, leave out those that are tagged ``long``.
     note : callable, optional
         Called with a sentence on what is left out; default: a warning.
     """
-    from simnav.scenario import names
+    from simnav.scenario import headers, names
 
     items = [] if given is None else [given] if isinstance(given, (str, Path, Scenario)) else list(given)
     asked: list[ScenarioLike] = []
+    tracks: dict[str, list[ScenarioLike]] = {}
+    for header in headers():
+        tracks.setdefault(header.track, []).append(header.name)
     for item in items:
-        asked += [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]
+        for part in [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]:
+            asked += tracks.get(part, [part]) if isinstance(part, str) else [part]
     found = []
     for item in dict.fromkeys(asked or names()) if all(isinstance(i, str) for i in asked) else asked:
         chosen = scenario_of(item)
-        if quick and not asked and "long" in chosen.tags:
+        if not asked and (chosen.training or (quick and "long" in chosen.tags)):
             continue
         if chosen.log is not None:
             from simnav.source import open_source
