@@ -2,7 +2,7 @@
 
 A specification holds no data and no colours. Data are columns, or curves by row, which the page expands
 (``charts.js``); ``$colours`` and ``$dashes`` stand for the scales of the rows that are shown, ``$ink`` and the like for
-colours of the theme. `filled` puts them in, for print.
+colours of the theme, which the page or `simnav.leaderboard.site.print_figures` puts in.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ __all__ = [
     "columns",
     "detection",
     "distribution",
-    "filled",
     "over_time",
     "ratios_by_group",
     "short",
@@ -31,9 +30,6 @@ __all__ = [
 
 Spec = dict[str, Any]
 
-_PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255", "#999933")
-_INKS = {"$ink": "#1b2430", "$grey": "#5b6673", "$shade": "#9aa5b1", "$strong": _PALETTE[0], "$second": _PALETTE[1]}
-_DASHES = ([1, 0], [6, 2], [2, 2], [6, 2, 2, 2])
 
 #: Zoom by the wheel with Shift, so that the page still scrolls; a double click shows all again.
 _ZOOM = {
@@ -84,9 +80,7 @@ def short(value: Any, digits: int = 4) -> float | None:
 
 def columns(**values: Iterable[Any]) -> dict[str, list[Any]]:
     """Columns of a data set: arrays become short lists."""
-    return {
-        name: [short(x) for x in v] if isinstance(v, np.ndarray) else list(v) for name, v in values.items()
-    }
+    return {name: [short(x) for x in v] if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
 
 
 def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
@@ -121,7 +115,9 @@ def _hover(points: Spec, tooltip: list[Spec]) -> Spec:
     """Points that appear on hover, nearest first."""
     return {
         **points,
-        "params": [{"name": "near", "select": {"type": "point", "on": "pointerover", "nearest": True, "clear": "pointerout"}}],
+        "params": [
+            {"name": "near", "select": {"type": "point", "on": "pointerover", "nearest": True, "clear": "pointerout"}}
+        ],
         "mark": {"type": "point", "size": 45, "filled": True},
         "encoding": {
             **points["encoding"],
@@ -131,9 +127,7 @@ def _hover(points: Spec, tooltip: list[Spec]) -> Spec:
     }
 
 
-def over_time(
-    name: str, title: str, unit: str, data: Mapping[str, Any], caption: str, *, spread: bool = True, bound: bool = False
-) -> Chart:
+def over_time(name: str, title: str, unit: str, data: Mapping[str, Any], caption: str, *, spread: bool = True) -> Chart:
     """An error over time: median with band (or one run), faults shaded, bound dashed.
 
     Parameters
@@ -157,28 +151,37 @@ def over_time(
         },
     ]
     if spread:
-        layers.append({
+        layers.append(
+            {
+                **curves,
+                "mark": {"type": "area", "opacity": 0.13},
+                "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
+            }
+        )
+    layers.append(
+        {
             **curves,
-            "mark": {"type": "area", "opacity": 0.13},
-            "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
-        })  # fmt: skip
-    layers.append({
-        **curves,
-        "params": [_ZOOM],
-        "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-        "encoding": {"x": x, "y": y, **_row()},
-    })  # fmt: skip
-    if bound:
-        layers.append({
+            "params": [_ZOOM],
+            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
+            "encoding": {"x": x, "y": y, **_row()},
+        }
+    )
+    layers.append(
+        {
             "data": {"name": "bound"},
             "mark": {"type": "line", "clip": True, "color": "$ink", "strokeDash": [3, 3], "strokeWidth": 1.4},
             "encoding": {"x": x, "y": {**y, "field": "bound"}},
-        })  # fmt: skip
+        }
+    )
     layers.append(
-        _hover({**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
-               _tip(row="Estimator", time="Time [s]", middle=f"{title} [{unit}]"))
-    )  # fmt: skip
-    return Chart(name, f"{title} over time", f"{caption} {_ZOOM_HELP}", {"height": 300, "layer": layers}, data, byrow=True)
+        _hover(
+            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            _tip(row="Estimator", time="Time [s]", middle=f"{title} [{unit}]"),
+        )
+    )
+    return Chart(
+        name, f"{title} over time", f"{caption} {_ZOOM_HELP}", {"height": 300, "layer": layers}, data, byrow=True
+    )
 
 
 def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], caption: str) -> Chart:
@@ -186,15 +189,30 @@ def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], capt
     x, y = _axis("error", f"{title} [{unit}]", log=True), _axis("share", "Share of the epochs [%]")
     curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.error > 0"}]}
     layers: list[Spec] = [
-        {**curves, "params": [_ZOOM], "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-         "encoding": {"x": x, "y": y, "order": {"field": "share"}, **_row()}},
-        {"data": {"values": [{"level": 50}, {"level": 95}]}, "mark": {"type": "rule", "color": "$grey", "strokeDash": [2, 2]},
-         "encoding": {"y": {"field": "level", "type": "quantitative"}}},
-        _hover({**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
-               _tip(row="Estimator", error=f"{title} [{unit}]", share="Share of the epochs [%]")),
-    ]  # fmt: skip
-    return Chart(name, f"Distribution of the {title.lower()}", f"{caption} {_ZOOM_HELP}", {"height": 280, "layer": layers},
-                 data, byrow=True)  # fmt: skip
+        {
+            **curves,
+            "params": [_ZOOM],
+            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
+            "encoding": {"x": x, "y": y, "order": {"field": "share"}, **_row()},
+        },
+        {
+            "data": {"values": [{"level": 50}, {"level": 95}]},
+            "mark": {"type": "rule", "color": "$grey", "strokeDash": [2, 2]},
+            "encoding": {"y": {"field": "level", "type": "quantitative"}},
+        },
+        _hover(
+            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            _tip(row="Estimator", error=f"{title} [{unit}]", share="Share of the epochs [%]"),
+        ),
+    ]
+    return Chart(
+        name,
+        f"Distribution of the {title.lower()}",
+        f"{caption} {_ZOOM_HELP}",
+        {"height": 280, "layer": layers},
+        data,
+        byrow=True,
+    )
 
 
 def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart:
@@ -202,21 +220,48 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
     x, y = _axis("east", "East [m]"), _axis("north", "North [m]")
     order = {"order": {"field": "time"}}
     layers: list[Spec] = [
-        {"data": {"name": "fixes"}, "mark": {"type": "point", "color": "$grey", "opacity": 0.5, "size": 8, "filled": True},
-         "encoding": {"tooltip": _tip(name="Fix", time="Time [s]")}},
-        {"data": {"name": "faulty"}, "mark": {"type": "line", "color": "$second", "opacity": 0.35, "strokeWidth": 9,
-                                              "strokeCap": "round"},
-         "encoding": {"detail": {"field": "part"}, "tooltip": _tip(name="Fault"), **order}},
+        {
+            "data": {"name": "fixes"},
+            "mark": {"type": "point", "color": "$grey", "opacity": 0.5, "size": 8, "filled": True},
+            "encoding": {"tooltip": _tip(name="Fix", time="Time [s]")},
+        },
+        {
+            "data": {"name": "faulty"},
+            "mark": {"type": "line", "color": "$second", "opacity": 0.35, "strokeWidth": 9, "strokeCap": "round"},
+            "encoding": {"detail": {"field": "part"}, "tooltip": _tip(name="Fault"), **order},
+        },
         {"data": {"name": "truth"}, "mark": {"type": "line", "color": "$ink", "strokeWidth": 2.4}, "encoding": order},
-        {"data": {"name": "curves"}, "params": [_ZOOM], "mark": {"type": "line", "clip": True, "strokeWidth": 1.4},
-         "encoding": {**_row(), **order}},
-        {"data": {"name": "ends"}, "mark": {"type": "point", "filled": True, "size": 60, "color": "$ink", "opacity": 1},
-         "encoding": {"shape": {"field": "name", "legend": None, "scale": {"domain": ["start", "end"], "range": ["circle", "square"]}},
-                      "tooltip": _tip(name="Truth")}},
-        _hover({"data": {"name": "curves"}, "encoding": {"color": _row()["color"]}}, _tip(row="Estimator", time="Time [s]")),
-    ]  # fmt: skip
-    return Chart(name, title, f"{caption} {_ZOOM_HELP}", {"encoding": {"x": x, "y": y}, "layer": layers}, data,
-                 byrow=True, equal=True)  # fmt: skip
+        {
+            "data": {"name": "curves"},
+            "params": [_ZOOM],
+            "mark": {"type": "line", "clip": True, "strokeWidth": 1.4},
+            "encoding": {**_row(), **order},
+        },
+        {
+            "data": {"name": "ends"},
+            "mark": {"type": "point", "filled": True, "size": 60, "color": "$ink", "opacity": 1},
+            "encoding": {
+                "shape": {
+                    "field": "name",
+                    "legend": None,
+                    "scale": {"domain": ["start", "end"], "range": ["circle", "square"]},
+                },
+                "tooltip": _tip(name="Truth"),
+            },
+        },
+        _hover(
+            {"data": {"name": "curves"}, "encoding": {"color": _row()["color"]}}, _tip(row="Estimator", time="Time [s]")
+        ),
+    ]
+    return Chart(
+        name,
+        title,
+        f"{caption} {_ZOOM_HELP}",
+        {"encoding": {"x": x, "y": y}, "layer": layers},
+        data,
+        byrow=True,
+        equal=True,
+    )
 
 
 def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart:
@@ -230,27 +275,40 @@ def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart
     x, y = _roomy(_axis("cost", "Time per epoch [ms]", log=True)), _roomy(_axis("error", y_title, log=True))
     rows = {"data": {"name": "rows"}}
     layers: list[Spec] = [
-        {**rows, "transform": [{"filter": "datum.front"}],
-         "mark": {"type": "line", "interpolate": "step-after", "color": "$grey", "strokeDash": [4, 3]},
-         "encoding": {"x": x, "y": y}},
-        {**rows, "params": [_ZOOM], "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
-         "encoding": {"x": x, "y": y,
-                      "color": {"condition": {"test": "datum.front", "value": "$second"}, "value": "$strong"},
-                      "opacity": {"condition": {"test": "datum.front", "value": 1}, "value": 0.55},
-                      "tooltip": _tip(row="Estimator", family="Family", cost="Time per epoch [ms]", error=y_title)}},
-        {**rows, "transform": [{"filter": "datum.front"}],
-         "mark": {"type": "text", "align": "left", "dx": 7, "dy": -6, "fontSize": 11, "color": "$ink"},
-         "encoding": {"x": x, "y": y, "text": {"field": "row"}}},
-    ]  # fmt: skip
+        {
+            **rows,
+            "transform": [{"filter": "datum.front"}],
+            "mark": {"type": "line", "interpolate": "step-after", "color": "$grey", "strokeDash": [4, 3]},
+            "encoding": {"x": x, "y": y},
+        },
+        {
+            **rows,
+            "params": [_ZOOM],
+            "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
+            "encoding": {
+                "x": x,
+                "y": y,
+                "color": {"condition": {"test": "datum.front", "value": "$second"}, "value": "$strong"},
+                "opacity": {"condition": {"test": "datum.front", "value": 1}, "value": 0.55},
+                "tooltip": _tip(row="Estimator", family="Family", cost="Time per epoch [ms]", error=y_title),
+            },
+        },
+        {
+            **rows,
+            "transform": [{"filter": "datum.front"}],
+            "mark": {"type": "text", "align": "left", "dx": 7, "dy": -6, "fontSize": 11, "color": "$ink"},
+            "encoding": {"x": x, "y": y, "text": {"field": "row"}},
+        },
+    ]
     caption = (
-        "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more accurate "
-        f"and quicker. {_ZOOM_HELP}"
+        "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more "
+        f"accurate and quicker. {_ZOOM_HELP}"
     )
     return Chart(name, "Accuracy against cost", caption, {"height": 340, "layer": layers}, data)
 
 
 def detection(name: str, data: Mapping[str, Any]) -> Chart:
-    """Share of the faulty measurements that are detected, against that of false alarms; columns ``row``, ``found``, ``false``."""
+    """Share of faults that are detected against that of false alarms [%]; columns ``row``, ``found``, ``false``."""
     spec = {
         "height": 300,
         "data": {"name": "rows"},
@@ -279,17 +337,30 @@ def spread(
     x = _roomy(_axis("value", x_title, log=True))
     layers: list[Spec] = []
     if len(ideal) == 2:
-        layers.append({"data": {"values": [{"low": ideal[0], "high": ideal[1]}]},
-                       "mark": {"type": "rect", "color": "$shade", "opacity": 0.25},
-                       "encoding": {"x": {"field": "low", "type": "quantitative"}, "x2": {"field": "high"}}})  # fmt: skip
+        layers.append(
+            {
+                "data": {"values": [{"low": ideal[0], "high": ideal[1]}]},
+                "mark": {"type": "rect", "color": "$shade", "opacity": 0.25},
+                "encoding": {"x": {"field": "low", "type": "quantitative"}, "x2": {"field": "high"}},
+            }
+        )
     layers += [
-        {"data": {"name": "runs"}, "mark": {"type": "tick", "opacity": 0.4, "thickness": 1.2, "color": "$strong"},
-         "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", run="Run", value=x_title)}},
-        {"data": {"name": "middles"}, "mark": {"type": "rule", "strokeWidth": 2.2, "color": "$ink"},
-         "encoding": {"x": {**x, "field": "low"}, "x2": {"field": "high"}, "y": y}},
-        {"data": {"name": "middles"}, "mark": {"type": "point", "filled": True, "size": 55, "opacity": 1, "color": "$ink"},
-         "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", value=x_title, low="Low", high="High")}},
-    ]  # fmt: skip
+        {
+            "data": {"name": "runs"},
+            "mark": {"type": "tick", "opacity": 0.4, "thickness": 1.2, "color": "$strong"},
+            "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", run="Run", value=x_title)},
+        },
+        {
+            "data": {"name": "middles"},
+            "mark": {"type": "rule", "strokeWidth": 2.2, "color": "$ink"},
+            "encoding": {"x": {**x, "field": "low"}, "x2": {"field": "high"}, "y": y},
+        },
+        {
+            "data": {"name": "middles"},
+            "mark": {"type": "point", "filled": True, "size": 55, "opacity": 1, "color": "$ink"},
+            "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", value=x_title, low="Low", high="High")},
+        },
+    ]
     return Chart(name, title, caption, {"height": {"step": 17}, "layer": layers}, data)
 
 
@@ -315,69 +386,22 @@ def timeline(name: str, data: Mapping[str, Any], caption: str) -> Chart:
 def ratios_by_group(name: str, data: Mapping[str, Any], caption: str) -> Chart:
     """How an estimator does under each kind of difficulty: columns ``group``, ``row``, ``value``, ``scenario``."""
     layers: list[Spec] = [
-        {"mark": {"type": "rule", "color": "$grey"}, "data": {"values": [{"one": 1}]},
-         "encoding": {"x": {"field": "one", "type": "quantitative"}}},
-        {"mark": {"type": "point", "filled": True, "size": 60, "opacity": 0.9},
-         "encoding": {
-             "x": _roomy(_axis("value", "Error, as a multiple of the reference figure", log=True)),
-             "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
-             "yOffset": {"field": "row", "type": "nominal"},
-             "color": {"condition": {"test": "datum.plain", "value": "$grey"}, "value": "$second"},
-             "shape": {"condition": {"test": "datum.plain", "value": "diamond"}, "value": "circle"},
-             "tooltip": _tip(row="Estimator", scenario="Scenario", value="Multiple of the reference"),
-         }},
-    ]  # fmt: skip
+        {
+            "mark": {"type": "rule", "color": "$grey"},
+            "data": {"values": [{"one": 1}]},
+            "encoding": {"x": {"field": "one", "type": "quantitative"}},
+        },
+        {
+            "mark": {"type": "point", "filled": True, "size": 60, "opacity": 0.9},
+            "encoding": {
+                "x": _roomy(_axis("value", "Error, as a multiple of the reference figure", log=True)),
+                "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
+                "yOffset": {"field": "row", "type": "nominal"},
+                "color": {"condition": {"test": "datum.plain", "value": "$grey"}, "value": "$second"},
+                "shape": {"condition": {"test": "datum.plain", "value": "diamond"}, "value": "circle"},
+                "tooltip": _tip(row="Estimator", scenario="Scenario", value="Multiple of the reference"),
+            },
+        },
+    ]
     spec = {"height": {"step": 30}, "data": {"name": "points"}, "layer": layers}
     return Chart(name, "Robustness profile", caption, spec, data)
-
-
-def filled(chart: Chart, rows: Sequence[str], width: int = 620) -> Spec:
-    """A specification with its data, in the colours of print, that shows some rows and a legend."""
-    scales = {
-        "$colours": {"domain": list(rows), "range": [_PALETTE[k % 8] for k in range(len(rows))]},
-        "$dashes": {"domain": list(rows), "range": [_DASHES[k // 8 % 4] for k in range(len(rows))]},
-    }
-
-    def fill(item: Any) -> Any:
-        if isinstance(item, str):
-            return _INKS.get(item, scales.get(item, item))
-        if isinstance(item, list):
-            return [fill(v) for v in item]
-        if isinstance(item, Mapping):
-            found = {k: fill(v) for k, v in item.items() if k != "params"}
-            if item.get("scale") in scales:
-                found["legend"] = {"title": None, "orient": "bottom", "columns": 3}
-            return found
-        return item
-
-    given = dict(chart.spec)
-    if "layer" in given:  # points that appear on hover have no place on paper
-        given["layer"] = [x for x in given["layer"] if not any(p["name"] == "near" for p in x.get("params", ()))]
-    spec = {"$schema": "https://vega.github.io/schema/vega-lite/v6.json", "width": width, **fill(given)}
-    spec["datasets"] = {name: _expanded(d, rows) for name, d in chart.data.items() if name != "frame"}
-    if chart.equal:
-        _one_scale(spec, chart.data["frame"], width)
-    return spec
-
-
-def _expanded(data: Mapping[str, Any], rows: Sequence[str]) -> list[dict[str, Any]]:
-    if "rows" not in data:
-        return [dict(zip(data, values, strict=True)) for values in zip(*data.values(), strict=True)]
-    axis = data.get("axis")
-    found = []
-    for row in (r for r in rows if r in data["rows"]):
-        curves = data["rows"][row]
-        for k, values in enumerate(zip(*curves.values(), strict=True)):
-            at = {} if axis is None else {data["name"]: axis[k]}
-            found.append({"row": row, **at, **dict(zip(curves, values, strict=True))})
-    return found
-
-
-def _one_scale(spec: Spec, frame: Mapping[str, Sequence[float]], width: int) -> None:
-    sides = {a: 1.12 * max(frame[a][1] - frame[a][0], 1e-9) for a in ("x", "y")}
-    height = max(240.0, min(560.0, width * sides["y"] / sides["x"]))
-    metres = max(sides["x"] / width, sides["y"] / height)
-    spec["height"] = height
-    for a, pixels in (("x", width), ("y", height)):
-        middle, half = 0.5 * (frame[a][0] + frame[a][1]), 0.5 * metres * pixels
-        spec["encoding"][a]["scale"] = {"domain": [middle - half, middle + half], "nice": False, "zero": False}

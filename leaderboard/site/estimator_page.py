@@ -29,7 +29,9 @@ _COLUMNS = (
     Column("track", "Track", "Scenarios of one track are ranked together.", "text", filter=True),
     Column("group", "Difficulty", "What makes the scenario difficult.", "text", filter=True),
     Column("rank", "Rank", "On this scenario.", "integer"),
-    Column("score", "× reference", "Geometric mean of the error, divided by the reference figure of the scenario.", "ratio"),
+    Column(
+        "score", "× reference", "Geometric mean of the error, divided by the reference figure of the scenario.", "ratio"
+    ),
     Column("interval", "95 % interval", "Interval of the score.", "interval"),
     Column("failed", "Failed", "Runs that failed count as the worst.", "text"),
 )
@@ -46,7 +48,12 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
             costs.append(row.update_median)
             if row.ranked:
                 provisional = ", provisional" if row.provisional else ""
-                found.append(Fact(f"{track.title}: rank {row.ranks.replace('-', '–') or row.rank}{provisional}", tables.number(row.score)))
+                found.append(
+                    Fact(
+                        f"{track.title}: rank {row.ranks.replace('-', '–') or row.rank}{provisional}",
+                        tables.number(row.score),
+                    )
+                )
             else:
                 found.append(Fact(f"{track.title}: {row.standing}", tables.number(row.score)))
     known = [c for c in costs if c > 0.0]
@@ -55,7 +62,9 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
     return found
 
 
-def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]], scenarios: Mapping[str, ScenarioEntry]) -> dict[str, Any]:
+def runs_data(
+    label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]], scenarios: Mapping[str, ScenarioEntry]
+) -> dict[str, Any]:
     """Every run of an estimator with its ranked figure and its scores: ``data/row-NAME.js``.
 
     ``error`` is the ratio to the reference figure as the ranking counts it, by seed or recording.
@@ -99,8 +108,11 @@ def estimator_data(
     """Everything that the page of an estimator shows."""
     label = entry.label
     rows = []
-    shown = [(c, f) for c, f in SCORES_SHOWN
-             if any(label in by and math.isfinite(by[label].score(c.key).value) for by in runs.values())]  # fmt: skip
+    shown = [
+        (c, f)
+        for c, f in SCORES_SHOWN
+        if any(label in by and math.isfinite(by[label].score(c.key).value) for by in runs.values())
+    ]
     unsuitable = []
     for table in ranking.scenarios:
         if label in table.unsuitable:
@@ -109,28 +121,41 @@ def estimator_data(
         if row is None:
             continue
         scenario, cell = scenarios[table.scenario], runs[table.scenario][label]
-        rows.append({
-            "name": {"text": scenario.name, "page": scenario.page},
-            "words": scenario.title, "track": table.track, "group": scenario.group, "rank": row.rank, "score": short(row.score),
-            "interval": {"value": None, "low": short(row.low), "high": short(row.high)},
-            "failed": {"text": f"{row.failed} of {row.runs}", "value": row.failed},
-            **{c.key: short(f * cell.score(c.key).value) for c, f in shown},
-        })  # fmt: skip
+        rows.append(
+            {
+                "name": {"text": scenario.name, "page": scenario.page},
+                "words": scenario.title,
+                "track": table.track,
+                "group": scenario.group,
+                "rank": row.rank,
+                "score": short(row.score),
+                "interval": {"value": None, "low": short(row.low), "high": short(row.high)},
+                "failed": {"text": f"{row.failed} of {row.runs}", "value": row.failed},
+                **{c.key: short(f * cell.score(c.key).value) for c, f in shown},
+            }
+        )
     worst = _worst(label, ranking, runs)
     plain_row = estimators.get(PLAIN)
     return {
         "kind": "estimator",
         "label": label,
         "data": entry.data,
-        "plain": None if plain_row is None or label == PLAIN else {"label": PLAIN, "data": plain_row.data, "page": plain_row.page},
-        "table": {"name": "main", "title": f"{label} by scenario", "columns": plain((*_COLUMNS, *(c for c, _ in shown))), "rows": rows},
+        "plain": None
+        if plain_row is None or label == PLAIN
+        else {"label": PLAIN, "data": plain_row.data, "page": plain_row.page},
+        "table": {
+            "name": "main",
+            "title": f"{label} by scenario",
+            "columns": plain((*_COLUMNS, *(c for c, _ in shown))),
+            "rows": rows,
+        },
         "charts": [c.to_dict() for c in _profile(label, ranking, scenarios)],
         "rows": {label: {"reference": entry.reference}},
         "first": [label],
         "worst": None if worst is None else _worst_page(label, worst, scenarios),
         "unsuitable": unsuitable,
         "parameters": [{"name": n, "default": d, "annotation": a} for n, d, a in entry.facts.parameters],
-    }  # fmt: skip
+    }
 
 
 def _profile(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry]) -> list[charts.Chart]:
@@ -138,12 +163,21 @@ def _profile(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry
     found: list[tuple[str, ScenarioRow, str]] = []
     for table in ranking.scenarios:
         if any(r.estimator == label for r in table.rows):
-            found += [(table.scenario, r, scenarios[table.scenario].group) for r in table.rows if r.estimator in (label, PLAIN)]
+            found += [
+                (table.scenario, r, scenarios[table.scenario].group)
+                for r in table.rows
+                if r.estimator in (label, PLAIN)
+            ]
     for scenario, row, group in sorted(found, key=lambda f: (f[2], f[1].estimator != PLAIN)):
         if not (row.score > 0.0 and math.isfinite(row.score)):
             continue
-        for key, x in (("group", group), ("row", row.estimator), ("value", short(row.score)),
-                       ("scenario", scenarios[scenario].name), ("plain", row.estimator != label)):  # fmt: skip
+        for key, x in (
+            ("group", group),
+            ("row", row.estimator),
+            ("value", short(row.score)),
+            ("scenario", scenarios[scenario].name),
+            ("plain", row.estimator != label),
+        ):
             points[key].append(x)
     if not points["row"]:
         return []
@@ -174,14 +208,20 @@ def _worst_page(label: str, worst: tuple[str, Result, float], scenarios: Mapping
     for key, title, unit, _ in curves.QUANTITIES:
         if key not in one or key in ("vertical", "velocity"):
             continue
-        bound = {"time": one[key]["time"], "bound": one[key]["bound"]} if "bound" in one[key] else {"time": [], "bound": []}
+        bound = (
+            {"time": one[key]["time"], "bound": one[key]["bound"]} if "bound" in one[key] else {"time": [], "bound": []}
+        )
         data = {
             "curves": {"rows": {label: {"time": one[key]["time"], "middle": one[key]["middle"]}}},
             "faults": {"start": [], "end": [], "name": []},
             "bound": bound,
         }
-        caption = "Dashed: three times the standard deviation that the estimator states." if bound["time"] else "Of the worst run."
-        made.append(charts.over_time(f"worst-{key}", title, unit, data, caption, spread=False, bound=bool(bound["time"])))
+        caption = (
+            "Dashed: three times the standard deviation that the estimator states."
+            if bound["time"]
+            else "Of the worst run."
+        )
+        made.append(charts.over_time(f"worst-{key}", title, unit, data, caption, spread=False))
     return {
         "scenario": {"name": scenario.name, "page": scenario.page},
         "seed": result.seed,

@@ -134,11 +134,16 @@ def datasheets(scenario: Scenario | None, recording: Recording) -> list[dict[str
     specs = {} if scenario is None else scenario.instruments
     found = []
     imu = recording.instruments.imu
-    sheets = [*([] if imu is None else [(imu.name, "imu", imu)]), *((a.name, a.kind, a) for a in recording.instruments.values())]
+    sheets: list[tuple[str, str, Any]] = [
+        *([] if imu is None else [(imu.name, "imu", imu)]),
+        *((a.name, a.kind, a) for a in recording.instruments.values()),
+    ]
     for name, kind, sheet in sheets:
         table = specs[name].to_toml() if name in specs else {k: v for k, v in asdict(sheet).items() if k != "details"}
         text = _table(table, skip=("kind", "name", "rate", "rate_hz", "phase", "phase_s"))
-        found.append({"name": name, "kind": kind.replace("_", " "), "rate": f"{tables.number(sheet.rate)} Hz", "text": text})
+        found.append(
+            {"name": name, "kind": kind.replace("_", " "), "rate": f"{tables.number(sheet.rate)} Hz", "text": text}
+        )
     return found
 
 
@@ -159,7 +164,11 @@ def events(scenario: Scenario | None, recording: Recording) -> dict[str, list[An
         start, end = max(label.start, 0.0), min(label.end, recording.duration)
         if start < end:
             spec = specs.get((label.kind, tuple(label.instruments)))
-            words = "" if spec is None else _table(spec.to_toml(), skip=("kind", "instruments", "start_s", "end_s", "intervals_s"))
+            words = (
+                ""
+                if spec is None
+                else _table(spec.to_toml(), skip=("kind", "instruments", "start_s", "end_s", "intervals_s"))
+            )
             name = label.kind.replace("_", " ")
             rows.append((f"{name}: {', '.join(label.instruments) or 'all'}", name, start, end, words))
     keys = ("group", "name", "start", "end", "words")

@@ -1,20 +1,18 @@
-"""The chart library of the site: one copy of Vega, Vega-Lite and Vega-Embed, and figures for print.
-
-All of it comes from the package vl-convert, which holds the libraries and needs neither a browser nor a network.
-"""
+"""The chart library of the site: one copy of Vega, Vega-Lite and Vega-Embed, as the package vl-convert holds them."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 from simnav.leaderboard.results.files import write_whole
 
-__all__ = ["VEGA_LITE", "bundle", "write_figure"]
+__all__ = ["VEGA_LITE", "bundle"]
 
 #: Version of Vega-Lite that the specifications are written for.
 VEGA_LITE = "6.4"
+
+_SETS = "window.vega = vega; window.vegaLite = vegaLite; window.vegaEmbed = vegaEmbed;"
 
 _LICENCE = """\
 /*! Vega, Vega-Lite and Vega-Embed. Copyright (c) 2015-2026, University of Washington Interactive Data Lab and
@@ -39,14 +37,15 @@ def bundle() -> str:
 
     Putting it together takes seconds, so it is kept in the user's cache, once for each version.
     """
-    import vl_convert
+    from importlib.metadata import version
 
-    version = f"{vl_convert.__version__}-{VEGA_LITE}"
-    kept = _cache() / f"vega-{version}.js"
+    kept = _cache() / f"vega-{version('vl-convert-python')}-{VEGA_LITE}.js"
     try:
         return kept.read_text(encoding="utf-8")
     except OSError:
-        made = _LICENCE + vl_convert.javascript_bundle(vl_version=VEGA_LITE)
+        import vl_convert
+
+        made = _LICENCE + vl_convert.javascript_bundle(_SETS, vl_version=VEGA_LITE)
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
         write_whole(kept, made)
@@ -58,12 +57,3 @@ def bundle() -> str:
 def _cache() -> Path:
     home = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(home) if os.path.isabs(home) else Path.home() / ".cache") / "simnav"
-
-
-def write_figure(spec: dict[str, Any], path: Path) -> list[Path]:
-    """Write a specification with its data as ``PATH.svg`` and ``PATH.png``, for print."""
-    import vl_convert
-
-    svg = vl_convert.vegalite_to_svg(spec, vl_version=VEGA_LITE)
-    png = vl_convert.svg_to_png(svg, scale=2.0)
-    return [write_whole(path.with_suffix(".svg"), svg), write_whole(path.with_suffix(".png"), png)]

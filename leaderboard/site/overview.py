@@ -18,26 +18,62 @@ __all__ = ["BOARD_COLUMNS", "bar_scale", "board_columns", "board_row", "overview
 
 _WIDEST = 100.0  # largest ratio on the scale of the bars
 
-_NAME = Column("name", "Estimator", "The name leads to the page of the estimator. Hollow rows are references: they are told the truth and are not ranked.", "name", fixed=True)  # fmt: skip
+_NAME = Column(
+    "name",
+    "Estimator",
+    "The name leads to the page of the estimator. Hollow rows are references, which are told the truth and not ranked.",
+    "name",
+    fixed=True,
+)
 _BEFORE = (
     Column("rank", "Rank", "Position by score. Equal scores share a rank.", "integer"),
     _NAME,
     Column("ranks", "Ranks", "Interval of the rank. The intervals of all rows hold together with 95 % probability."),
-    Column("tier", "Tier", "Rows of one tier cannot be told apart by these runs. Bands show the tiers.", "integer", wide=True),
+    Column(
+        "tier",
+        "Tier",
+        "Rows of one tier cannot be told apart by these runs. Bands show the tiers.",
+        "integer",
+        wide=True,
+    ),
 )
 _AFTER = (
     Column("family", "Family", "Kind of method.", "text", filter=True),
-    Column("badge", "Consistency", "Whether the stated covariance agrees with the errors while faults act: optimistic where the errors are larger.", "badge", filter=True),
-    Column("coverage", "95 % coverage", "Mean share of the epochs at which the truth lies in the stated 95 % ellipse, from the first fault of a run on.", "percent"),
+    Column(
+        "badge",
+        "Consistency",
+        "Whether the stated covariance agrees with the errors from the first fault on; optimistic: errors are larger.",
+        "badge",
+        filter=True,
+    ),
+    Column(
+        "coverage",
+        "95 % coverage",
+        "Mean share of the epochs, from the first fault of a run on, with the truth in the stated 95 % ellipse.",
+        "percent",
+    ),
     Column("clean_badge", "Consistency, clean", "The same before the first fault of a run.", "badge", hidden=True),
-    Column("clean_coverage", "95 % coverage, clean", "The same before the first fault of a run.", "percent", hidden=True),
-    Column("failed", "Failed", "Runs with an exception, an invalid output, a timeout, too much memory or a diverged estimate. They count as the worst.", "text"),
-    Column("p95", "95 % of runs", "Ratio to the reference figure that 95 % of the runs do not exceed.", "ratio", hidden=True),
+    Column(
+        "clean_coverage", "95 % coverage, clean", "The same before the first fault of a run.", "percent", hidden=True
+    ),
+    Column(
+        "failed",
+        "Failed",
+        "Runs with an exception, an invalid output, a timeout, too much memory or divergence. They count as the worst.",
+        "text",
+    ),
+    Column(
+        "p95",
+        "95 % of runs",
+        "Ratio to the reference figure that 95 % of the runs do not exceed.",
+        "ratio",
+        hidden=True,
+    ),
     Column("worst", "Worst run", "Largest ratio to the reference figure of a run.", "ratio", hidden=True),
     Column("p", "p-value", "Adjusted for all pairs of rows, against the row with the best score.", "p", hidden=True),
     Column("cost", "Time per epoch", "Median wall-clock time of one epoch.", "duration"),
     Column("memory", "Memory", "Largest memory of all runs.", "size", hidden=True),
-)  # fmt: skip
+)
 
 #: Columns whose meaning does not depend on the board.
 BOARD_COLUMNS = tuple(c for c in (*_BEFORE, *_AFTER) if c is not _NAME)
@@ -50,7 +86,9 @@ def bar_scale(rows: Sequence[Row]) -> tuple[float, float]:
     return low, max(min(max(ends, default=2.0), low * _WIDEST), low * 1.5)
 
 
-def board_columns(title: str, explanation: str, scale: tuple[float, float], more: Sequence[Column] = ()) -> list[dict[str, Any]]:
+def board_columns(
+    title: str, explanation: str, scale: tuple[float, float], more: Sequence[Column] = ()
+) -> list[dict[str, Any]]:
     """Columns of a board; ``more`` stand at the end."""
     score = (
         Column("score", title, explanation, "ratio"),
@@ -68,7 +106,7 @@ def board_row(
     ``same`` are the references that have the same result; ``provisional`` says that all of the board is, so that a row
     need not say it.
     """
-    notes = [] if row.ranked else [row.standing]
+    notes: list[str] = [] if row.ranked else [row.standing]
     if row.ranked and row.provisional and not provisional:
         notes.append("provisional")
     if same:
@@ -125,11 +163,15 @@ def _track(
 ) -> dict[str, Any]:
     title = "× reference" if track.relative else "Error [m]"
     explanation = (
-        "Geometric mean of the error of each run, divided by the reference figure of its scenario. Each scenario counts the "
-        "same." if track.relative else "Geometric mean of the error of each run."
-    )  # fmt: skip
+        "Geometric mean of the error of each run, divided by the reference figure of its scenario. Each scenario "
+        "counts the same."
+        if track.relative
+        else "Geometric mean of the error of each run."
+    )
     more = [
-        Column(f"s:{s}", scenarios[s].name, f"{title} on {scenarios[s].title or scenarios[s].name}.", "ratio", hidden=True)
+        Column(
+            f"s:{s}", scenarios[s].name, f"{title} on {scenarios[s].title or scenarios[s].name}.", "ratio", hidden=True
+        )
         for s in track.scenarios
     ]
     every = all(r.provisional for r in track.rows if r.ranked)
@@ -144,7 +186,8 @@ def _track(
         "title": track.title,
         "remarks": list(track.remarks),
         "provisional": track.provisional,
-        "facts": f"{len(track.scenarios)} scenarios, {len(scored)} ranked estimators, at least {track.units} {track.unit}s each",
+        "facts": f"{len(track.scenarios)} scenarios, {len(scored)} ranked estimators, "
+        f"at least {track.units} {track.unit}s each",
         "table": {
             "name": track.track,
             "title": f"{track.title}: ranking",
@@ -152,7 +195,10 @@ def _track(
             "rows": rows,
         },
         "charts": [c.to_dict() for c in _charts(track, scored, title, estimators, runs)],
-        "scenarios": [{"id": s, "name": scenarios[s].name, "title": scenarios[s].title, "page": scenarios[s].page} for s in track.scenarios],
+        "scenarios": [
+            {"id": s, "name": scenarios[s].name, "title": scenarios[s].title, "page": scenarios[s].page}
+            for s in track.scenarios
+        ],
         "ratios": {r.estimator: {s: short(v, 6) for s, v in r.ratios.items()} for r in scored},
     }
 
@@ -184,19 +230,29 @@ def _charts(
     made = []
     if len(costed) > 1:
         front = _front([(r.update_median, r.score) for r in costed])
-        data = {"rows": {
-            "row": [r.estimator for r in costed], "cost": [short(1e3 * r.update_median) for r in costed],
-            "error": [short(r.score) for r in costed], "family": [estimators[r.estimator].facts.family for r in costed],
-            "front": front,
-        }}  # fmt: skip
+        data = {
+            "rows": {
+                "row": [r.estimator for r in costed],
+                "cost": [short(1e3 * r.update_median) for r in costed],
+                "error": [short(r.score) for r in costed],
+                "family": [estimators[r.estimator].facts.family for r in costed],
+                "front": front,
+            }
+        }
         made.append(accuracy_and_cost(f"{track.track}-cost", f"Score ({title})", data))
     nees = _scores(track, rows, runs, "nees_horizontal")
     if nees["middles"]["row"]:
-        made.append(spread(
-            f"{track.track}-nees", "Consistency", "NEES by degree of freedom", nees,
-            "Ticks: median of a scenario. Point and line: median and range over the scenarios. In the band the covariance "
-            "agrees with the errors; to the right the estimator is optimistic.", ideal=(0.7, 1.5),
-        ))  # fmt: skip
+        made.append(
+            spread(
+                f"{track.track}-nees",
+                "Consistency",
+                "NEES by degree of freedom",
+                nees,
+                "Ticks: median of a scenario. Point and line: median and range over the scenarios. In the band the "
+                "covariance agrees with the errors; to the right the estimator is optimistic.",
+                ideal=(0.7, 1.5),
+            )
+        )
     found = _medians(track, rows, runs)
     if len(found["row"]) > 1:
         made.append(detection(f"{track.track}-detection", {"rows": found}))
@@ -229,8 +285,12 @@ def _scores(
                     ticks[key].append(x)
         if values:
             values.sort()
-            for key, x in (("row", row.estimator), ("value", short(values[len(values) // 2])),
-                           ("low", short(values[0])), ("high", short(values[-1]))):  # fmt: skip
+            for key, x in (
+                ("row", row.estimator),
+                ("value", short(values[len(values) // 2])),
+                ("low", short(values[0])),
+                ("high", short(values[-1])),
+            ):
                 middles[key].append(x)
     return {"runs": ticks, "middles": middles}
 

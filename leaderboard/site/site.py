@@ -28,7 +28,7 @@ from simnav.leaderboard.site.columns import glossary
 from simnav.leaderboard.site.content import EstimatorEntry, ExtraPage, Fact, ScenarioEntry, SiteFacts, slug
 from simnav.leaderboard.site.estimator_page import estimator_data, facts_of, runs_data
 from simnav.leaderboard.site.facts import catalogued, estimator_facts, name_of, toml_of
-from simnav.leaderboard.site.library import bundle, write_figure
+from simnav.leaderboard.site.library import bundle
 from simnav.leaderboard.site.overview import BOARD_COLUMNS, overview
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 from simnav.leaderboard.site.scenario_page import RUNS_SHOWN, ScenarioData, scenario_data
@@ -229,7 +229,9 @@ class _Site:
             self._page(pages, "estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
                        data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
         tracks = overview(self.ranking, self.estimators, self.scenarios, self.runs)
-        self._page(pages, "index.html", "index.html", {"kind": "index", "tracks": tracks}, tracks=tracks, facts=self._counts())
+        self._page(
+            pages, "index.html", "index.html", {"kind": "index", "tracks": tracks}, tracks=tracks, facts=self._counts()
+        )
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
         self._page(pages, "compare.html", "compare.html", {"kind": "compare", "rows": rows})
         self._page(pages, "about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
@@ -288,7 +290,7 @@ class _Site:
         (self.folder / "data" / f"{name}.js").write_text(text, encoding="utf-8")
 
     def _print(self, scenario: ScenarioEntry, found: ScenarioData) -> None:
-        from simnav.leaderboard.site.charts import filled
+        from simnav.leaderboard.site.print_figures import filled, write_figure
 
         (self.folder / "figures").mkdir(exist_ok=True)
         for chart in found.charts:

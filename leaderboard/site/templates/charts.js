@@ -114,6 +114,9 @@
       spec.$schema = "https://vega.github.io/schema/vega-lite/v6.json";
       spec.width ??= width;
       spec.datasets = Object.fromEntries(Object.entries(data).map(([name, d]) => [name, expand(d, shown.rows ?? [])]));
+      // A layer without data would only spoil the scales.
+      if (spec.layer) spec.layer = spec.layer.filter((l) => !l.data?.name || spec.datasets[l.data.name]?.length);
+      if (spec.layer && !spec.layer.length) return this.place.replaceChildren("There is nothing to show.");
       if (given.equal) equal(spec, data.frame, width);
       delete spec.datasets.frame;
       this.view?.finalize();
