@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.leaderboard.figures.run_figure import fixes, true_track
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.charts import Chart, short
@@ -367,7 +368,11 @@ def _one_run(seed: int, runs: Mapping[str, Runs], rows: Sequence[str], recording
         **chart_of(recording, [r for n in rows for r in runs[n].good if r.seed == seed]),
     }
     notes = [r.note for n in rows for r in runs[n].results if r.seed == seed and r.note]
-    return {"seed": seed, "note": notes[0] if notes else "", "charts": data}
+    drawn = next((r.draws for n in rows for r in runs[n].results if r.seed == seed and r.draws), {})
+    draws = ", ".join(
+        f"{key} {tables.number(value)}" for key, value in drawn.items() if isinstance(value, (int, float))
+    )
+    return {"seed": seed, "note": notes[0] if notes else "", "draws": draws, "charts": data}
 
 
 def chart_of(recording: Recording | None, results: Sequence[Result]) -> dict[str, Any]:

@@ -16,7 +16,7 @@
     const { ink, grey, grid } = inks[name];
     return {
       background: null, font: "system-ui, sans-serif", view: { stroke: null }, mark: { color: palettes[name][0] },
-      axis: { labelColor: ink, titleColor: ink, tickColor: grey, domainColor: grey, gridColor: grid, labelFontSize: 11, titleFontSize: 12, titleFontWeight: 500, labelOverlap: true },
+      axis: { labelColor: ink, titleColor: ink, tickColor: grey, domainColor: grey, gridColor: grid, labelFontSize: 11, titleFontSize: 12, titleFontWeight: 500, labelOverlap: true, labelSeparation: 6 },
       legend: { labelColor: ink, titleColor: ink, orient: "bottom" }, header: { labelColor: ink, titleColor: ink }, title: { color: ink },
     };
   };
@@ -125,6 +125,7 @@
         actions: { export: { svg: true, png: true }, source: false, compiled: false, editor: false },
       });
       this.view = found.view;
+      this.place.querySelector("summary")?.setAttribute("aria-label", `Save ${given.title} as SVG or PNG`);
       this.place.dataset.drawn = "true";
     }
 

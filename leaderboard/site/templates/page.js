@@ -121,6 +121,7 @@
       charts.hidden = !page.runs.seeds.includes(seed);
       if (charts.hidden) return;
       const name = `${data}-run-${seed}`, read = await simnav.read(name);
+      if (read.draws) facts.textContent += ` Drawn for this run: ${read.draws}.`;
       if (!made) made = page.runs.charts.map((chart) => simnav.chart(charts, { ...chart, data: read.charts[chart.name] }));
       else for (const chart of made) chart.show({ data: read.charts[chart.given.name] });
     };

@@ -68,7 +68,7 @@
       this.head = make("tr");
       this.status = make("span", { class: "count", role: "status" });
       const tools = make("div", { class: "tools" });
-      if (given.rows.length > 5 || given.search) {
+      if (given.rows.length > 4 || given.search) {
         const field = make("input", { type: "search", "aria-label": `Search in ${given.title}`, placeholder: "Search", value: this.words });
         field.addEventListener("input", () => { this.words = field.value; state.set(param("q"), field.value); this.draw(); });
         tools.append(field);
