@@ -7,12 +7,23 @@ the right model the separation d has the covariance
     cov(d) = P_i - P_0                                              (R. G. Brown and P. W. McBurney 1988)
 
 which gives the threshold of the test, component by component of the position, velocity and heading:
-``T_i = K_fa sqrt(P_i - P_0)``. Where a test fails, an instrument is excluded: of those whose test fails, the one whose
+``T_i = K_fa sqrt(P_i - P_0)``. Where a test fails, an instrument is excluded: of those with a large separation, the one whose
 sub-filter is in the best agreement with the instruments that it uses (the least mean NIS of its worst instrument over
-`_RECENT` seconds; residual monitoring after Young and McGraw). Its sub-filter becomes the main one, so that what the
-fault has done so far is undone, too.
+`_RECENT` seconds; residual monitoring after Young and McGraw). Where several agree (a mean NIS of up to `_AGREEMENT`),
+it is one on probation (see below), else that of the largest separation. Its sub-filter becomes the main one, so that what the fault has done so far is
+undone, too.
 
-An excluded instrument is tried on: when it has agreed with the main filter for ``recovery`` seconds it is used again.
+Where a fix is excluded, the sub-filter without the log is kept beside, and the other way round: the hypothesis that was
+not chosen. If the instrument that was believed fails a test in its turn, and the one excluded agrees with all others in
+that filter, the two change places.
+
+Single gross errors are none of this: a measurement that the main filter finds improbable (`_NOT_GROSS`) is left out of
+all filters, unless its instrument goes on so for `_PATIENCE` seconds.
+
+An excluded instrument is tried on: when it has agreed with the main filter for ``recovery`` seconds it is used again;
+twice as long after every further exclusion, up to `_LONGEST` times. For the next ``horizon`` seconds it is on
+probation: if any test fails, it is suspected, too. Fixes and logs are out together for `_COASTING` seconds at most, since an
+IMU alone is soon worse than either: then the logs are used again or, where they are silent, the fixes.
 
 **Protection level.** For the north and the east component, with the sigmas of main and sub-filters, ::
 
@@ -38,7 +49,7 @@ algorithm and possible improvements*, IEEE Trans. Aerospace and Electronic Syste
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import exp, hypot, sqrt
 from typing import ClassVar
@@ -49,6 +60,7 @@ from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.noise import normalised_square
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
+from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.state_difference import difference
@@ -62,41 +74,77 @@ _TESTED = (0, 1, 2, 3, 4, 5, 8)
 _LINEARISATION = 0.1
 #: Memory of the mean NIS of an instrument in a filter [s].
 _RECENT = 10.0
+#: A mean NIS by component up to this is no disagreement.
+_AGREEMENT = 2.0
+#: Where a test fails, an instrument is suspected if its separation is more than this part of the largest, each over
+#: its threshold. Were there two sources only, both would be the same.
+_SUSPECT = 0.3
+#: Most that ``recovery`` is multiplied by.
+_LONGEST = 16
+#: Longest time without fixes and logs by exclusion [s].
+_COASTING = 60.0
+#: An instrument that has said nothing for so long, or for three periods, is silent [s].
+_SILENCE = 5.0
+#: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
+_NOT_GROSS, _PATIENCE = 0.99999, 5.0
 #: Of a good measurement to agree with the main filter.
 _AGREES = 0.999
 
 
 class _Exclusion(Adaptation):
-    """Leaves the excluded instruments out, and notes since when each has agreed with the filter."""
+    """Leaves the excluded instruments and single gross errors out; notes since when an excluded one has agreed."""
 
     def __init__(self) -> None:
         self.excluded: set[str] = set()
         self.agrees_since: dict[str, float] = {}
-        self._limits = chi_square_limits(_AGREES)
-
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        self.excluded, self.agrees_since = set(), {}
+        self.gross: set[tuple[str, float]] = set()
+        self._failing: dict[str, float] = {}
+        self._agrees, self._gross = chi_square_limits(_AGREES), chi_square_limits(_NOT_GROSS)
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """The nominal noise, or None."""
         name, time = innovation.measurement.instrument, innovation.measurement.time
-        if name not in self.excluded:
-            return innovation.noise
         nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
-        if nis <= self._limits[len(innovation.residual)]:
-            self.agrees_since.setdefault(name, time)
-        else:
-            self.agrees_since.pop(name, None)
-        return None
+        m = len(innovation.residual)
+        if name in self.excluded:
+            if nis <= self._agrees[m]:
+                self.agrees_since.setdefault(name, time)
+            else:
+                self.agrees_since.pop(name, None)
+            return None
+        if nis <= self._gross[m]:
+            self._failing.pop(name, None)
+        elif time - self._failing.setdefault(name, time) < _PATIENCE:
+            self.gross.add((name, time))
+            return None
+        return innovation.noise
+
+
+class _Watched(KalmanEstimator):
+    """The filter, with the fading mean of the NIS by component of each instrument."""
+
+    mean_nis: dict[str, float]
+
+    def take_over(self, other: _Watched) -> None:
+        """Go on from the state of another one."""
+        self.model.take_over(other.model)
+        self.covariance[...] = other.covariance
+        self.mean_nis = dict(other.mean_nis)
+
+    def watch(self, estimate: Estimate, components: Mapping[str, int], fading: float) -> None:
+        """Take a step into the means; components by instrument."""
+        for name, m in components.items():
+            nis = float(estimate.diagnostics.get(f"nis.{name}", np.nan))
+            if nis == nis:
+                self.mean_nis[name] = fading * self.mean_nis.get(name, 1.0) + (1.0 - fading) * nis / m
 
 
 @dataclass
 class _Without:
-    """A sub-filter: the instrument that it does without, when it was begun, its estimate and the mean NIS."""
+    """A sub-filter: the instrument that it does without, when it was begun, and its estimate."""
 
     name: str
-    filter: KalmanEstimator
+    filter: _Watched
     begun: float
     estimate: Estimate | None = None
 
@@ -148,24 +196,22 @@ class SolutionSeparation(Solver):
         self.false_alarm, self.horizon, self.recovery = false_alarm, horizon, recovery
         self.risk, self.fault_probability = risk, fault_probability
 
-    def _filter(self, start: InitialState, instruments: Instruments, exclusion: _Exclusion | None) -> KalmanEstimator:
-        one = KalmanEstimator(copy.deepcopy(self._choice), exclusion)
-        one.row = self.label
-        one.reset(start, instruments)
+    def _filter(self, exclusion: _Exclusion | None = None) -> _Watched:
+        one = _Watched(copy.deepcopy(self._choice), exclusion)
+        one.row, one.mean_nis = self.label, {}
+        one.reset(*self._begin_with)
         return one
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         from scipy.stats import norm
 
+        self._begin_with = start, instruments
         self._exclusion = _Exclusion()
-        self._main = self._filter(start, instruments, self._exclusion)
+        self._main = self._filter(self._exclusion)
         self._names = [name for name, sheet in instruments.items() if self._main.model.observes(sheet)]
         self._components = {name: len(KINDS[instruments[name].kind].errors) for name in self._names}
-        self._pairs = {
-            name: [_Without(name, self._filter(start, instruments, None), start.time) for _ in range(2)]
-            for name in self._names
-        }
+        self._pairs = {name: [_Without(name, self._filter(), start.time) for _ in range(2)] for name in self._names}
         for _, younger in self._pairs.values():
             younger.begun = start.time - 0.5 * self.horizon  # so that the two come of age in turns
         tests = max(len(self._names), 1) * len(_TESTED)
@@ -174,7 +220,13 @@ class SolutionSeparation(Solver):
         self._quiet = float(norm.isf(0.25 * self.risk / hypotheses))
         share = self.risk / (2.0 * hypotheses * self.fault_probability)
         self._missed = float(norm.isf(min(share, 0.5)))
-        self._nis: dict[int, dict[str, float]] = {}
+        self._group = fixes_and_logs(instruments)
+        self._coasting: float | None = None
+        self._heard = dict.fromkeys(self._names, start.time)
+        self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
+        self._readmitted: dict[str, float] = {}
+        self._count = dict.fromkeys(self._names, 0)
+        self._alternatives: dict[str, _Without] = {}
         self._time = start.time
 
     @property
@@ -194,25 +246,26 @@ class SolutionSeparation(Solver):
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
-        out = self._exclusion.excluded
+        out, gross = self._exclusion.excluded, self._exclusion.gross
+        gross.clear()
         estimate = self._main.update(measurements)
         fading = exp(-max(measurements.time - self._time, 0.0) / _RECENT)
-        self._note(self._main, estimate, fading)
+        self._main.watch(estimate, self._components, fading)
         self._time = measurements.time
-        for name in self._names:
-            if name in out:
-                continue
-            left = [m for m in measurements.aids if m.instrument != name and m.instrument not in out]
+        self._heard.update({m.instrument: m.time for m in measurements.aids if m.instrument in self._heard})
+        running = [(sub, {sub.name, *out}) for name in self._names if name not in out for sub in self._pairs[name]]
+        running += [(sub, {sub.name}) for sub in self._alternatives.values()]
+        for sub, without in running:
+            left = [m for m in measurements.aids if m.instrument not in without and (m.instrument, m.time) not in gross]
             packet = Measurements(measurements.start, measurements.time, measurements.imu, left)
-            for sub in self._pairs[name]:
-                sub.estimate = sub.filter.update(packet)
-                self._note(sub.filter, sub.estimate, fading)
+            sub.estimate = sub.filter.update(packet)
+            sub.filter.watch(sub.estimate, self._components, fading)
         flagged = list(estimate.flagged)
         ratios = {name: self._separation(name, estimate) for name in self._names if name not in out}
-        wrong = [name for name, ratio in ratios.items() if ratio > 1.0]
+        most = max(ratios.values(), default=0.0)
         diagnostics = dict(estimate.diagnostics)
-        if wrong:
-            guilty = min(wrong, key=self._disagreement)
+        if most > 1.0:
+            guilty = self._guilty([name for name, ratio in ratios.items() if ratio > _SUSPECT * most], ratios)
             estimate = self._exclude(guilty)
             flagged += [(guilty, m.time) for m in measurements.aids if m.instrument == guilty]
         self._readmit(measurements.time)
@@ -224,19 +277,24 @@ class SolutionSeparation(Solver):
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 
-    def _note(self, one: KalmanEstimator, estimate: Estimate, fading: float) -> None:
-        """Take the NIS of a step into the means of a filter."""
-        means = self._nis.setdefault(id(one), {})
-        for name in self._names:
-            nis = estimate.diagnostics.get(f"nis.{name}", np.nan)
-            if nis == nis:
-                means[name] = fading * means.get(name, 1.0) + (1.0 - fading) * float(nis) / self._components[name]
+    def _disagreement(self, sub: _Without, out: Collection[str]) -> float:
+        """The largest mean NIS of an instrument in a sub-filter."""
+        means = sub.filter.mean_nis
+        return max((v for n, v in means.items() if n != sub.name and n not in out), default=1.0)
 
-    def _disagreement(self, name: str) -> float:
-        """The largest mean NIS of an instrument in the elder sub-filter without ``name``."""
-        means = self._nis.get(id(self._elder(name).filter), {})
-        used = [v for n, v in means.items() if n != name and n not in self._exclusion.excluded]
-        return max(used, default=1.0)
+    def _guilty(self, suspects: list[str], ratios: Mapping[str, float]) -> str:
+        """Of the suspects and the instruments on probation, the one to exclude."""
+        probation = {
+            name for name, since in self._readmitted.items() if self._time - since < self.horizon and name in ratios
+        }
+        return min(
+            {*suspects, *probation},
+            key=lambda n: (
+                max(self._disagreement(self._elder(n), self._exclusion.excluded), _AGREEMENT),
+                n not in probation,
+                -ratios[n],
+            ),
+        )
 
     def _elder(self, name: str) -> _Without:
         return min(self._pairs[name], key=lambda sub: sub.begun)
@@ -264,11 +322,23 @@ class SolutionSeparation(Solver):
 
     def _exclude(self, name: str) -> Estimate:
         """Take the sub-filter without an instrument for the main filter; all others begin anew from it."""
+        excluded, before = self._exclusion.excluded, self._alternatives.pop(name, None)
         chosen = self._elder(name)
+        if before is not None and self._disagreement(before, ()) <= _AGREEMENT:
+            chosen = before  # it was another one that should have been excluded
+            excluded.clear()
+        elif not excluded:
+            self._alternatives = {n: self._elder(n) for n in self._group if n != name and name in self._group}
+            for n, sub in self._alternatives.items():
+                self._pairs[n] = [other for other in self._pairs[n] if other is not sub]
+                self._pairs[n].append(_Without(n, self._filter(), self._time))
+        if excluded or chosen is before:
+            self._alternatives = {}
         assert chosen.estimate is not None
-        self._exclusion.excluded.add(name)
+        self._count[name] += 1
         self._exclusion.agrees_since.pop(name, None)
-        self._take_over(self._main, chosen.filter)
+        excluded.add(name)
+        self._main.take_over(chosen.filter)
         for other in self._names:
             for k, sub in enumerate(self._pairs[other]):
                 self._begin(sub, self._time - 0.5 * self.horizon * k, chosen.estimate)
@@ -276,12 +346,27 @@ class SolutionSeparation(Solver):
 
     def _readmit(self, time: float) -> None:
         """Use instruments again that have agreed for long enough."""
-        for name, since in list(self._exclusion.agrees_since.items()):
-            if time - since >= self.recovery:
-                self._exclusion.excluded.discard(name)
-                del self._exclusion.agrees_since[name]
-                for k, sub in enumerate(self._pairs[name]):
-                    self._begin(sub, time - 0.5 * self.horizon * k, None)
+        excluded, agrees = self._exclusion.excluded, self._exclusion.agrees_since
+        again = [
+            name
+            for name, since in agrees.items()
+            if time - since >= self.recovery * min(2.0 ** (self._count[name] - 1), _LONGEST)
+        ]
+        heard = [name for name in self._group if time - self._heard[name] <= self._silence[name]]
+        coasting = bool(heard) and set(heard) <= excluded
+        self._coasting = (time if self._coasting is None else self._coasting) if coasting else None
+        if self._coasting is not None and time - self._coasting >= _COASTING:
+            again += [n for n in [n for n in heard if not self._group[n]] or heard if n not in again]
+        if again:
+            self._alternatives = {}
+        for name in again:
+            excluded.discard(name)
+            self._readmitted[name] = time
+            agrees.pop(name, None)
+            for one in (self._main, *(sub.filter for pair in self._pairs.values() for sub in pair)):
+                one.mean_nis.pop(name, None)
+            for k, sub in enumerate(self._pairs[name]):
+                self._begin(sub, time - 0.5 * self.horizon * k, None)
 
     def _renew(self, time: float) -> None:
         """Begin sub-filters anew that have come of age."""
@@ -289,17 +374,13 @@ class SolutionSeparation(Solver):
             for sub in self._pairs[name]:
                 if time - sub.begun >= self.horizon and name not in self._exclusion.excluded:
                     self._begin(sub, time, None)
+        self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.begun < 2.0 * self.horizon}
 
     def _begin(self, sub: _Without, time: float, estimate: Estimate | None) -> None:
         """Begin a sub-filter from the main filter's state."""
-        self._take_over(sub.filter, self._main)
+        sub.filter.take_over(self._main)
         sub.begun = time
         sub.estimate = estimate if estimate is not None else self._main.model.estimate(self._main.covariance)
-
-    def _take_over(self, one: KalmanEstimator, other: KalmanEstimator) -> None:
-        one.model.take_over(other.model)
-        one.covariance[...] = other.covariance
-        self._nis[id(one)] = dict(self._nis.get(id(other), {}))
 
     def _protection_level(self, estimate: Estimate) -> float:
         """The horizontal protection level [m]."""

@@ -156,7 +156,9 @@ class StudentTSmoother(Smoother):
         # `Stretches.correction` is that at the beginning of a stretch; those of the last stop are still here.
         moved = np.concatenate([*(s.correction[: s.count] for s in self._stretches), self._here[None]])
         first = p[0] if len(p) else covariance
-        shift, spread = self._smoothed(np.ascontiguousarray(phi), 0.5 * (process + process.swapaxes(1, 2)), moved, first)
+        shift, spread = self._smoothed(
+            np.ascontiguousarray(phi), 0.5 * (process + process.swapaxes(1, 2)), moved, first
+        )
         states = [state for s in self._stretches for state in s.states] + [model.snapshot()]
         for stop in range(len(states) - 1, -1, -1):
             yield stop, states[stop], shift[stop], spread[stop]
@@ -188,7 +190,9 @@ class StudentTSmoother(Smoother):
                 residual = known - np.einsum("jin,jn->ji", jacobians, at)
                 seen = np.einsum("jin,jnk,jlk->jil", jacobians, spread[of_stop], jacobians, optimize=True)
                 for j, d in enumerate(sizes.tolist()):
-                    noise, e, a = (np.ascontiguousarray(x) for x in (noises[j, :d, :d], residual[j, :d], seen[j, :d, :d]))
+                    noise, e, a = (
+                        np.ascontiguousarray(x) for x in (noises[j, :d, :d], residual[j, :d], seen[j, :d, :d])
+                    )
                     trace = normalised_trace(noise, e, a)
                     if trace >= 0.0:
                         new[j] = (self.dof + d) / (self.dof + trace)
