@@ -24,7 +24,6 @@ from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
 from simnav.scenario import Scenario
 
 if TYPE_CHECKING:
-    from simnav.contract_check import Report
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.rescoring import Rescored
@@ -34,8 +33,10 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.costs import CostReport
     from simnav.leaderboard.ranking.ranking import Ranking
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
+    from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.recording import Recording
+    from simnav.testing.contract_check import Report
 
 __all__ = [
     "EstimatorLike",
@@ -47,6 +48,7 @@ __all__ = [
     "bound",
     "campaign",
     "check",
+    "cite",
     "evaluate",
     "make",
     "quick_estimators",
@@ -121,14 +123,14 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
 
     Returns
     -------
-    simnav.contract_check.Report
+    simnav.testing.contract_check.Report
 
     Raises
     ------
     ValueError
         If there is no such estimator, or it cannot be made.
     """
-    from simnav.contract_check import check
+    from simnav.testing.contract_check import check
 
     return check(one_request(estimator, parameters).make)
 
@@ -408,6 +410,28 @@ def rescore(
         return rescore_results(_absolute(results), [n.strip() for n in names if n.strip()], given, progress)
 
 
+def cite(results: str | os.PathLike[str] | None = None) -> Citation:
+    """How to cite this version of simnav, or results.
+
+    Parameters
+    ----------
+    results : path, optional
+        Folder that a campaign wrote; default: simnav itself.
+
+    Returns
+    -------
+    Citation
+
+    Examples
+    --------
+    >>> print(cite().bibtex.splitlines()[0])
+    @software{simnav,
+    """
+    from simnav.leaderboard.results.citation import citation
+
+    return citation(None if results is None else [r.provenance for r in results_of(results)])
+
+
 def bound(
     scenario: ScenarioLike,
     *,
@@ -542,7 +566,8 @@ def quick_estimators(note: Callable[[str], None] | None = None) -> list[str]:
 
 
 def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[Result]:
-    """The current results of a folder; ``series`` are what figures need."""
+    """The current results of a folder, all of one version of the benchmark; ``series`` are what charts need."""
+    from simnav.leaderboard.results.provenance import benchmark_of
     from simnav.leaderboard.results.store import StoreError, load
 
     path = _absolute(folder)
@@ -550,6 +575,7 @@ def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[
         results = load(path, series=series)
     if not results:
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
+    benchmark_of(r.provenance for r in results)
     return results
 
 

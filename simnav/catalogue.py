@@ -45,6 +45,8 @@ class Header:
         Length of a run [s].
     tags : tuple of str
         Words by which lists are filtered; ``long`` is left out of quick campaigns.
+    track, group : str
+        Scenarios of one track are ranked together; a group is what some of them have in common.
     path : Path
         Path of the TOML file.
     """
@@ -54,6 +56,8 @@ class Header:
     title: str
     duration: float
     tags: tuple[str, ...]
+    track: str
+    group: str
     path: Path
 
     @property
@@ -147,6 +151,8 @@ def _header(path: Path) -> Header | None:
         title=str(table.get("title", "")),
         duration=float(duration),
         tags=tuple(map(str, tags)) if isinstance(tags, list) else (),
+        track=str(table.get("track", "other")),
+        group=str(table.get("group", "other")),
         path=path,
     )
 

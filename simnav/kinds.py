@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from simnav.compiled import Array
-from simnav.earth import displace, relative_position
+from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.rotation import wrap_angle
 from simnav.plugins import PluginError, Registry
-from simnav.rotation import wrap_angle
 
 if TYPE_CHECKING:
     from simnav.types import Datasheet

@@ -86,6 +86,8 @@ class Scenario(Spec):
     description: str = Field("", description="what happens and why, for the reader of the board")
     source: str = Field("", description="paper or data that it follows")
     tags: tuple[str, ...] = Field((), description="free words to select by")
+    track: str = Field("other", description="kebab-case; scenarios of one track are ranked together")
+    group: str = Field("other", description="what scenarios of a track have in common, in a word or two")
     plugins: tuple[str, ...] = Field(
         (), description="Python files that register the instruments and faults of others, from the folder of this file"
     )
@@ -154,9 +156,10 @@ class Scenario(Spec):
     def content_hash(self) -> str:
         """Hexadecimal digest of everything that decides the numbers of a run, defaults included.
 
-        Title, description, source and tags are words and do not count; neither do the files of a log.
+        Title, description, source, tags, track and group are words and do not count; neither do the files of a log.
         """
-        content = self.model_dump(mode="python", exclude={"title", "description", "source", "tags", "plugins"})
+        words = {"title", "description", "source", "tags", "track", "group", "plugins"}
+        content = self.model_dump(mode="python", exclude=words)
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.
         digest = hashlib.blake2b(json.dumps(content, default=str).encode(), digest_size=16)
         for module in sorted({type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)}):
@@ -197,6 +200,10 @@ def _restore(plugins: tuple[str, ...], reduced: bytes) -> Any:
 def _check_head(s: Scenario) -> None:
     if not NAME.fullmatch(s.name) or re.search(r"-v\d+$", s.name):
         raise ValueError(f"name = {s.name!r} should be in kebab-case and without a version, like 'coastal-voyage'")
+    if not NAME.fullmatch(s.track):
+        raise ValueError(f"track = {s.track!r} should be in kebab-case, like 'aided-ins'")
+    if not s.group.strip():
+        raise ValueError(f"group = {s.group!r} should be a word or two, like 'degraded GNSS'")
     if s.step > s.duration or abs(s.epochs * s.step - s.duration) > 1e-6:
         raise ValueError(
             f"duration_s = {s.duration:g} should be a multiple of step_s = {s.step:g}, "

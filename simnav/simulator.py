@@ -16,9 +16,9 @@ from simnav.recording import Block, ImuLabels, Recording
 from simnav.scenario import Scenario
 from simnav.sensors.faults import build_layers, labels
 from simnav.spec import SpecError
-from simnav.start import draw_start
 from simnav.types import Array, InitialState, NavigationStates
 from simnav.world import Vessel, World, WorldBlock
+from simnav.world.initial_state import draw_start
 
 __all__ = ["TIME_TOLERANCE", "Simulator", "ideal", "sample_times", "simulate", "simulate_many"]
 

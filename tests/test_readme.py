@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from simnav.contract_check import check
 from simnav.estimator import make
 from simnav.scenario import load
+from simnav.testing.contract_check import check
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.earth import earth_rate, principal_radii
+from simnav.geometry.earth import earth_rate, principal_radii
+from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import NavigationPoint
-from simnav.rotation import dcm_from_rotation_vector
 from simnav.types import KINDS, Array, Datasheet
 
 __all__ = ["OwnObservation"]

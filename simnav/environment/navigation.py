@@ -28,8 +28,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from simnav.earth import principal_radii
-from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.geometry.earth import principal_radii
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
 
 if TYPE_CHECKING:
@@ -459,7 +459,7 @@ def _rows(position: Array) -> list[list[float]]:
 
 
 def _horizontal(estimate: list[float], row: list[float]) -> tuple[float, float]:
-    """North and east error [m] (as `simnav.earth.relative_position`, in plain floats: once a step)."""
+    """North and east error [m] (as `simnav.geometry.earth.relative_position`, in plain floats: once a step)."""
     east = math.remainder(estimate[1] - row[1], math.tau)
     return (estimate[0] - row[0]) * row[3], east * row[4]
 

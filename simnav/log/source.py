@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.earth import gravity
+from simnav.geometry.earth import gravity
 from simnav.log.channel import ImuSeries, Series, list_recordings, read_channel, read_imu
 from simnav.log.reference import Reference
 from simnav.log.table import LogError, LogWarning
 from simnav.recording import AidStream, Block, ImuLabels
 from simnav.sensors import build_layers, labels
-from simnav.start import draw_start
 from simnav.types import Array, ImuSamples, NavigationStates
+from simnav.world.initial_state import draw_start
 
 if TYPE_CHECKING:
     from simnav.log.spec import RecordedSpec

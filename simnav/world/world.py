@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.rotation import wrap_angle
+from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world import motion
 from simnav.world.current import Current

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.contract_check import check
 from simnav.estimator import describe, make, names
+from simnav.testing.contract_check import check
 
 PAGE = Path(__file__).parents[2] / "docs" / "estimators.md"
 TEXT = PAGE.read_text(encoding="utf-8")

@@ -35,6 +35,7 @@ def test_every_scenario_loads_and_is_what_its_head_says(header: Header):
     scenario = load(header.id)
     assert (scenario.id, scenario.gym_id) == (header.id, header.gym_id)
     assert (scenario.duration, scenario.title, scenario.tags) == (header.duration, header.title, header.tags)
+    assert (scenario.track, scenario.group) == (header.track, header.group)
     assert header.path.stem in (scenario.name, scenario.id)
     assert load(header.path) == scenario
 
@@ -55,6 +56,8 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
     assert scenario.recorded or re.match(r"(ours|paper 00[0-4])\b", scenario.source)
     assert scenario.source
     assert scenario.tags
+    assert scenario.track in ("aided-ins", "no-imu", "underwater", "recorded", "papers")
+    assert scenario.group != "other"
 
 
 @pytest.mark.parametrize("header", SIMULATED, ids=lambda h: h.id)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav.contract_check import CHECKS
+from simnav.testing.contract_check import CHECKS
 
 TEXT = (Path(__file__).parents[3] / "docs" / "testing.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simnav.earth import relative_position
-from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.geometry.earth import relative_position
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.strapdown import integrate
 from simnav.world import (
     Accelerate,
