@@ -1,20 +1,20 @@
 """An EKF for each of several initial headings, until the measurements tell which one is right.
 
-The error equations of an EKF are linear in the attitude error, which holds to about twenty degrees. A vessel that starts
-without a heading is outside of that: one filter with a standard deviation of 100 degrees linearises about the wrong
-heading and may settle on it. So the initial density of the heading is written as a mixture of narrow Gaussians round the
-circle, and each has a filter of its own. A filter's weight is multiplied by the likelihood of every innovation,
-N(v; 0, S); a filter of negligible weight is dropped, and of two filters that have come to the same heading one is
-dropped, its weight given to the other. When one is left, it is the plain EKF.
+The error equations of an EKF are linear in the attitude error, which holds to about twenty degrees. A vessel that
+starts without a heading is outside of that: one filter with a standard deviation of 100 degrees linearises about the
+wrong heading and may settle on it. So the initial density of the heading is written as a mixture of narrow Gaussians
+round the circle, and each has a filter of its own. A filter's weight is multiplied by the likelihood of every
+innovation, N(v; 0, S); a filter of negligible weight is dropped, and of two filters that have come to the same heading
+one is dropped, its weight given to the other. When one is left, it is the plain EKF.
 
 The estimate is the mean of the mixture, its covariance holds the spread between the filters. A gross error must not
 decide: a normalised innovation squared counts as no more than its `_CLIP` quantile.
 
 Where the start is known to `above_deg` or better there is one filter from the beginning.
 
-Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; H. W. Sorenson
-and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*, Automatica 7(4), 1971; for large heading errors
-B. M. Scherzinger, *Inertial navigator error models for large heading uncertainty*, PLANS 1996.
+Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; H. W.
+Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*, Automatica 7(4), 1971; for large
+heading errors B. M. Scherzinger, *Inertial navigator error models for large heading uncertainty*, PLANS 1996.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from simnav.estimators.models.base import Observation
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.state_difference import difference, displaced
-from simnav.rotation import wrap_angle
+from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
 __all__ = ["HeadingBank", "initial_headings"]
@@ -65,11 +65,11 @@ def initial_headings(sigma: float, spacing: float) -> tuple[Array, Array]:
     """
     if 6.0 * sigma >= 2.0 * pi:
         count = ceil(2.0 * pi / spacing)
-        offsets = np.asarray(wrap_angle(2.0 * pi / count * np.arange(count)))
+        offsets = np.asarray(wrap_angle(2.0 * pi / count * np.arange(count, dtype=np.float64)))
     else:
         count = 2 * ceil(3.0 * sigma / spacing) + 1
         offsets = np.linspace(-3.0 * sigma, 3.0 * sigma, count)
-    turns = offsets[:, None] + 2.0 * pi * np.arange(-2, 3)
+    turns = offsets[:, None] + 2.0 * pi * np.arange(-4, 5)
     weights = np.exp(-0.5 * np.square(turns / sigma)).sum(axis=1)
     return offsets, weights / weights.sum()
 

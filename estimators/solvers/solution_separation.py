@@ -7,11 +7,11 @@ the right model the separation d has the covariance
     cov(d) = P_i - P_0                                              (R. G. Brown and P. W. McBurney 1988)
 
 which gives the threshold of the test, component by component of the position, velocity and heading:
-``T_i = K_fa sqrt(P_i - P_0)``. Where a test fails, an instrument is excluded: of those with a large separation, the one whose
-sub-filter is in the best agreement with the instruments that it uses (the least mean NIS of its worst instrument over
-`_RECENT` seconds; residual monitoring after Young and McGraw). Where several agree (a mean NIS of up to `_AGREEMENT`),
-it is one on probation (see below), else that of the largest separation. Its sub-filter becomes the main one, so that what the fault has done so far is
-undone, too.
+``T_i = K_fa sqrt(P_i - P_0)``. Where a test fails, an instrument is excluded: of those with a large separation, the one
+whose sub-filter is in the best agreement with the instruments that it uses (the least mean NIS of its worst instrument
+over `_RECENT` seconds; residual monitoring after Young and McGraw). Where several agree (a mean NIS of up to
+`_AGREEMENT`), it is one on probation (see below), else that of the largest separation. Its sub-filter becomes the main
+one, so that what the fault has done so far is undone, too.
 
 Where a fix is excluded, the sub-filter without the log is kept beside, and the other way round: the hypothesis that was
 not chosen. If the instrument that was believed fails a test in its turn, and the one excluded agrees with all others in
@@ -22,8 +22,8 @@ all filters, unless its instrument goes on so for `_PATIENCE` seconds.
 
 An excluded instrument is tried on: when it has agreed with the main filter for ``recovery`` seconds it is used again;
 twice as long after every further exclusion, up to `_LONGEST` times. For the next ``horizon`` seconds it is on
-probation: if any test fails, it is suspected, too. Fixes and logs are out together for `_COASTING` seconds at most, since an
-IMU alone is soon worse than either: then the logs are used again or, where they are silent, the fixes.
+probation: if any test fails, it is suspected, too. Fixes and logs are out together for `_COASTING` seconds at most,
+since an IMU alone is soon worse than either: then the logs are used again or, where they are silent, the fixes.
 
 **Protection level.** For the north and the east component, with the sigmas of main and sub-filters, ::
 
@@ -35,8 +35,8 @@ bounds the error whatever single instrument is wrong, but for a risk that is sha
 ``protection_level`` [m].
 
 **Horizon.** A sub-filter without GNSS grows less certain for ever, until it tests nothing. Sub-filters are therefore
-begun anew from the main filter: there are two for each instrument, the elder ``horizon / 2`` to ``horizon`` seconds old.
-So a fault that grows more slowly than the dead reckoning of that time is followed, and the protection level covers
+begun anew from the main filter: there are two for each instrument, the elder ``horizon / 2`` to ``horizon`` seconds
+old. So a fault that grows more slowly than the dead reckoning of that time is followed, and the protection level covers
 faults that began after the elder sub-filters. After an exclusion all of them are new.
 
 Sources: R. G. Brown and P. W. McBurney, *Self-contained GPS integrity check using maximum solution separation*,
@@ -74,8 +74,8 @@ _TESTED = (0, 1, 2, 3, 4, 5, 8)
 _LINEARISATION = 0.1
 #: Memory of the mean NIS of an instrument in a filter [s].
 _RECENT = 10.0
-#: A mean NIS by component up to this is no disagreement.
-_AGREEMENT = 2.0
+#: A mean NIS by component up to this is no disagreement: two sigma above 1 for ten measurements of one component.
+_AGREEMENT = 1.6
 #: Where a test fails, an instrument is suspected if its separation is more than this part of the largest, each over
 #: its threshold. Were there two sources only, both would be the same.
 _SUSPECT = 0.3

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from simnav.earth import displace, relative_position
-from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm
+from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm
 from simnav.types import Array, Estimate
 
 __all__ = ["difference", "displaced"]

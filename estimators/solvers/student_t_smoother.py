@@ -181,7 +181,8 @@ class StudentTSmoother(Smoother):
         predicted[0] = covariance[0] = first
         for _ in range(self.passes):
             _forward(
-                phi, process, moved, begin, sizes, jacobians, known, noises, weights, before, predicted, after, covariance
+                phi, process, moved, begin, sizes, jacobians, known, noises, weights, before, predicted, after,
+                covariance,
             )  # fmt: skip
             shift, spread = _smooth_back(phi, moved, before, predicted, after, covariance)
             new = np.ones(len(used))
