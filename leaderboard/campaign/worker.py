@@ -198,6 +198,7 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
     blank = replace(
         unit.result(entrant, key, outcome.status, outcome.reason),
         note=recording.note,
+        draws=recording.draws,
         seconds=outcome.seconds,
         peak_memory=outcome.peak_memory,
     )
