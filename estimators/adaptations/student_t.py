@@ -87,7 +87,7 @@ class StudentT(NoiseAdaptation):
         Of state and weight, for a measurement; at least 1.
     """
 
-    def __init__(self, dof: float = 6.0, turns: int = 5):
+    def __init__(self, dof: float = 8.0, turns: int = 5):
         if not dof > 0.0:
             raise ValueError(f"dof = {dof:g}: it must be above 0")
         if turns < 1:

@@ -7,7 +7,8 @@ average away (P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integ
 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, 1974, section 3.6).
 
 A datasheet may say the size and the correlation time of the slow part (``bias_instability``, ``correlation_time``);
-every model of simnav then has these states. Here a fix has them also where its datasheet is silent.
+every model of simnav then has these states. Here a fix has them also where its datasheet is silent, and a slow error
+of a certain size at least: reflections are no part of a datasheet.
 """
 
 from __future__ import annotations
@@ -25,20 +26,25 @@ __all__ = ["CorrelatedFixes", "with_correlated_fixes"]
 
 
 def with_correlated_fixes(instruments: Instruments, slow: float, slow_time: float) -> Instruments:
-    """The datasheets, with a slow error for every fix whose datasheet says nothing of one.
+    """The datasheets, with a slow error of a certain size or more for every fix.
 
     Parameters
     ----------
     instruments : Instruments
     slow : float
-        Sigma of the slow error over that of the white noise.
+        Least sigma of the slow error over that of the white noise.
     slow_time : float
-        Correlation time of the slow error [s].
+        Its correlation time where a datasheet says nothing of a slow error [s].
     """
     sheets = []
     for sheet in instruments.values():
-        if sheet.role == "fix" and not np.any(sheet.bias_instability) and not np.any(sheet.bias):
-            sheet = replace(sheet, bias_instability=slow * sheet.sigma, correlation_time=slow_time)
+        if sheet.role == "fix":
+            told, least = np.any(sheet.bias_instability), slow * sheet.sigma
+            sheet = replace(
+                sheet,
+                bias_instability=np.maximum(sheet.bias_instability, least),
+                correlation_time=sheet.correlation_time if told else slow_time,
+            )
         sheets.append(sheet)
     return Instruments(sheets, instruments.imu, instruments.step)
 
@@ -70,14 +76,13 @@ class _Ship(ShipModel):
 class CorrelatedFixes:
     """The inertial model where there is an IMU, else the ship model, with states for the slow error of every fix.
 
-    A fix whose datasheet gives a slow error keeps that one.
-
     Parameters
     ----------
     slow : float
-        Sigma of the slow error over that of the datasheet's white noise, which stays; 0: the plain filter.
+        Sigma of the slow error over that of the datasheet's white noise, which stays; a larger one of the datasheet
+        holds. 0: the plain filter.
     slow_time : float
-        Correlation time of the slow error [s].
+        Correlation time of the slow error [s], where the datasheet gives none.
     """
 
     def __init__(self, slow: float = 1.0, slow_time: float = 120.0):

@@ -22,13 +22,16 @@ def silent(recording):
     return replace(recording, instruments=sheets)
 
 
-def test_only_a_silent_datasheet_is_completed():
-    told = with_correlated_fixes(Instruments([WHITE, replace(SLOW, name="other"), DVL]), 2.0, 90.0)
-    np.testing.assert_array_equal(told["gnss"].bias_instability, [3.0, 3.0, 6.0])
+def test_a_datasheet_is_completed_and_a_larger_slow_error_holds():
+    told = with_correlated_fixes(Instruments([WHITE, replace(SLOW, name="other"), DVL]), 1.0, 90.0)
+    np.testing.assert_array_equal(told["gnss"].bias_instability, [1.5, 1.5, 3.0])
     assert told["gnss"].correlation_time == 90.0
     np.testing.assert_array_equal(told["gnss"].sigma, WHITE.sigma)
     np.testing.assert_array_equal(told["other"].bias_instability, SLOW.bias_instability)
     assert told["other"].correlation_time == 60.0
+    wider = with_correlated_fixes(Instruments([SLOW]), 4.0, 90.0)["gnss"]
+    np.testing.assert_array_equal(wider.bias_instability, [6.0, 6.0, 12.0])
+    assert wider.correlation_time == 60.0
     assert not told["dvl"].bias_instability.any()
 
 
