@@ -3,6 +3,7 @@
 - `errors`: estimate minus truth, by component and epoch.
 - `score`: the named scores of a run; `SCORES` says what each one is.
 - `series`: thinned errors and tracks, for plots.
+<<<<<<< HEAD
 - `stanford`: errors beside protection levels.
 - `compare`: two estimators on the same seeds.
 
@@ -11,12 +12,19 @@
 The rooms: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``integrity``,
 ``detection``, ``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``navigation_error``,
 ``scores``, ``plot_series``, ``comparison``.
+=======
+
+- `register_score`: makes a function a score; ours and those of others.
+
+The rooms: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``detection``,
+``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``navigation_error``, ``scores``,
+``plot_series``.
+>>>>>>> main
 """
 
 from __future__ import annotations
 
 from simnav.scoring import standard  # first: it decides the order of the scores
-from simnav.scoring.comparison import Comparison, compare, paired_test
 from simnav.scoring.consistency import badge, nees, nees_band
 from simnav.scoring.integrity import Stanford, protection_levels, stanford
 from simnav.scoring.navigation_error import errors, smoothed_errors
@@ -26,17 +34,14 @@ from simnav.scoring.scores import ScoreWarning, score
 
 __all__ = [
     "SCORES",
-    "Comparison",
     "Score",
     "ScoreWarning",
     "ScoringInput",
     "Stanford",
     "badge",
-    "compare",
     "errors",
     "nees",
     "nees_band",
-    "paired_test",
     "protection_levels",
     "register_score",
     "score",
