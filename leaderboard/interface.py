@@ -465,42 +465,70 @@ def reproduce(
     *,
     runs: int | None = None,
     methods: Sequence[str] = (),
+    until_decided: bool = False,
+    limit: int = 200,
+    minutes: float | None = None,
+    stored: bool = False,
     output: str | os.PathLike[str] | None = None,
     workers: int = 2,
     progress: Callable[[str, Progress], None] | None = None,
 ) -> Reproduction:
-    """Run a paper's comparison again: ours beside theirs, row by row.
+    """Repeat the comparison of a paper: our figures beside the paper's, with a verdict on each row.
 
     Parameters
     ----------
     paper : str
-        One of `simnav.leaderboard.papers.PAPERS`.
+        One of `simnav.leaderboard.papers.PAPERS`, such as ``guo-2026``, or an alias.
     runs : int, optional
-        Seeds a scenario; default: few, so that it ends within minutes.
+        Number of runs of each scenario; default: a few, so that it takes minutes.
     methods : sequence of str
-        Only what is about these methods of the paper.
+        Only the rows about these methods of the paper; default: all.
+    until_decided : bool
+        Run the methods of undecided rows again and again, until each row is decided (see
+        `simnav.leaderboard.papers.sequential`).
+    limit : int
+        With ``until_decided``: largest number of runs of a scenario.
+    minutes : float, optional
+        With ``until_decided``: time after which no further run is started.
+    stored : bool
+        Use the results that come with simnav, and run nothing.
     output : path, optional
-        Folder; default: ``reproduced/PAPER``. Its folder ``results`` keeps the results: started again, it goes on.
+        Folder; default: ``reproduced/PAPER``. Its folder ``results`` keeps the results: a later call continues there.
     workers : int
-        Processes.
+        Number of processes.
     progress : callable, optional
         Called with the name of the scenario and the campaign's progress.
 
     Returns
     -------
     Reproduction
+
+    Raises
+    ------
+    RequestError
+        If there is no such paper or method, or options contradict each other; one sentence.
     """
     from simnav.leaderboard.papers import paper as papers
+    from simnav.leaderboard.papers import sequential
+    from simnav.leaderboard.papers import stored as shipped
     from simnav.leaderboard.papers.reproduction import reproduce
     from simnav.leaderboard.results.store import StoreError
 
+    if stored and (until_decided or runs is not None):
+        raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")
+    if until_decided and runs is not None:
+        raise RequestError("'until_decided' chooses the number of runs itself: give 'limit' in place of 'runs'")
     with mistakes(ValueError):
         chosen = papers.load(paper)
         if methods:
             chosen = chosen.only(methods)
-    folder = _absolute(output or Path("reproduced") / paper)
+        if stored:
+            return shipped.load(chosen)
+    folder = _absolute(output or Path("reproduced") / chosen.key) / "results"
     with mistakes(StoreError):
-        return reproduce(chosen, runs or chosen.runs, folder / "results", workers=workers, progress=progress)
+        if until_decided:
+            return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
+        return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
 
 
 # -- what is given -----------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 A `Template` is the table of a scenario file with what is to be drawn in it. `Template.drawn` turns it and a seed into a
 plain table. It works on TOML, before units and validation, so that anything may be drawn: a number, a component of a
-vector, the name of an instrument, a whole table. The forms are described in ``docs/draws.md``::
+vector, the name of an instrument, a whole table. The forms are described in ``docs/reference/draws.md``::
 
     sigma_m = { log_uniform = [2, 12] }
     instruments = { choice = [["gnss"], ["dvl"]], weights = [3, 1] }

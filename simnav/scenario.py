@@ -5,7 +5,7 @@ A scenario says what happens (vessel, manoeuvres, sea, current), with what it is
 table says which files hold what. Everything random is drawn from a run's seed, nothing from here.
 
 `load` finds one by name or path; `simnav.catalogue` knows where the packs are. The schema is
-described in ``docs/scenarios.md``.
+described in ``docs/reference/scenarios.md``.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class Scenario(Spec):
     """A run, described; simulated unless it has a ``[log]``.
 
     The fields carry their own descriptions (``Scenario.model_fields``) and hold SI units and radians;
-    ``docs/scenarios.md`` lists their TOML keys. Build one with `load` or `parse`, or from Python.
+    ``docs/reference/scenarios.md`` lists their TOML keys. Build one with `load` or `parse`, or from Python.
     """
 
     name: str = Field(description="kebab-case; with the version it is the scenario's id")

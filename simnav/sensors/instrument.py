@@ -9,7 +9,7 @@ first-order Gauss-Markov bias and w white noise; the errors of a position are in
 start of a run from the datasheet's one-sigma figures; ``fixed_*`` are realised values that come on top and that no
 estimator is told. Every process has its own random stream and draws at every sample, delivered or not.
 
-`register_instrument` makes a kind of instrument known, ours and others' alike (``docs/instruments.md``).
+`register_instrument` makes a kind of instrument known, ours and others' alike (``docs/how-to/add-an-instrument.md``).
 """
 
 from __future__ import annotations
@@ -249,7 +249,7 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
 
     Examples
     --------
-    See ``docs/instruments.md``.
+    See ``docs/how-to/add-an-instrument.md``.
     """
 
     def wrap(cls: type[S]) -> type[S]:
