@@ -3,23 +3,13 @@
 - `errors`: estimate minus truth, by component and epoch.
 - `score`: the named scores of a run; `SCORES` says what each one is.
 - `series`: thinned errors and tracks, for plots.
-<<<<<<< HEAD
 - `stanford`: errors beside protection levels.
-- `compare`: two estimators on the same seeds.
 
 - `register_score`: makes a function a score; ours and those of others.
 
 The rooms: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``integrity``,
 ``detection``, ``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``navigation_error``,
-``scores``, ``plot_series``, ``comparison``.
-=======
-
-- `register_score`: makes a function a score; ours and those of others.
-
-The rooms: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``detection``,
-``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``navigation_error``, ``scores``,
-``plot_series``.
->>>>>>> main
+``scores``, ``plot_series``.
 """
 
 from __future__ import annotations
