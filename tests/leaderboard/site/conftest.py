@@ -52,8 +52,22 @@ def made_up(scenario: str, seed: int, estimator: str, status: str = "ok") -> Res
         series = {k: v.astype(np.float32) for k, v in series.items()}
     reason = "" if status == "ok" else f"<b>{status}</b> of {estimator}"
     parameters = {"gate": 3.5} if estimator == "ekf" else {}
-    return Result(scenario, seed, estimator, parameters, kin == "oracle", status, reason, scores, series,
-                  "run <i>7</i>" if scenario in MADE_UP else "", 1.5, 2**20, scenario_digest="5ce", provenance=MADE)  # fmt: skip
+    return Result(
+        scenario,
+        seed,
+        estimator,
+        parameters,
+        kin == "oracle",
+        status,
+        reason,
+        scores,
+        series,
+        "run <i>7</i>" if scenario in MADE_UP else "",
+        1.5,
+        2**20,
+        scenario_digest="5ce",
+        provenance=MADE,
+    )
 
 
 @pytest.fixture(scope="session")
