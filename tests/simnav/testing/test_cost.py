@@ -67,7 +67,7 @@ class Vandal(Idle):
 class Unsuited(Idle):
     """Needs what is not there."""
 
-    needs = ("speed_log",)
+    needs = ("terrain_fix",)
 
 
 class Broken(Idle):
@@ -117,7 +117,7 @@ def test_what_fails_is_named(recording: Recording):
     unsuited, broken, idle = measure(
         rows, recording, rounds=2, progress=lambda done, total, note="": told.append((done, total, note))
     )
-    assert (unsuited.status, unsuited.reason) == ("unsuitable", "it needs speed_log; there is none")
+    assert (unsuited.status, unsuited.reason) == ("unsuitable", "it needs terrain_fix; there is none")
     assert (broken.status, broken.reason) == ("error", "RuntimeError: no")
     assert np.isnan([unsuited.update_median, unsuited.peak_memory, broken.peak_memory]).all()
     assert idle.status == "ok"
