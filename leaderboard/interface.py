@@ -328,8 +328,8 @@ def campaign(
 
     Parameters
     ----------
-    scenarios, estimators, optional
-        Default: all.
+    scenarios, estimators : optional
+        What is run; default: all.
     runs : int, optional
         Seeds a scenario; default: 50, or 3 where it is quick.
     output : path
