@@ -61,6 +61,7 @@ __all__ = [
     "cite",
     "evaluate",
     "make",
+    "merge",
     "quick_estimators",
     "rank",
     "record",
@@ -322,6 +323,9 @@ def campaign(
     retry: bool = False,
     keep_trials: bool = False,
     covariance_interval: float = 0.0,
+    backend: str = "loky",
+    scheduler: str | None = None,
+    shard: tuple[int, int] = (1, 1),
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run scenarios x estimators x seeds; started again, it goes on where it was.
@@ -346,6 +350,9 @@ def campaign(
     covariance_interval : float
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.
+    backend, scheduler, shard
+        As for `simnav.leaderboard.campaign.campaign.run_campaign`: processes of this machine or a Dask cluster, its
+        address, and which of how many parts of the runs to do.
 
     Returns
     -------
@@ -362,7 +369,8 @@ def campaign(
     chosen, folder = scenarios_of(scenarios, quick=quick), absolute(output)
     everyone = requests(estimators, parameters)
     summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
-                   keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
+                   keep_trials=keep_trials, covariance_interval=covariance_interval, backend=backend,
+                   scheduler=scheduler, shard=shard)  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
 
@@ -483,6 +491,35 @@ def rescore(
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return rescore_results(absolute(results), [n.strip() for n in names if n.strip()], given, progress)
+
+
+def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str]) -> list[Result]:
+    """Put the results of several folders into one, e.g. of the shards of a campaign.
+
+    Parameters
+    ----------
+    folders : iterable of path
+        They stay as they are.
+    output : path
+        New, or a folder of results, which are kept.
+
+    Returns
+    -------
+    list of Result
+        All that the output holds.
+
+    Raises
+    ------
+    RequestError
+        If the folders belong to different versions of the benchmark, or if a scenario, the simulator or an estimator
+        differs between them.
+    """
+    from simnav.leaderboard.results.gathering import gather
+    from simnav.leaderboard.results.store import StoreError
+
+    with mistakes(StoreError):
+        target = gather(absolute(output), [absolute(folder) for folder in folders])
+    return results_of(target)
 
 
 def cite(results: str | os.PathLike[str] | None = None) -> Citation:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simnav.estimator import EstimatorError, find
+from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
@@ -132,6 +133,7 @@ def run_campaign(
     progress: Callable[[Progress], None] | None = None,
     backend: str = "loky",
     scheduler: str | None = None,
+    shard: tuple[int, int] = (1, 1),
 ) -> Summary:
     """Run estimators on scenarios and seeds, and store the results.
 
@@ -160,10 +162,13 @@ def run_campaign(
     progress : callable, optional
         Called with a `Progress` now and then.
     backend : {"loky", "dask"}
-        Processes of this machine, or a Dask cluster (extra ``distributed``), whose workers must see
-        the folder under the same path.
+        Processes of this machine, or a Dask cluster (extra ``distributed``). Its workers need no common disk: the
+        results travel through the scheduler.
     scheduler : str, optional
         Address of the Dask scheduler; default: a cluster on this machine.
+    shard : pair of int
+        Which of how many parts of the runs to do, from 1. All parts together are the campaign; `simnav.merge` puts
+        their folders together.
 
     Returns
     -------
@@ -196,6 +201,9 @@ def run_campaign(
             raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
     _unique("scenario", [s.id for s in scenarios])
     _unique("estimator", [e.label for e in estimators])
+    part, parts = shard
+    if not 1 <= part <= parts:
+        raise RequestError(f"shard = {part}/{parts} should be k/n, with k from 1 to n")
     if backend not in ("loky", "dask"):
         raise RequestError(f"backend = {backend!r} is unknown; there are 'loky' and 'dask'")
     if backend == "dask" and importlib.util.find_spec("distributed") is None:
@@ -224,37 +232,38 @@ def run_campaign(
         endings = store.keys(path)
     units: list[Unit] = []
     again: set[str] = set()
-    for seed in seeds:
-        for scenario in scenarios:
-            limit = time_limit(scenario) if timeout is None else timeout
-            keyed = [(e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants]
-            missing = tuple(
-                (e, k)
-                for e, k in keyed
-                if k not in endings
-                or _again(endings[k], limit, memory, retry)
-                or scoring_differs(endings[k].scoring, scoring)
-            )
-            again.update(key for _, key in missing if key in endings)
-            if missing:
-                units.append(
-                    Unit(
-                        scenario,
-                        seed,
-                        missing,
-                        recordings[scenario.id],
-                        simulator,
-                        path,
-                        limit,
-                        memory,
-                        os.getpid(),
-                        scores,
-                        scoring,
-                        keep_trials,
-                        covariance_interval,
-                    )
+    # Each part gets every scenario, though they differ much in length.
+    runs = [(x, s) for i, x in enumerate(seeds) for j, s in enumerate(scenarios) if (i + j) % parts == part - 1]
+    for seed, scenario in runs:
+        limit = time_limit(scenario) if timeout is None else timeout
+        keyed = [(e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants]
+        missing = tuple(
+            (e, k)
+            for e, k in keyed
+            if k not in endings
+            or _again(endings[k], limit, memory, retry)
+            or scoring_differs(endings[k].scoring, scoring)
+        )
+        again.update(key for _, key in missing if key in endings)
+        if missing:
+            units.append(
+                Unit(
+                    scenario,
+                    seed,
+                    missing,
+                    recordings[scenario.id],
+                    simulator,
+                    path,
+                    limit,
+                    memory,
+                    os.getpid(),
+                    scores,
+                    scoring,
+                    keep_trials,
+                    covariance_interval,
                 )
-    total = len(seeds) * len(scenarios) * len(entrants)
+            )
+    total = len(runs) * len(entrants)
     skipped = total - sum(len(u.entrants) for u in units)
     statuses: Counter[str] = Counter()
     if units:
@@ -394,19 +403,18 @@ def _parallel(
 ) -> Iterator[tuple[int, Counter[str]]]:
     from joblib import Parallel, delayed, parallel_config
 
+    if backend == "dask":
+        try:
+            yield from run_on_cluster(units, scheduler, workers)
+        except ClusterError as error:
+            raise CampaignError(str(error)) from error
+        return
     with contextlib.ExitStack() as stack:
-        if backend == "dask":
-            distributed = importlib.import_module("distributed")  # an extra: there or not
-            options = {"address": scheduler} if scheduler else {"n_workers": workers, "threads_per_worker": 1}
-            client = distributed.Client(**options)
-            stack.enter_context(client)
-            stack.enter_context(parallel_config(backend="dask", n_jobs=-1))
-        else:
-            # A folder that holds a random.py must not be searched by a worker that starts in it.
-            stack.enter_context(_environment(PYTHONSAFEPATH="1"))
-            stack.enter_context(parallel_config(backend="loky", n_jobs=workers, inner_max_num_threads=1))
-            if workers > 1:
-                stack.callback(_stop_workers)
+        # A folder that holds a random.py must not be searched by a worker that starts in it.
+        stack.enter_context(_environment(PYTHONSAFEPATH="1"))
+        stack.enter_context(parallel_config(backend="loky", n_jobs=workers, inner_max_num_threads=1))
+        if workers > 1:
+            stack.callback(_stop_workers)
         # Joblib's advice to whoever stops early, or whose worker was replaced, is not for the user.
         stack.enter_context(warnings.catch_warnings())
         for message in (".*tasks which were still being processed.*", "A worker stopped while some jobs.*"):

@@ -22,6 +22,7 @@ from simnav.leaderboard.cli import (
     evaluate,
     leaderboard,
     list_,
+    merge,
     new_estimator,
     reproduce,
     rescore,
@@ -90,6 +91,7 @@ for _module in (
     reproduce,
     rescore,
     cite,
+    merge,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -21,8 +22,28 @@ from simnav.leaderboard.cli.options import (
     campaign_progress,
     parameters,
 )
+from simnav.leaderboard.results.errors import RequestError
 
 __all__ = ["command"]
+
+
+class Backend(StrEnum):
+    """Where a campaign runs."""
+
+    LOKY = "loky"
+    DASK = "dask"
+
+
+def _shard(text: str) -> tuple[int, int]:
+    """Which of how many parts.
+
+    >>> _shard("2/8")
+    (2, 8)
+    """
+    part, _, parts = text.partition("/")
+    if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
+        raise RequestError(f"--shard {text}: it should be K/N with K from 1 to N, like --shard 2/8")
+    return int(part), int(parts)
 
 
 def command(
@@ -43,6 +64,13 @@ def command(
     covariance_interval: Annotated[
         float, typer.Option(min=0.0, help="Least seconds between two covariances that are kept. 0 keeps all.")
     ] = 0.0,
+    backend: Annotated[Backend, typer.Option(help="Processes of this machine, or a Dask cluster.")] = Backend.LOKY,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Of the Dask scheduler, e.g. tcp://host:8786; implies dask.")
+    ] = None,
+    shard: Annotated[
+        str, typer.Option(metavar="K/N", help="Do part K of N of the runs; 'simnav merge' puts the parts together.")
+    ] = "1/1",
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -60,7 +88,9 @@ def command(
             report = interface.campaign(
                 chosen, estimator, runs=runs, seed=seed, output=output, quick=quick, parameters=parameters(set_),
                 workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
-                covariance_interval=covariance_interval, progress=campaign_progress(bar),
+                covariance_interval=covariance_interval,
+                backend=(Backend.DASK if scheduler else backend).value, scheduler=scheduler, shard=_shard(shard),
+                progress=campaign_progress(bar),
             )  # fmt: skip
         summary = report.summary
         out.document(report.to_dict())

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 __all__ = [
+    "FILES",
     "FORMAT",
     "Ending",
     "Result",
@@ -56,6 +57,7 @@ __all__ = [
     "atomic",
     "compact",
     "create",
+    "described",
     "drop",
     "keys",
     "load",
@@ -67,6 +69,8 @@ __all__ = [
 
 _MARKER = "simnav-results.json"
 _LOOSE, _COMPACTED, _TRIALS, _PROVENANCE = "results", "compacted", "trials", "provenance"
+#: Folders inside a folder of results, those first that others refer to.
+FILES = (_PROVENANCE, _TRIALS, _COMPACTED, _LOOSE)
 _MOST_PARTS = 16  # more are merged into one
 _STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
 
@@ -497,6 +501,18 @@ def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]
             2,
         )
     return sorted(found.values(), key=lambda r: (r.scenario, r.estimator, r.seed))
+
+
+def described(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """What the folder says of itself: format, version of the benchmark, what is current; empty where it is new.
+
+    Raises
+    ------
+    StoreError
+        If it holds something else, or results of another format.
+    """
+    path = Path(folder)
+    return _read_marker(path) if _check(path) else {}
 
 
 def compact(folder: str | os.PathLike[str]) -> None:

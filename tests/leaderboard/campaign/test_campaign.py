@@ -22,6 +22,7 @@ from simnav.leaderboard.campaign.campaign import CampaignError, Progress, run_ca
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.gathering import gather
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.store import Result, StoreError
 from simnav.scenario import Scenario, load, parse
@@ -479,9 +480,15 @@ def test_the_time_limit_grows_with_the_run() -> None:
     assert campaign.time_limit(scenario(duration_s="6000.0")) == 1200.0
 
 
-def test_a_dask_cluster_gives_the_same(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
-    request = estimator(tmp_path)
-    run_campaign([scenario()], [request], range(3), tmp_path / "dask", workers=2, backend="dask")
-    run_campaign([scenario()], [request], range(3), tmp_path / "here", workers=1)
-    assert rows(tmp_path / "dask") == rows(tmp_path / "here")
+def test_shards_are_the_campaign_in_parts(tmp_path: Path) -> None:
+    requests, scenarios = [estimator(tmp_path)], [scenario(), scenario("tiny-two", heading_deg="90.0")]
+    parts = [tmp_path / f"part-{k}" for k in (1, 2, 3)]
+    totals = []
+    for k, folder in enumerate(parts, 1):
+        totals.append(run_campaign(scenarios, requests, range(4), folder, workers=1, shard=(k, 3)).total)
+        assert len({r.scenario for r in store.load(folder)}) == 2  # a part is no scenario of its own
+    assert sum(totals) == 8
+    run_campaign(scenarios, requests, range(4), tmp_path / "whole", workers=1)
+    assert rows(gather(tmp_path / "merged", parts)) == rows(tmp_path / "whole")
+    with pytest.raises(RequestError, match=r"shard = 4/3"):
+        run_campaign(scenarios, requests, range(4), tmp_path / "x", shard=(4, 3))

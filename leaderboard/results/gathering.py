@@ -1,0 +1,72 @@
+"""The results of several folders in one, as of the parts of one campaign."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.provenance import BENCHMARK
+from simnav.leaderboard.results.store import StoreError
+
+__all__ = ["gather"]
+
+
+def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[str]]) -> Path:
+    """Put the results of several folders into one, as of the parts of one campaign.
+
+    The folders stay as they are. A run that several of them hold counts once.
+
+    Parameters
+    ----------
+    output : path
+        A new or empty folder, or one of results, which are kept.
+    folders : iterable of path
+
+    Returns
+    -------
+    Path
+        Of the output.
+
+    Raises
+    ------
+    StoreError
+        If a folder cannot be used, if the folders belong to different versions of the benchmark, or if a scenario, the
+        simulator or an estimator differs between them. Then the output is as it was.
+    """
+    paths, target = [Path(folder) for folder in folders], Path(output)
+    markers = [(path, store.described(path)) for path in (target, *paths)]
+    for path, marker in markers[1:]:
+        if not marker:
+            raise StoreError(f"there are no results in {path}; 'simnav campaign' makes some")
+    current: dict[str, Any] = {}
+    whence: dict[tuple[str, str], Path] = {}
+    for path, marker in (m for m in markers if m[1]):
+        if marker["current"] and marker.get("benchmark") != BENCHMARK:
+            version = marker.get("benchmark", "a benchmark without a version")
+            raise StoreError(f"the results in {path} belong to {version}, not to {BENCHMARK}: they cannot be merged")
+        for scenario, entry in marker["current"].items():
+            both = current.setdefault(scenario, {"recording": entry["recording"], "estimators": {}})
+            first = whence.setdefault((scenario, ""), path)
+            if both["recording"] != entry["recording"]:
+                raise StoreError(
+                    f"{scenario}, or the simulator, differs between {first} and {path}: run one of them again"
+                )
+            for label, variant in entry["estimators"].items():
+                first = whence.setdefault((scenario, label), path)
+                if both["estimators"].setdefault(label, variant) != variant:
+                    raise StoreError(f"{label} on {scenario} differs between {first} and {path}: run one of them again")
+    target = store.create(target)
+    for path in paths:
+        for part in store.FILES:
+            for file in sorted((path / part).glob("[!.]*")):
+                if file.suffix in (".json", ".parquet") and not (target / part / file.name).exists():
+                    (target / part).mkdir(exist_ok=True)
+                    with store.atomic(target / part / file.name) as copy, open(file, "rb") as original:
+                        shutil.copyfileobj(original, copy)
+    store.select(target, {s: (e["recording"], e["estimators"]) for s, e in current.items()})
+    store.compact(target)
+    return target
