@@ -28,6 +28,7 @@ from simnav.leaderboard.cli import (
     run,
     simulate,
     train,
+    tune,
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
@@ -88,6 +89,7 @@ for _module in (
     reproduce,
     rescore,
     cite,
+    tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)
