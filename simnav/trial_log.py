@@ -10,6 +10,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,7 @@ class TrialLog:
         self._time = np.full(steps, np.nan)
         self._seconds = np.full(steps, np.nan)
         self._states = np.full((steps, 9), np.nan)
-        self._state_bytes = memoryview(self._states).cast("B") if steps else memoryview(bytearray())
+        self._state_bytes = _bytes_of(self._states)
         self._estimated = np.zeros(steps, dtype=np.uint16)
         self._shapes: list[list[tuple[str, tuple[int, ...]]]] = [[]]  # of diagnostics
         self._sizes = [0]  # of each shape [bytes]
@@ -203,7 +204,7 @@ class TrialLog:
         if given & COVARIANCE:
             if self._chunk is None:
                 self._chunk = np.empty((min(_CHUNK, self._steps), 9, 9))
-                self._chunk_bytes = memoryview(self._chunk).cast("B")
+                self._chunk_bytes = _bytes_of(self._chunk)
             begin = _COVARIANCE * len(self._epochs)
             self._chunk_bytes[begin : begin + _COVARIANCE] = body[after - _COVARIANCE : after]
             self._epochs.append(k)
@@ -258,7 +259,9 @@ class TrialLog:
             status=status,
             reason=reason,
             time=self._time[:n],
-            **{name: self._states[:n, section].copy() for name, section in VECTORS.items()},
+            position=self._states[:n, 0:3].copy(),
+            velocity=self._states[:n, 3:6].copy(),
+            attitude=self._states[:n, 6:9].copy(),
             estimated=MASKS[self._estimated[:n]],
             covariance=None if self._covariance is None else self._covariance[:n],
             diagnostics=self._collected(n),
@@ -283,7 +286,8 @@ class TrialLog:
             for name, dimensions in shape:
                 end = begin + math.prod(dimensions)
                 part = values[:, begin:end].reshape(len(items), *dimensions)
-                found[name][(epochs, *(slice(d) for d in dimensions))] = part
+                place: Any = (epochs, *(slice(d) for d in dimensions))
+                found[name][place] = part
                 begin = end
         return found
 
@@ -310,6 +314,11 @@ class TrialLog:
             if not np.isfinite(vector[:, wanted]).all():
                 raise InvalidOutputError(f"{name} is not finite")
         return NavigationStates(times, **vectors)
+
+
+def _bytes_of(array: Array) -> memoryview:
+    """The memory of an array."""
+    return memoryview(array.reshape(-1).view(np.uint8)) if array.size else memoryview(bytearray())  # type: ignore[arg-type]
 
 
 def _malformed() -> InvalidOutputError:

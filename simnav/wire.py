@@ -154,7 +154,7 @@ class PacketDecoder:
     def size(header: bytes | bytearray) -> int:
         """Bytes of a packet, header included."""
         samples, _, numbers, *_ = _PACKET.unpack_from(header)
-        return _PACKET.size + 8 * (numbers + (0 if samples == _NO_IMU else _IMU_WIDTH * samples))
+        return _PACKET.size + 8 * int(numbers + (0 if samples == _NO_IMU else _IMU_WIDTH * samples))
 
     def __call__(self, packet: bytearray) -> Measurements:
         """The packet; its arrays are views of the buffer, which should not be used again."""

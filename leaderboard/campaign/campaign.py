@@ -329,7 +329,7 @@ def _variant(entrant: Entrant, recording: str) -> str:
 
 def _resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bool) -> Entrant:
     """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
-    name, code = request.name, b""
+    name, source = request.name, ""
     file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
     parameters = {key: _absolute(value) for key, value in request.parameters.items()}
     if file:
@@ -345,10 +345,9 @@ def _resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: b
                 request.make()
             return replace(entrant, reference=is_own_reference(cls.name), source=estimator_source(cls))
         with contextlib.suppress(Exception):  # the other process says what is wrong
-            estimator_source(cls)  # files that are parsed here need not be parsed in every process
+            source = estimator_source(cls)  # here, where the text of a session is known
         if request.cls is not None or is_session(cls.__module__):
-            code = carry(cls)
-            entrant = replace(entrant, code=code)
+            entrant = replace(entrant, code=carry(cls))
     if confinement == "none":
         outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=MEMORY)
         found, why = outcome.value, outcome.reason
@@ -366,7 +365,7 @@ def _resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: b
             f"estimator {request.name!r} declares itself a reference; in a campaign only simnav's own references are "
             "told the truth"
         )
-    return replace(entrant, source=found["source"])
+    return replace(entrant, source=source or found["source"])
 
 
 def _is_ours(cls: type) -> bool:

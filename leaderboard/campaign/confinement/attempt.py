@@ -23,7 +23,16 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.recording import Recording
 
-__all__ = ["CONFINEMENTS", "Attempt", "attempt", "chosen_confinement", "close_server", "describe", "prepare", "seed_words"]
+__all__ = [
+    "CONFINEMENTS",
+    "Attempt",
+    "attempt",
+    "chosen_confinement",
+    "close_server",
+    "describe",
+    "prepare",
+    "seed_words",
+]
 
 #: What can be asked for; ``auto`` is the strongest that works here.
 CONFINEMENTS = ("auto", "bubblewrap", "process", "none")
@@ -124,7 +133,7 @@ def seed_words(recording: Recording, entrant: Entrant) -> list[int]:
     """
     truth = hashlib.blake2b(str(recording.seed).encode(), digest_size=32)
     for array in (recording.data.truth.position, recording.data.truth.attitude):
-        truth.update(np.ascontiguousarray(array))
+        truth.update(array.tobytes())
     h = hashlib.blake2b(entrant.label.encode(errors="surrogatepass"), digest_size=32, key=truth.digest())
     return [int(word) for word in np.frombuffer(h.digest(), dtype="<u4")]
 
@@ -160,7 +169,12 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
 
 
 def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[str, Any]:
-    """Look at an estimator where it can do no harm: ``reference``, ``source`` (a digest), ``failure`` of its constructor.
+    """Look at an estimator where it can do no harm.
+
+    Returns
+    -------
+    dict
+        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty).
 
     Raises
     ------

@@ -15,7 +15,7 @@ import struct
 import sys
 from collections.abc import Iterable
 
-__all__ = ["available", "restrict"]
+__all__ = ["available", "restrict", "signals_are_scoped"]
 
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # system calls, the same on all architectures
 _PR_SET_NO_NEW_PRIVS = 38
@@ -41,6 +41,11 @@ def _version() -> int:
 def available() -> bool:
     """Whether this system has it."""
     return _version() > 0
+
+
+def signals_are_scoped() -> bool:
+    """Whether it keeps signals from processes outside."""
+    return _version() >= _SCOPES[0]
 
 
 def restrict(writable: Iterable[str | os.PathLike[str]]) -> bool:

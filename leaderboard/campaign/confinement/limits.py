@@ -88,7 +88,10 @@ def _children() -> list[int]:
     with contextlib.suppress(OSError):
         for entry in os.listdir("/proc"):
             with contextlib.suppress(OSError, ValueError, IndexError):
-                if entry.isdigit() and int(Path(f"/proc/{entry}/stat").read_text().rpartition(")")[2].split()[1]) == own:
+                if (
+                    entry.isdigit()
+                    and int(Path(f"/proc/{entry}/stat").read_text().rpartition(")")[2].split()[1]) == own
+                ):
                     found.append(int(entry))
     return found
 

@@ -1,9 +1,9 @@
 """The server of a worker: kernels loaded, nothing secret, forks an estimator process for each run.
 
 It is started as ``python -m simnav.leaderboard.campaign.confinement.server DESCRIPTOR [kernels]``, where the descriptor
-is a Unix socket to the worker. It is asked, in JSON, to fork (two descriptors come with it), to finish with the process that it
-forked, and to import a library before the next fork. It watches the memory of the process, kills all that is left of
-it, and is gone when the worker is.
+is a Unix socket to the worker. It is asked, in JSON, to fork (two descriptors come with it), to finish with the process
+that it forked, and to import libraries before the next fork. It watches the memory of the process, kills all that is
+left of it, and is gone when the worker is.
 """
 
 from __future__ import annotations
@@ -145,8 +145,8 @@ def _become_estimator(parent: int, asked: dict[str, Any], descriptors: list[int]
     os.setsid()  # Ctrl-C in the terminal is not for it
     die_with_parent(parent)
     faulthandler.disable()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
-        signal.signal(number, signal.SIG_DFL)
+    for which in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
+        signal.signal(which, signal.SIG_DFL)
     nothing = os.open(os.devnull, os.O_RDWR)
     moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, 16) for descriptor in descriptors]
     for number, descriptor in enumerate((nothing, nothing, nothing, *moved)):
