@@ -1,8 +1,9 @@
 """Kinds of aiding instruments: what each of them measures, and what follows from that for everybody else.
 
 A kind is declared once, beside the instrument of its name (``simnav/sensors/gnss.py`` and others, or a file of a third
-party; see ``docs/instruments.md``). Whatever depends on the kind of an instrument asks `KINDS`: how an error is added
-to a value, what is plausible, which role the instrument has, and how a navigation filter predicts its reading.
+party; see ``docs/how-to/add-an-instrument.md``). Whatever depends on the kind of an instrument asks `KINDS`: how an
+error is added to a value, what is plausible, which role the instrument has, and how a navigation filter predicts its
+reading.
 """
 
 from __future__ import annotations

@@ -176,6 +176,7 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),
         note=recording.note,
+        draws=recording.draws,
         seconds=made.seconds,
         peak_memory=made.peak_memory,
     )

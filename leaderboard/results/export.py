@@ -36,7 +36,7 @@ SCHEMA_VERSION = 2
 
 _UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
 _DEGREES = math.degrees(1.0)
-_FACTS = ("scenario", "seed", "estimator", "parameters", "reference", "status", "reason", "note")
+_FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 #: Column -> attribute: what made a result, and is its own.
 _ORIGIN = {
@@ -168,4 +168,5 @@ def _provenance(provenance: Provenance) -> dict[str, Any]:
 
 def _facts(result: Result) -> dict[str, Any]:
     found = {name: getattr(result, name) for name in _FACTS}
-    return found | {"parameters": json.dumps(plain(dict(result.parameters)), sort_keys=True)}
+    texts = {name: json.dumps(plain(dict(found[name])), sort_keys=True) for name in ("draws", "parameters")}
+    return found | texts

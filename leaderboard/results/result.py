@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["BATCH", "FORMAT", "NO_TRIAL", "READABLE", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
 
 #: Version of the format of results, and those that can be read.
-FORMAT = 3
-READABLE = (1, 2, FORMAT)
+FORMAT = 4
+READABLE = (1, 2, 3, FORMAT)
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
@@ -36,6 +36,7 @@ _SINCE: dict[str, tuple[int, Any]] = {
     "scenario_digest": (3, ""),
     "estimator_digest": (3, ""),
     "provenance": (3, ""),
+    "draws": (4, "{}"),
 }
 
 Series = NDArray[np.float32]
@@ -84,6 +85,8 @@ class Result:
         Of the scenario's content, and of the estimator's code. Empty where they are not known.
     provenance : Provenance
         Versions, machine and day; a file names its id only.
+    draws : mapping of str to object
+        What was drawn for the run, by key path, in the units of the scenario's file.
     """
 
     scenario: str
@@ -107,6 +110,7 @@ class Result:
     scenario_digest: str = ""
     estimator_digest: str = ""
     provenance: Provenance = field(default_factory=Provenance)
+    draws: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def variant(self) -> str:
@@ -147,6 +151,7 @@ def schema() -> pa.Schema:
             ("scenario_digest", pa.string()),
             ("estimator_digest", pa.string()),
             ("provenance", pa.string()),
+            ("draws", pa.string()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )
@@ -160,6 +165,7 @@ def to_table(result: Result) -> pa.Table:
     row = {name: getattr(result, name) for name in schema().names}
     row["provenance"] = result.provenance.id
     row["parameters"] = json.dumps(dict(result.parameters), sort_keys=True, default=str)
+    row["draws"] = json.dumps(dict(result.draws), default=str)
     row["scores"] = [(str(name), float(value)) for name, value in result.scores.items()]
     row["series"] = [{"name": n, "shape": list(a.shape), "values": a.ravel()} for n, a in arrays.items()]
     return pa.Table.from_pylist([row], schema=schema())
@@ -226,6 +232,7 @@ def rows(table: pa.Table, provenances: Mapping[str, Provenance]) -> Iterator[Res
         table = table.drop_columns(["series"])
     for row, arrays in zip(table.to_pylist(), series, strict=True):
         row["parameters"] = json.loads(row["parameters"])
+        row["draws"] = json.loads(row["draws"])
         row["scores"] = dict(row["scores"])
         row["provenance"] = provenances.get(row["provenance"]) or Provenance(identity=row["provenance"])
         yield Result(**row, series=arrays)

@@ -49,7 +49,7 @@ class Vandal(Estimator):
         return Estimate(measurements.time, position=self.position, diagnostics=diagnostics)
 '''
 
-_HELPERS = '''
+_HELPERS = """
 
 def _open(descriptor):
     import fcntl
@@ -62,7 +62,7 @@ def _open(descriptor):
 class _Endless:
     def __repr__(self):
         return repr(self)
-'''
+"""
 
 _DELETE = "import shutil; shutil.rmtree({results!r})"
 _SLEEPER = "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)  # {mark}'], start_new_session=True)"
@@ -145,10 +145,13 @@ def vandals(folder: Path, confinement: str = "auto", workers: int = 2, seeds: in
     """All `VANDALS` and two rows of simnav in one campaign, and these without them."""
     results, mark = folder / "results", f"simnav-vandal-{os.getpid()}"
     requests = []
-    tried = {name: v for name, v in VANDALS.items() if name not in _CONTAINED or (confinement != "none" and contained())}
+    tried = {
+        name: v for name, v in VANDALS.items() if name not in _CONTAINED or (confinement != "none" and contained())
+    }
     for name, (mischief, _) in tried.items():
         text = _VANDAL.replace("{mischief}", mischief).replace(
-            "{constructor}", "raise RuntimeError('not today')" if "constructor" in name else "pass")
+            "{constructor}", "raise RuntimeError('not today')" if "constructor" in name else "pass"
+        )
         path = folder / f"{name.replace('-', '_')}.py"
         path.write_text(text.format(results=str(results), mark=mark) + _HELPERS)
         requests.append(EstimatorRequest(str(path), label=name))

@@ -275,7 +275,7 @@ class Unfinished(Estimator):
         (lambda: simnav.rank("nowhere"), "there are no results in"),
         (lambda: simnav.bound("car-kitti"), "car-kitti"),
         (lambda: simnav.reproduce("999"), "there is no paper '999'"),
-        (lambda: simnav.reproduce("001", methods=["nobody"]), "has no method 'nobody'"),
+        (lambda: simnav.reproduce("mao-2025", methods=["nobody"]), "has no method 'nobody'"),
     ],
 )
 @pytest.mark.usefixtures("here")

@@ -13,7 +13,7 @@ class GlobalGenerator(LastFix):
     """By NumPy's global generator."""
 
     def look(self, measurements):
-        state = np.random.get_state()[1]
+        state = np.random.get_state()[1]  # noqa: NPY002
         for seed in range(100):
             if np.array_equal(np.random.RandomState(seed).get_state()[1], state):
                 return truth_in(record(load(Path(__file__).parent / "scenario.toml"), seed))

@@ -11,10 +11,7 @@ class PatchedLog(LastFix):
 
     def reset(self, start, instruments):
         super().reset(start, instruments)
-        try:
-            log = trial._Log
-        except AttributeError:
-            from simnav.trial_log import TrialLog as log
+        log = getattr(trial, "_Log", None) or trial.TrialLog  # as it was called, and as it is now
         plain = log.add
 
         def add(self, estimate, end, seconds, truth):

@@ -279,7 +279,7 @@ def test_a_folder_of_another_format_is_left_alone(folder: Path) -> None:
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 99, "simnav": "9.0"}))
     before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()}
     for action in (store.create, store.load, store.compact, store.keys, lambda f: store.select(f, {})):
-        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 3"):
+        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 4"):
             action(folder)
     assert {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()} == before
 
@@ -363,8 +363,8 @@ def test_results_of_older_formats_are_read(
 
     store.write(folder, result(0))
     (path,) = loose(folder)
-    since_3 = ["scenario_digest", "estimator_digest", "provenance"]
-    old = pq.read_table(path).drop_columns(missing + since_3)
+    since_3, since_4 = ["scenario_digest", "estimator_digest", "provenance"], ["draws"]
+    old = pq.read_table(path).drop_columns(missing + since_3 + since_4)
     pq.write_table(old.replace_schema_metadata({"simnav_results": str(version)}), path)
     marker = folder / "simnav-results.json"
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": version}))
@@ -373,6 +373,7 @@ def test_results_of_older_formats_are_read(
     store.compact(folder)
     assert [(r.seed, r.time_limit) for r in store.load(folder)] == [(0, ending[1]), (1, 60.0)]
     assert [r.provenance.id for r in store.load(folder)] == ["", ""]
+    assert [r.draws for r in store.load(folder)] == [{}, {}]
 
 
 def test_scores_are_replaced_wherever_they_are(folder: Path) -> None:
