@@ -12,7 +12,8 @@ status              meaning
                     is not symmetric or not positive semi-definite
 ``diverged``        finite, but horizontally more than `DIVERGENCE_LIMIT` from the truth
 ``out-of-memory``   the estimator raised MemoryError
-``unsuitable``      ``reset`` raised `UnsuitableScenario`: no failure, the estimator needs other instruments
+``unsuitable``      an instrument is lacking that `Estimator.needs` names: no failure. To refuse a scenario that has all
+                    of them (`UnsuitableScenario`) is an ``error``
 ==================  ==================================================================================================
 """
 
@@ -27,7 +28,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimator import Estimator, NeedsError, UnsuitableScenario, lacking
 from simnav.recording import Recording
 from simnav.trial_log import DIVERGENCE_LIMIT, DivergedError, Trial, TrialLog
 from simnav.types import NavigationStates
@@ -42,7 +43,7 @@ class FailureError(Exception):
     Parameters
     ----------
     status : str
-        ``error``, ``invalid-output``, ``out-of-memory`` or ``unsuitable``.
+        ``error``, ``invalid-output``, ``out-of-memory`` or ``unsuitable`` (it refuses).
     reason : str
     """
 
@@ -61,6 +62,11 @@ class Session(Protocol):
     """
 
     name: str
+
+    @property
+    def needs(self) -> Any:
+        """What `Estimator.needs` says."""
+        ...
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
         """Begin the run: `Estimator.reset`."""
@@ -125,6 +131,9 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
     packets = PacketEncoder(data, data.truth.time)
     ends, truth = data.truth.time.tolist(), data.truth.position
     try:
+        lack = lacking(session.needs, recording.instruments)
+        if lack:
+            return log.trial(session.name, "unsuitable", lack)
         begun = time.perf_counter()
         session.begin(recording, packets)
         reset_seconds = time.perf_counter() - begun
@@ -154,11 +163,11 @@ def _failure(error: BaseException, session: Session, where: str) -> tuple[str, s
         return "diverged", f"{where}: {error}"
     if isinstance(error, InvalidOutputError):
         return "invalid-output", f"{where}: {error}"
-    if isinstance(error, UnsuitableScenario) and where == "reset()":
-        return "unsuitable", str(error)
+    if isinstance(error, NeedsError):
+        return "error", str(error)
+    if isinstance(error, UnsuitableScenario) or (isinstance(error, FailureError) and error.status == "unsuitable"):
+        return "error", f"{where}: it refuses a scenario that has all instruments that its needs name ({error})"
     if isinstance(error, FailureError):
-        if error.status == "unsuitable":
-            return ("unsuitable", error.reason) if where == "reset()" else ("error", f"{where}: {error.reason}")
         return error.status, f"{where}: {error.reason}"
     return "out-of-memory" if isinstance(error, MemoryError) else "error", f"{where}: {session.describe(error)}"
 
@@ -171,6 +180,10 @@ class _LocalSession:
         self.name = estimator.name or type(estimator).__name__
         self._encode = EstimateEncoder()
         self._decode = PacketDecoder(())
+
+    @property
+    def needs(self) -> Any:
+        return self.estimator.needs
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
         self._decode = PacketDecoder(packets.streams)

@@ -79,12 +79,12 @@ class _Session:
             _seed(words)
             self._estimator = entrant.make()
             cls = type(self._estimator)
-            told = {"name": cls.name or cls.__name__}
+            told = {"name": cls.name or cls.__name__, "needs": self._estimator.needs}
         except MemoryError:
             return _failure("out-of-memory", "more memory was wanted")
         except BaseException as error:  # SystemExit and KeyboardInterrupt, too: it is not the user who asks
             return _failure("error", _described(error))
-        return answer(Up.DONE, json.dumps(told).encode())
+        return answer(Up.DONE, json.dumps(told, default=repr).encode())
 
     def describe(self, body: bytes) -> bytes:
         """What the estimator is, and why it cannot be made: by a wrong request, or in its constructor."""
@@ -116,8 +116,6 @@ class _Session:
             _load_kinds(homes)
             self._estimator.reset(start, instruments)
         except BaseException as error:
-            if isinstance(error, UnsuitableScenario):
-                return _failure("unsuitable", str(error))
             return self._raised(error)
         return answer(Up.DONE)
 
@@ -148,6 +146,8 @@ class _Session:
     def _raised(self, error: BaseException) -> bytes:
         if isinstance(error, InvalidOutputError):
             return _failure("invalid-output", str(error))
+        if isinstance(error, UnsuitableScenario):
+            return _failure("unsuitable", str(error))
         status = "out-of-memory" if isinstance(error, MemoryError) else "error"
         estimator: Estimator = self._estimator
         return _failure(status, describe_failure(error, estimator, skip=1))

@@ -273,6 +273,8 @@ class RemoteSession:
 
     Attributes
     ----------
+    needs : object
+        As it declared them before it knew the instruments.
     libraries : list of str
         What it imported, and the server may import, too.
     peak_memory : int
@@ -281,6 +283,7 @@ class RemoteSession:
 
     def __init__(self, write: int, read: int, limits: Limits):
         self.name = ""
+        self.needs: Any = ()
         self.limits = limits
         self.libraries: list[str] = []
         self.peak_memory = 0
@@ -301,8 +304,9 @@ class RemoteSession:
         simnav.trial.FailureError
             If that fails.
         """
-        told = self._ask(Down.MAKE, (entrant, sys.path, words))
-        name = _told(told).get("name")
+        told = _told(self._ask(Down.MAKE, (entrant, sys.path, words)))
+        name, needs = told.get("name"), told.get("needs")
+        self.needs = tuple(tuple(n) if isinstance(n, list) else n for n in needs) if isinstance(needs, list) else needs
         self.name = name[:200] if isinstance(name, str) else ""
 
     def describe_estimator(self, entrant: Entrant) -> dict[str, Any]:

@@ -95,9 +95,13 @@ CASES = {
     "raises": ("", "if self.k == 7: raise KeyError('lost\\nin a line')"),
     "leaves": ("", "if self.k == 7: sys.exit(3)"),
     "wants memory": ("", "if self.k == 7: raise MemoryError"),
-    "unsuitable": ("raise UnsuitableScenario('no sonar')", ""),
-    "late unsuitable": ("", "raise UnsuitableScenario('no sonar')"),
+    "refuses at once": ("raise UnsuitableScenario('no sonar')", ""),
+    "refuses": ("", "raise UnsuitableScenario('no sonar')"),
     "raises in reset": ("[][1]", ""),
+    "needs a DVL": ("", "pass\n    needs = ('imu', ('dvl', 'terrain_fix'))\n    def nothing(self, measurements):\n        "
+                        "diagnostics, flagged = {}, []"),
+    "odd needs": ("", "pass\n    needs = 'imu'\n    def nothing(self, measurements):\n        "
+                      "diagnostics, flagged = {}, []"),
     "wrong type": ("", "if self.k == 7: return 3"),
     "wrong shape": ("", "if self.k == 7: self.position = np.zeros(4)"),
     "wrong time": ("", "if self.k == 7: return Estimate(0.0, position=self.position)"),
