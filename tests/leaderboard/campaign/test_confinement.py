@@ -88,6 +88,8 @@ def test_both_ways_give_the_same_bits(name: str, server: EstimatorServer, record
     same(there.trial, run_trial(make(name), recording))
 
 
+NEXT = "\n    def nothing(self, measurements):\n        diagnostics, flagged = {}, []"
+
 CASES = {
     "varying": ("", "diagnostics = {'a': np.arange(self.k % 3 + 1.0), 'n': self.k, 'b': True}"),
     "names come and go": ("", "diagnostics = {str(self.k % 4): np.eye(2), 'x': 1.5} if self.k % 3 else {}"),
@@ -98,10 +100,8 @@ CASES = {
     "refuses at once": ("raise UnsuitableScenario('no sonar')", ""),
     "refuses": ("", "raise UnsuitableScenario('no sonar')"),
     "raises in reset": ("[][1]", ""),
-    "needs a DVL": ("", "pass\n    needs = ('imu', ('dvl', 'terrain_fix'))\n    def nothing(self, measurements):\n        "
-                        "diagnostics, flagged = {}, []"),
-    "odd needs": ("", "pass\n    needs = 'imu'\n    def nothing(self, measurements):\n        "
-                      "diagnostics, flagged = {}, []"),
+    "needs a DVL": ("", f"pass\n    needs = ('imu', ('dvl', 'terrain_fix')){NEXT}"),
+    "odd needs": ("", f"pass\n    needs = 'imu'{NEXT}"),
     "wrong type": ("", "if self.k == 7: return 3"),
     "wrong shape": ("", "if self.k == 7: self.position = np.zeros(4)"),
     "wrong time": ("", "if self.k == 7: return Estimate(0.0, position=self.position)"),
