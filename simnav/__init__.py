@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         reproduce,
         rescore,
         run,
+        sweep,
         tune,
     )
     from simnav.plugins import load_plugin
@@ -103,6 +104,7 @@ __all__ = [
     "run",
     "run_trial",
     "score",
+    "sweep",
     "tune",
 ]
 
@@ -147,6 +149,7 @@ _HOMES = {
         "reproduce",
         "rescore",
         "run",
+        "sweep",
         "tune",
     ),
 }

@@ -99,7 +99,7 @@ def space_of(request: EstimatorRequest, ranges: Sequence[str | Range]) -> tuple[
     Raises
     ------
     RequestError
-        If there is no such parameter, it is no number, or it is set or varied twice.
+        If there is no such parameter, it is no number or outside of its range, or it is set or varied twice.
     """
     known = {p.name: p.default for p in describe(request.name).parameters}
     space = tuple(r if isinstance(r, Range) else read_range(r) for r in ranges)
@@ -114,5 +114,7 @@ def space_of(request: EstimatorRequest, ranges: Sequence[str | Range]) -> tuple[
         default = known[r.name]
         if isinstance(default, bool) or not isinstance(default, int | float):
             raise RequestError(f"{request.label}: {r.name} = {default!r} is no number that could be varied")
+        if not r.low <= default <= r.high:
+            raise RequestError(f"{request.label}: the present {r.name} = {default:g} is not within {r}")
         present[r.name] = default
     return space, present

@@ -79,6 +79,7 @@ def test_values_stay_within_their_range_and_come_back(r: Range):
         ("huber-kf", [], "no parameter is varied"),
         ("huber-kf:k=3", ["k=1:4"], "set or varied twice"),
         ("iae", ["newest=0:1"], "is no number"),
+        ("huber-kf", ["k=3:4"], "present k = 2 is not within k=3:4"),
     ],
 )
 def test_a_parameter_that_cannot_be_varied_is_refused(estimator: str, vary: list[str], message: str):
