@@ -1,4 +1,4 @@
-"""GNSS noise from a neuro-fuzzy network (ANFIS): a reconstruction of the adaptation of paper 002.
+"""GNSS noise from a neuro-fuzzy network (ANFIS): a reconstruction of Jiang et al. (2026).
 
 Section 3 of the paper, the ANFIS itself, is missing from the text at hand. Known are: a five-layer first-order network,
 fed with features of the present moment (of the ship's motion), that gives the covariance of the GNSS. Reconstructed
@@ -115,7 +115,7 @@ class Features:
 
 
 class Anfis(NoiseAdaptation):
-    """The noise of GNSS fixes, scaled by the network (reconstruction of paper 002).
+    """The noise of GNSS fixes, scaled by the network (reconstruction of Jiang et al. 2026).
 
     Inputs beyond what training saw are clipped to it; an input that is not known (no compass, no log) is the median of
     training. Every component of a fix is scaled alike. Other instruments keep their nominal noise.

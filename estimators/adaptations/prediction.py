@@ -1,4 +1,4 @@
-"""Whose fault it is: where instruments of two kinds disagree with the prediction together, it is the prediction's."""
+"""Test of the prediction: if fixes and velocities disagree with it together, the prediction is wrong."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def standardised(residual, predicted, noise):  # type: ignore[no-untyped-def]
 class PredictionTest:
     """Chi-square tests of the fixes and of the logs, which fail together when the prediction is wrong.
 
-    An adaptation that gives less weight to what does not fit the prediction is lost when it is the prediction that is
-    wrong (a disturbed IMU): nothing fits, nothing is believed, and nothing brings the filter back. Paper 003 tells the
-    two cases apart by the chi-square tests of GNSS and DVL: one fails, that instrument is wrong; both fail, the
-    prediction. Gross errors of both that coincide are no such case, so that both must fail ``together`` times running.
+    An adaptation gives less weight to measurements that do not fit the prediction. If the prediction itself is wrong (a
+    disturbed IMU), no measurement fits, and the filter does not recover. Zhan et al. (2026) separate the two cases by
+    the chi-square tests of GNSS and DVL: if one of them fails, that instrument is wrong; if both fail, the prediction
+    is. Gross errors of both may coincide by chance, so both tests must fail ``together`` times in a row.
 
     Parameters
     ----------
@@ -79,7 +79,8 @@ class PredictionTest:
     def inflation(self, innovation: Innovation) -> float:
         """What to multiply P by, now that the prediction has failed: once for every ``together`` rounds of failures.
 
-        The root of the mean squared standardised component, over 2 (eqs. 28 and 34 of paper 003), within `limited`.
+        The root of the mean squared standardised component, over 2 (eqs. 28 and 34 of Zhan et al. 2026), within
+        `limited`.
         """
         self._blamed += 1
         if (self._blamed - 1) % (self.together * len(self._group)):

@@ -1,9 +1,10 @@
 """What the ANFIS of `simnav.estimators.adaptations.anfis` learns from: voyages of its own, on seeds never scored.
 
-A reconstruction: of how paper 002 trained its network nothing is known. Here ships sail three voyages, with receivers
-of different quality, in five kinds of weather for GNSS: healthy; noise that grows; gross errors; multipath; all of
-them. Each trouble comes and goes at random, so that about seven fixes in ten are healthy. They are no scenarios of the
-catalogue, whose faults come at fixed times: a network that had seen those could learn when, instead of how.
+This is a reconstruction: how Jiang et al. (2026) trained their network is not known. Here ships sail three voyages,
+with receivers of different quality, in five kinds of weather for GNSS: healthy; noise that grows; gross errors;
+multipath; all of them. Each trouble comes and goes at random, so that about seven fixes in ten are healthy. They are no
+scenarios of the catalogue, whose faults come at fixed times: a network that had seen those could learn when, instead of
+how.
 
 What is learnt for each fix is ``ln(true variance / datasheet's)``, mean of north and east. The true variance is the
 white noise that the measurement really had, and of the faults that touched it the variance of multipath and the second

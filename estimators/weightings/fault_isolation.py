@@ -2,8 +2,8 @@
 
 A weighting that gives less weight to what does not fit is lost when it is the motion that is wrong (a disturbed IMU):
 nothing fits, nothing is believed, and nothing brings the window back. As in a filter
-(`simnav.estimators.adaptations.prediction`, after paper 003), suspicion falls on the motion where fixes and logs fail
-their chi-square tests together, several times running. But a filter cannot tell that from two instruments that are
+(`simnav.estimators.adaptations.prediction`, after Zhan et al. 2026), suspicion falls on the motion where fixes and logs
+fail their chi-square tests together, several times running. But a filter cannot tell that from two instruments that are
 wrong at once. A window can ask: with the motion of that time all but taken away for one iteration, measurements that
 are right agree with each other, and measurements that are wrong still do not. Only those that agree are then believed
 in full.
