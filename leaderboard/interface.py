@@ -81,6 +81,7 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     Parameters
     ----------
     estimator : str, Path, type or pair
+        Name, file or class, also with parameters.
     **parameters
         Of its constructor; texts are converted as on the command line.
 
@@ -103,7 +104,9 @@ def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     seed : int
+        Seed of the run.
 
     Raises
     ------
@@ -215,9 +218,11 @@ def run(
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     estimators : estimators, optional
         Default: all registered ones.
     seed : int
+        Seed of the run.
     parameters : mapping, optional
         Of the estimators; of several each gets those that it has.
     progress : callable, optional
@@ -254,6 +259,7 @@ def evaluate(
     estimators : estimators
         Those in question.
     scenarios : scenarios
+        One scenario or several, by name, file or themselves.
     runs : int
         Seeds a scenario.
     seed : int
@@ -460,6 +466,7 @@ def bound(
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     runs : int
         Seeds over which it is averaged.
     smoothed : bool

@@ -34,6 +34,7 @@ class Motion:
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
 
     Attributes
     ----------
@@ -91,6 +92,7 @@ class Features:
     features : str
         Key of `FEATURES`.
     instruments : Instruments
+        Datasheets of the run's instruments.
     """
 
     MEMORY = 10.0  # s; of the fading mean

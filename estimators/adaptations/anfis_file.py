@@ -45,6 +45,7 @@ class Parameters:
     largest : float
         Largest log variance factor in training; the output is held in [0, largest].
     network : Sugeno
+        The trained network.
     record : dict
         How it was learnt: command, seeds, errors, version of the simulator.
     """

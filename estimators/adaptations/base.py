@@ -15,6 +15,7 @@ class Innovation(NamedTuple):
     Attributes
     ----------
     measurement : Measurement
+        The measurement that the innovation belongs to.
     residual : (m,) array
         Measured minus predicted, in the units of ``KINDS[kind].errors``.
     predicted : (m, m) array

@@ -117,6 +117,7 @@ class InnovationBased(EstimatedNoise):
     Parameters
     ----------
     source : "innovation" or "residual"
+        What the noise is estimated from: innovations, or residuals after the update.
     shortest, longest : int
         M_min and M_max; equal for a fixed window.
     low, high : float

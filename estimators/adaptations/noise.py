@@ -28,6 +28,7 @@ def posterior(innovation, predicted, noise, residual, after):  # type: ignore[no
     Parameters
     ----------
     innovation : (m,) array
+        Measurement minus its prediction.
     predicted, noise : (m, m) arrays
         H P H' and R.
     residual : (m,) array
@@ -93,13 +94,16 @@ class Posterior:
     Parameters
     ----------
     innovation : Innovation
+        The innovation that is used.
     noise : (m, m) array
+        Covariance of the measurement noise R.
 
     Attributes
     ----------
     nis : float
         -1 where S is singular; then nothing is corrected.
     residual : (m,) array
+        Measurement minus its prediction after the update.
     predicted : (m, m) array
         H P+ H'.
     """
@@ -234,6 +238,7 @@ class EstimatedNoise(NoiseAdaptation):
         Parameters
         ----------
         estimate, nominal : (m, m) array
+            The estimated and the datasheet's covariance of the noise.
         """
         low, high = self.lowest * self.lowest, self.highest * self.highest
         m = len(nominal)

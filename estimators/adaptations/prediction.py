@@ -36,6 +36,7 @@ class PredictionTest:
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
     together : int
         0: never.
     probability : float

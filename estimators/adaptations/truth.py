@@ -241,6 +241,7 @@ def fisher_information(probability: Array, variance: Array) -> Array:
     Parameters
     ----------
     probability : (c,) array
+        Probabilities of the components of the mixture.
     variance : (c, d) array
         Of each component under each hypothesis.
 

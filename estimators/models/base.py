@@ -69,6 +69,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         instruments : Instruments
+            Datasheets of the run's instruments.
         name : str
             Of the estimator, for the message.
 
@@ -141,6 +142,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         measurement : Measurement
+            The measurement to be used.
         covariance : (n, n) array
             Updated.
         correction : (n,) array

@@ -141,6 +141,7 @@ class ShipChain(Chain):
     Parameters
     ----------
     front : ShipModel
+        The model that runs ahead and leaves the nodes behind.
     """
 
     front: ShipModel

@@ -76,7 +76,9 @@ class FederatedEstimator(KalmanEstimator):
     Parameters
     ----------
     model : InertialModel
+        The model of the shared reference.
     adaptation : Adaptation, optional
+        Chooses the noise of each measurement; default: the datasheet's.
     fusion_period : float, optional
         Time between fusions [s]; 0 fuses after every measurement; None: the period of the slowest sensor.
     reset_locals : bool

@@ -56,6 +56,7 @@ def draw_points(covariance, spread, points):  # type: ignore[no-untyped-def]
     covariance : (n, n) array
         Positive semi-definite; a pivot of zero, or below it by rounding, gives a column of zeros.
     spread : float
+        Distance of the points from the mean, in columns of the square root.
     points : (2 n, n) array
         Overwritten.
     """
@@ -74,7 +75,9 @@ class SigmaPointEstimator(KalmanEstimator):
     Parameters
     ----------
     model : PointModel
+        What is estimated, how it moves and how it is observed.
     adaptation : Adaptation, optional
+        Chooses the noise of each measurement; default: the datasheet's.
     alpha : float
         Scale of the points, above 0: they lie ``alpha sqrt(n + kappa)`` sigma out. Small values see the neighbourhood
         only, as an EKF does.

@@ -213,6 +213,7 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
     Parameters
     ----------
     seeds : iterable of int
+        Seeds of the voyages.
     told : callable, optional
         Called after each run with the number of runs so far.
 
@@ -263,6 +264,7 @@ def train(
     features : str
         Key of `FEATURES`.
     data, validation : Data
+        Inputs and targets for training and for validation.
     passes : int
         At most so many.
     told : callable, optional

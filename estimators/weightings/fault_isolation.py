@@ -42,6 +42,7 @@ class MotionTest:
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
     together : int
         Failures running, of a fix and of a log, that make the motion suspect.
     recent : float

@@ -56,6 +56,7 @@ def medians(values, group, fewest, out):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     values : (M,) array
+        Values of all groups.
     group : (M,) array of int
         Of each value, below G.
     fewest : int

@@ -35,6 +35,7 @@ class ProgressBar:
     console : rich.console.Console
         Of standard error.
     text : str
+        The text beside the bar.
     total : int or None
         None while it is not known.
     """

@@ -41,9 +41,11 @@ class Bar:
     Attributes
     ----------
     label : str
+        Name of the method.
     value, low, high : float
         NaN where there is none.
     runs : sequence of float
+        Values of the single runs.
     paper : pair of float
         Least and most; NaN where the paper has none.
     """
@@ -70,9 +72,11 @@ def curves_over_time(
     panels : mapping of str to sequence of Curve
         Label of the vertical axis, with its unit -> curves.
     style : Style
+        Colours and line styles of the methods.
     outages : sequence of (start, end, name)
         Shaded [s].
     title : str
+        Title of the figure.
     """
     with styled():
         fig = figure(7.6, 1.0 + 1.75 * len(panels))
@@ -143,7 +147,9 @@ def bars(panels: Mapping[str, Sequence[Bar]], style: Style, *, title: str = "", 
     panels : mapping of str to sequence of Bar
         Label of the horizontal axis, with its unit -> one bar a method, the same methods in all panels.
     style : Style
+        Colours and line styles of the methods.
     title : str
+        Title of the figure.
     zero : bool
         Mark zero, and never use a logarithmic axis: these are gains.
     """

@@ -171,8 +171,11 @@ class Curve:
     Attributes
     ----------
     label : str
+        Name of the estimator.
     time, values : (n,) array
+        Times [s] and values.
     bound : (n,) array or None
+        The estimator's own three-sigma bound, if it has one.
     """
 
     label: str
@@ -197,8 +200,11 @@ class Dot:
     Attributes
     ----------
     label : str
+        Name of the estimator.
     value, low, high : float
+        The value and its interval.
     runs : sequence of float
+        Values of the single runs.
     hollow : bool
         Reference rows.
     note : str
@@ -236,9 +242,11 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
     Parameters
     ----------
     fig : matplotlib.figure.Figure
+        The figure.
     path : Path
         Its suffix is replaced by the format's.
     formats : sequence of str
+        Endings of the files, such as ``png``.
     dpi : int
         Of pixel formats.
 
@@ -360,9 +368,11 @@ def error_over_time(
     panels : mapping of str to sequence of Band
         Label of the vertical axis, with its unit -> one band for each estimator.
     style : Style
+        Colours and line styles of the estimators.
     outages : sequence of (start, end, name)
         Shaded [s].
     title : str
+        Title of the figure.
     """
     with styled():
         fig = figure(7.6, 1.0 + 2.15 * len(panels))
@@ -493,10 +503,13 @@ def run_chart(
     Parameters
     ----------
     truth : Track
+        The true track.
     tracks : sequence of Track
+        The estimated tracks.
     errors : mapping of str to sequence of Curve
         Label of the vertical axis, with its unit -> one curve for each estimator.
     style : Style
+        Colours and line styles of the estimators.
     fixes : mapping of str to Track, optional
         Instrument -> its position fixes.
     outages : sequence of (start, end, name)
@@ -504,6 +517,7 @@ def run_chart(
     diagnostics : mapping of str to sequence of Curve, optional
         Label of the vertical axis -> curves.
     title : str
+        Title of the figure.
     """
     below = diagnostics or {}
     top, rows = max(len(errors), 1), -(-len(below) // 2)

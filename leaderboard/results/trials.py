@@ -67,6 +67,7 @@ def write(
     key : str
         Of its result.
     trial : Trial
+        The trial to be kept.
     recording : Recording
         That it was run on.
     covariance_interval : float
@@ -114,7 +115,9 @@ def read(folder: str | os.PathLike[str], key: str, recording: Recording) -> tupl
     Parameters
     ----------
     folder : path
+        Folder of the results.
     key : str
+        Key of the result.
     recording : Recording
         That it was run on, made again.
 
