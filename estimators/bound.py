@@ -1,4 +1,4 @@
-"""The posterior Cramer-Rao bound of a scenario: how accurate any real-time estimator can be, by epoch.
+"""The posterior Cramer-Rao bound of a scenario: the best possible accuracy of a real-time estimator, by epoch.
 
 For a state that moves with Phi and Q and is measured with H and R, Jacobians at the truth, the information obeys ::
 

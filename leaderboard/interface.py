@@ -213,7 +213,7 @@ def run(
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> RunReport:
-    """Run estimators once over one scenario, in this process, and score them.
+    """Run estimators once on one scenario, in this process, and score them.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def evaluate(
     results: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> EvaluationReport:
-    """Run estimators beside the baselines on the same seeds, and say where they stand.
+    """Compare estimators with the baselines on the same seeds.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def campaign(
     covariance_interval: float = 0.0,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
-    """Run scenarios x estimators x seeds; started again, it goes on where it was.
+    """Run estimators on scenarios and seeds. Started again, the campaign continues.
 
     Parameters
     ----------
@@ -461,7 +461,7 @@ def bound(
     smoothed: bool = False,
     progress: Callable[..., None] | None = None,
 ) -> BoundReport:
-    """The posterior Cramer-Rao bound of a simulated scenario: no estimator can be better.
+    """The posterior Cramer-Rao bound of a simulated scenario: a lower limit of the error.
 
     Parameters
     ----------

@@ -149,7 +149,7 @@ class AdaptiveFactor(NoiseAdaptation):
         self._variance: dict[str, float] = {}
 
     def choose(self, innovation: Innovation) -> Array:
-        """The noise, over the factor where R is the target; sets the inflation of P."""
+        """The noise to use: R divided by the factor if R is the target. Otherwise sets the inflation of P."""
         name = innovation.measurement.instrument
         if self.printed and self.statistic == "residual":
             statistic = _printed_residual(innovation.residual, innovation.predicted, innovation.noise)

@@ -25,7 +25,7 @@ __all__ = ["Anfis", "Features", "Motion"]
 
 
 class Motion:
-    """Speed, turn rate and change of speed, from what the filter expects a compass and a log to show.
+    """Speed, turn rate and change of speed, from the predicted readings of compass and log.
 
     Measured less innovation is the prediction, in which the filter has smoothed the instrument's noise already; its
     differences, through a first-order low pass, are the rates. All of it is known before the fix that it is used for.
@@ -52,7 +52,7 @@ class Motion:
         self._rates: dict[str, float] = {}
 
     def observe(self, innovation: Innovation) -> None:
-        """See an innovation of any instrument."""
+        """Update the motion from an innovation of any instrument."""
         m = innovation.measurement
         if m.instrument not in (self._heading, self._speed):
             return
@@ -103,7 +103,7 @@ class Features:
         self._recent: dict[str, tuple[float, float]] = {}
 
     def observe(self, innovation: Innovation) -> list[float] | None:
-        """See an innovation; the n inputs where it is a fix of GNSS, else None."""
+        """Update from an innovation; return the n inputs for a fix of GNSS, and None for other measurements."""
         m = innovation.measurement
         if KINDS[m.kind].equation != POSITION:
             self._motion.observe(innovation)
@@ -153,7 +153,7 @@ class Anfis(NoiseAdaptation):
         self._seen: list[float] | None = None
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """The noise to use; compass and log are watched on the way."""
+        """The noise to use; also updates the motion from compass and log."""
         self._seen = self._inputs.observe(innovation)
         return super().adapt(innovation)
 

@@ -1,4 +1,4 @@
-"""The parameter file of the ANFIS: what was learnt, from what, and by which command."""
+"""The parameter file of the ANFIS: the trained network, its data and the command that made it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ParametersError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """A learnt network with the scale of its inputs.
+    """A trained network with the scale of its inputs.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Parameters:
         return ranges
 
     def save(self, path: Path) -> None:
-        """Write the file; OSError where that cannot be."""
+        """Write the file; OSError if it cannot be written."""
         network = self.network
         document = {
             "format": FORMAT,

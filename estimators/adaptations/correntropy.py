@@ -1,4 +1,4 @@
-"""Maximum correntropy: a Gaussian kernel on the residuals in the place of their square."""
+"""Maximum correntropy: a Gaussian kernel of the residuals in place of their square."""
 
 from __future__ import annotations
 

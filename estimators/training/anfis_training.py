@@ -2,9 +2,9 @@
 
 This is a reconstruction: how Jiang et al. (2026) trained their network is not known. Here ships sail three voyages,
 with receivers of different quality, in five kinds of weather for GNSS: healthy; noise that grows; gross errors;
-multipath; all of them. Each trouble comes and goes at random, so that about seven fixes in ten are healthy. They are no
-scenarios of the catalogue, whose faults come at fixed times: a network that had seen those could learn when, instead of
-how.
+multipath; all of them. Faults start and end at random, so that about seven fixes in ten are healthy. These are no
+scenarios of the catalogue, whose faults have fixed times: a network could learn the times instead of the signs of a
+fault.
 
 What is learnt for each fix is ``ln(true variance / datasheet's)``, mean of north and east. The true variance is the
 white noise that the measurement really had, and of the faults that touched it the variance of multipath and the second

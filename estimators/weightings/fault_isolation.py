@@ -56,7 +56,7 @@ class MotionTest:
         self._limits = np.array(chi_square_limits(probability))
         self._is_fix = fixes_and_logs(instruments)
         if len(set(self._is_fix.values())) < 2:
-            self._is_fix = {}  # nobody to ask
+            self._is_fix = {}  # the test needs instruments of both groups
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
         self._tested = -np.inf

@@ -1,4 +1,4 @@
-"""``simnav train``: learns the parameters of a trained estimator anew."""
+"""``simnav train``: trains the parameters of an estimator."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _command(
 
 
 def run(out: Output, features: str, seeds: int, passes: int, output: Path | None) -> None:
-    """Gather, learn, and write the parameter file with two figures beside it."""
+    """Simulate the training data, train, and write the parameter file and two figures."""
     from simnav.estimators.training.anfis_training import (
         FIRST_TRAINING_SEED,
         FIRST_VALIDATION_SEED,

@@ -36,7 +36,7 @@ _DECADES = 30.0  # largest over smallest value, from where on they do not go int
 
 @dataclass(frozen=True, eq=False)
 class Bar:
-    """A figure with its interval, the runs behind it, and the paper's.
+    """A figure with its interval, the values of the runs, and the paper's figure.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ def curves_over_time(
     outages: Sequence[tuple[float, float, str]] = (),
     title: str = "",
 ) -> Figure:
-    """Series of one run, a panel each; where a series has no values for a while, its curve is broken.
+    """Series of one run, one panel each. A curve is interrupted where its series has no values.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def _layer(curve: Curve) -> tuple[bool, float]:
 
 
 def broken(time: Array, values: Array) -> tuple[Array, Array]:
-    """A series without its missing values, with one NaN where it was away for long.
+    """A series without its missing values, with one NaN in each long gap.
 
     >>> broken(np.array([0.0, 1.0, 2.0, 9.0]), np.array([5.0, 6.0, 7.0, 8.0]))[1].tolist()
     [5.0, 6.0, 7.0, nan, 8.0]
@@ -123,7 +123,7 @@ def broken(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _frame(ax: Axes, series: Sequence[Array]) -> None:
-    """Around zero, or from zero on; whoever diverges from the better half leaves the frame rather than flatten them."""
+    """Limits around zero, or from zero on. Curves that are far beyond the better half leave the frame."""
     if not series:
         return
     spans = sorted(float(np.abs(v).max()) for v in series)

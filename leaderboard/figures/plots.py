@@ -166,7 +166,7 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One error over time, with the three-sigma bound that was claimed for it.
+    """One error over time, with the estimator's own three-sigma bound.
 
     Attributes
     ----------
@@ -221,7 +221,7 @@ class Dot:
 
 
 def figure(width: float, height: float) -> Figure:
-    """An empty figure in the house style; ``width`` and ``height`` in inches."""
+    """An empty figure in the common style; ``width`` and ``height`` in inches."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -230,7 +230,7 @@ def figure(width: float, height: float) -> Figure:
 
 
 def styled() -> Any:
-    """The house style, for the time of a ``with`` block."""
+    """The common style, inside a ``with`` block."""
     import matplotlib as mpl
 
     return mpl.rc_context(_RC)
@@ -308,7 +308,7 @@ def trajectory(
     fixes: Mapping[str, Track] | None = None,
     title: str = "",
 ) -> Figure:
-    """Chart of one run: truth, fixes and estimates. The frame is the truth's; what diverges leaves it."""
+    """Chart of one run: truth, fixes and estimates. The frame is that of the truth; estimates that diverge leave it."""
     with styled():
         width, height = _frame(truth)
         fig = figure(7.2, min(max(5.4 * height / width, 3.0), 7.5))
@@ -441,7 +441,7 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
 
 
 def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log: bool = True) -> Figure:
-    """One line an estimator: the runs as faint points, the figure with its interval in front.
+    """One line for each estimator: the runs as faint points, and the figure with its interval.
 
     What is more than `FAR_OFF` times the median estimator stands at the edge, as a number.
     """

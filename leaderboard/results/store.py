@@ -68,7 +68,7 @@ __all__ = [
 _MARKER = "simnav-results.json"
 _LOOSE, _COMPACTED, _TRIALS, _PROVENANCE = "results", "compacted", "trials", "provenance"
 _MOST_PARTS = 16  # more are merged into one
-_STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
+_STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
 T = TypeVar("T")

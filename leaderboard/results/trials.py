@@ -2,7 +2,7 @@
 
 One file a trial, ``trials/KEY.parquet`` in the folder of the results, a row an array. Estimates are kept as the
 difference to the truth, in single precision: what is rounded then is the error, to seven digits, and not the position
-on the Earth. The truth itself is not kept; whoever reads a trial makes the recording again.
+on the Earth. The truth itself is not kept; the recording is computed again when a trial is read.
 """
 
 from __future__ import annotations
