@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from simnav.recording import AidStream, Block
     from simnav.scenario import Scenario
 
-__all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action"]
+__all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action", "most_samples"]
 
 Observation = dict[str, Any]
 
@@ -144,7 +144,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self.closed_loop = closed_loop
         self.render_mode = render_mode
         self._weights = _weights(reward)
-        self._most = _most_samples(scenario)
+        self._most = most_samples(scenario)
         instruments = scenario.instruments_sheet()
         self._widths = {name: len(KINDS[sheet.kind].values) for name, sheet in instruments.items()}
         self.observation_space = _observation_space(self._most, self._widths)
@@ -338,7 +338,7 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
 # ------------------------------------------------------------------------------------------------- spaces
 
 
-def _most_samples(scenario: Scenario) -> dict[str, int]:
+def most_samples(scenario: Scenario) -> dict[str, int]:
     """Per instrument (and ``imu``) the most samples that one step can bring."""
     instruments, step = scenario.instruments_sheet(), scenario.step
     rates = {name: sheet.rate for name, sheet in instruments.items()}
