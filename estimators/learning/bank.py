@@ -173,9 +173,11 @@ def observe(  # type: ignore[no-untyped-def]
             base = at * width
             for i in range(4):
                 row[base + i] = _clipped(memory[b, at, i])
-            row[base + 4] = _clipped(log1p(max(end[b] - memory[b, at, 4], 0.0) / period[at]))
-            row[base + 5] = _clipped(counts[at] / most)
-            row[base + 6] = memory[b, at, 5]
+            x = memory[b, at, 1] ** 2 + memory[b, at, 2] ** 2 + memory[b, at, 3] ** 2
+            row[base + 4] = log1p(sqrt(x))
+            row[base + 5] = _clipped(log1p(max(end[b] - memory[b, at, 4], 0.0) / period[at]))
+            row[base + 6] = _clipped(counts[at] / most)
+            row[base + 7] = memory[b, at, 5]
         base = places * width
         row[base] = _clipped(0.5 * log10(max(P[0, 0] + P[1, 1], 1e-18)))
         for i in range(context.shape[1]):

@@ -6,6 +6,7 @@ most K measurements of a step):
 ====================== =============================================================================================
 mean innovation        fading mean over `MEMORY` seconds of the innovation below
 mean, by component     fading mean of the whitened innovation, three numbers: an error that lasts shows here
+size of the mean       ``ln(1 + norm of these three)``
 age                    ``ln(1 + seconds since the last measurement / its period)``
 number                 measurements in the step over K
 setting                logarithm of the noise scale that is in use, over that of `LARGEST_SCALE`
@@ -53,7 +54,7 @@ WHITE, SPEED, TURN_RATE = 3.0, 10.0, 0.05
 #: Largest factor on a sigma that an agent may set; the smallest is its inverse.
 LARGEST_SCALE = 30.0
 
-PER_INSTRUMENT, PER_MEASUREMENT, CONTEXT = 7, 4, 12
+PER_INSTRUMENT, PER_MEASUREMENT, CONTEXT = 8, 4, 12
 
 
 def observation_size(instruments: int, most: int) -> int:
@@ -65,7 +66,7 @@ def observation_names(instruments: list[str], most: int) -> list[str]:
     """A name for each number of the observation."""
     names = []
     for name in instruments:
-        own = ["mean_innovation", "mean_0", "mean_1", "mean_2", "age", "number", "setting"]
+        own = ["mean_innovation", "mean_0", "mean_1", "mean_2", "size_of_mean", "age", "number", "setting"]
         for j in range(most):
             own += [f"{what}[{j}]" for what in ("innovation", "white_0", "white_1", "white_2")]
         names += [f"{name}.{what}" for what in own]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.truth import TrueNoise
 from simnav.estimators.learning.features import Context
 from simnav.estimators.learning.reference import Linear, ReferenceFilter
+from simnav.estimators.learning.training_voyages import noise_and_multipath
 from simnav.estimators.solvers.oracle import OracleEstimator
 from simnav.log import LogWarning
 from simnav.recording import AidStream, Recording
@@ -23,18 +25,25 @@ from simnav.scenario import Scenario, load
 from simnav.source import open_source
 from simnav.types import Array, Estimate, InitialState, Instruments
 
-__all__ = ["Family", "Prepared", "Voyage", "as_family", "prepare", "recorded"]
+__all__ = ["FAMILIES", "Family", "Prepared", "Voyage", "as_family", "prepare", "recorded"]
 
 #: From the seed of a voyage to its scenario; all of them with the same instruments and the same step.
 Family = Callable[[int], Scenario]
 
+#: Families that are known by name.
+FAMILIES: Mapping[str, Family] = {"noise-and-multipath": noise_and_multipath}
+
 
 def as_family(scenario: Scenario | Family | str | Path) -> Family:
-    """What a task is given for a scenario, as a family; one scenario is the family of itself."""
+    """What a task is given for a scenario, as a family: by name, a scenario as the family of itself, or a family."""
+    if isinstance(scenario, str) and scenario in FAMILIES:
+        return FAMILIES[scenario]
     if isinstance(scenario, (str, Path)):
         scenario = load(scenario)
-    if isinstance(scenario, Scenario):
-        return lambda seed, only=scenario: only  # type: ignore[misc]
+    return partial(_itself, scenario) if isinstance(scenario, Scenario) else scenario
+
+
+def _itself(scenario: Scenario, seed: int) -> Scenario:
     return scenario
 
 
@@ -88,7 +97,7 @@ class Voyage:
         self.recording = recording = recorded(scenario, seed, steps)
         if not len(recording.data.truth):
             raise ValueError(f"scenario {scenario.id}: the run is shorter than one step")
-        self._packets = recording.steps()
+        self._packets = list(recording.steps())
         self.filter = ReferenceFilter()
         self.filter.reset(recording.start, recording.instruments)
         self._knowing: OracleEstimator | None = None
@@ -106,10 +115,10 @@ class Voyage:
 
     def advance(self) -> bool:
         """Take the next step; False where the voyage is over."""
-        packet = next(self._packets, None)
-        if packet is None:
+        if self.step + 1 == self.steps:
             return False
         self.step += 1
+        packet = self._packets[self.step]
         truth, k = self.recording.data.truth, self.step
         self.truth = np.stack([truth.position[k], truth.velocity[k], truth.attitude[k]])
         self.context = self._context.numbers()
