@@ -1,7 +1,8 @@
 """An agent without gradients: the cross-entropy method on the tuning task, in NumPy.
 
-A policy is linear in `SEEN`, a few numbers of the observation. Each generation draws policies from a normal distribution, lets all of them steer
-filters over the same training voyages at once, and fits the distribution to the best eighth. Run it::
+A policy is linear in `SEEN`, a few numbers of the observation. Each generation draws policies from a normal
+distribution, lets all of them steer filters over the same training voyages at once, and fits the distribution to the
+best eighth. Run it::
 
     python examples/cross_entropy.py --output policy.npz
 

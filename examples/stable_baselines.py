@@ -4,8 +4,8 @@ Install the extra ``rl`` (``pip install simnav[rl]``) and run it; it takes less 
 
     python examples/stable_baselines.py --output policy.npz
 
-The policy learns from training voyages with noise steps and multipath. It is scored on other voyages of the same family,
-beside the plain filter, and written to a file of plain arrays that ``simnav`` runs without this library.
+The policy learns from training voyages with noise steps and multipath. It is scored on other voyages of the same
+family, beside the plain filter, and written to a file of plain arrays that ``simnav`` runs without this library.
 """
 
 from __future__ import annotations

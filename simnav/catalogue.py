@@ -49,6 +49,8 @@ class Header:
         Scenarios of one track are ranked together; a group is what some of them have in common.
     path : Path
         Path of the TOML file.
+    recorded : bool
+        Whether the measurements come from a log.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Header:
     track: str
     group: str
     path: Path
+    recorded: bool = False
 
     @property
     def id(self) -> str:
@@ -154,6 +157,7 @@ def _header(path: Path) -> Header | None:
         track=str(table.get("track", "other")),
         group=str(table.get("group", "other")),
         path=path,
+        recorded="log" in table,
     )
 
 

@@ -16,7 +16,7 @@ from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, P
 
 __all__ = ["MEMORY_COLUMNS", "REWARDS", "observe", "reward", "set_scales", "take"]
 
-#: Of each instrument: four fading means, time of the last measurement, logarithm of the scale in use (over the largest).
+#: Of each instrument: four fading means, time of the last measurement, logarithm of the scale over the largest.
 MEMORY_COLUMNS = 6
 #: Codes of the rewards (`reward`).
 REWARDS = {"error": 0, "likelihood": 1, "labels": 2, "improvement": 3}

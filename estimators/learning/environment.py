@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 from simnav.earth import displace
 from simnav.environment.rendering import Chart
 from simnav.environment.seeds import training_seed
-from simnav.estimators.learning.features import LIMIT
+from simnav.estimators.learning.features import LIMIT, Numbers
 from simnav.estimators.learning.filters import Filters, checked_actions, layout_of_scenario
 from simnav.estimators.learning.tasks import TASKS, Task
 from simnav.estimators.learning.voyage import Family, Voyage, as_family
 from simnav.scenario import Scenario
-from simnav.types import KINDS, Array
+from simnav.types import KINDS
 
 __all__ = ["FilterTaskEnv", "TaskOptions", "run_seed"]
 
@@ -100,7 +100,7 @@ def run_seed(seed: int | None, rng: np.random.Generator, voyages: int | None) ->
     return int(rng.integers(2**63 - 1)) if seed is None else int(seed)
 
 
-class FilterTaskEnv(gymnasium.Env[Array, Array]):
+class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
     """One of the tasks of `simnav.estimators.learning.tasks`, over one voyage at a time.
 
     Parameters
@@ -141,7 +141,7 @@ class FilterTaskEnv(gymnasium.Env[Array, Array]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Numbers, dict[str, Any]]:
         """Begin a voyage.
 
         Parameters
@@ -176,7 +176,7 @@ class FilterTaskEnv(gymnasium.Env[Array, Array]):
         info = {"seed": run, "start": recording.start, "instruments": recording.instruments}
         return self._observe(voyage, self._filters), info
 
-    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
         """Decide on the step that was observed; get its reward and the next observation.
 
         Raises
@@ -226,11 +226,12 @@ class FilterTaskEnv(gymnasium.Env[Array, Array]):
             self._chart.close()
         self._chart = self._voyage = None
 
-    def _observe(self, voyage: Voyage, filters: Filters) -> Array:
+    def _observe(self, voyage: Voyage, filters: Filters) -> Numbers:
         self._last[0] = voyage.filter.count
         end = np.array([voyage.estimate.time])
         filters.observe(voyage.filter.linear, self._first, self._last, end, voyage.context[None], _ON)
-        return filters.observation[0].copy()
+        observation: Numbers = filters.observation[0].copy()
+        return observation
 
     def _draw(self, chart: Chart, voyage: Voyage, filters: Filters) -> None:
         position = voyage.estimate.position

@@ -1,4 +1,4 @@
-"""What an agent is worth on voyages that it has not seen, beside the plain filter, an agent by chance and the oracle."""
+"""What an agent is worth on voyages that it has not seen, beside the plain filter, chance and the oracle."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from simnav.environment.seeds import is_training
+from simnav.estimators.learning.features import Numbers
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 from simnav.estimators.learning.voyage import Family
 from simnav.scenario import Scenario
@@ -18,7 +19,7 @@ from simnav.types import Array
 __all__ = ["Agent", "Worth", "by_chance", "interval", "plain", "scoring_envs", "worth"]
 
 #: From (b, o) observations to (b, ...) actions.
-Agent = Callable[[Array], Array]
+Agent = Callable[[Numbers], Numbers]
 
 _LEVEL = 0.975
 

@@ -25,8 +25,10 @@ Everything is clipped to +-`LIMIT`. Numbers that a filter does not have (a headi
 from __future__ import annotations
 
 from math import atan2, cos, hypot, log10, radians, sin
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.types import Array, Estimate, InitialState
 
@@ -41,9 +43,13 @@ __all__ = [
     "TURN_RATE",
     "WHITE",
     "Context",
+    "Numbers",
     "observation_names",
     "observation_size",
 ]
+
+#: Observations and actions, of any type of number.
+Numbers = NDArray[Any]
 
 #: Bound of every number of an observation.
 LIMIT = 10.0
@@ -103,7 +109,8 @@ class Context:
             hypot(self._velocity[0], self._velocity[1]) / SPEED, cos(self._heading), sin(self._heading),
             self._turn / TURN_RATE, np.log1p(self._time / 60.0) / 5.0,
         ]  # fmt: skip
-        return np.nan_to_num(np.concatenate([motion, self._start]))
+        numbers: Array = np.nan_to_num(np.concatenate([motion, self._start]))
+        return numbers
 
     def move(self, estimate: Estimate) -> None:
         """Take the plain filter's estimate at the end of a step."""

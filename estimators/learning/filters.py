@@ -171,5 +171,3 @@ def checked_actions(actions: object, shape: tuple[int, ...], what: str) -> Array
     if not np.isfinite(array).all():
         raise ValueError(f"{what} finite, not {array.tolist()}")
     return array
-
-

@@ -1,7 +1,7 @@
 """A trained policy as a file of plain arrays: a network, what it expects, and what it was trained on.
 
-The file is an ``.npz`` without pickle: ``meta`` (JSON), ``mean`` and ``deviation`` of the observation, and ``weight_0``,
-``bias_0``, ``weight_1``, ... of the layers. Between the layers is a hyperbolic tangent, and the last is clipped to the
+The file is an ``.npz`` without pickle: ``meta`` (JSON), ``mean`` and ``deviation`` of the observation, and
+``weight_0``, ``bias_0``, ``weight_1``, ... of the layers. Between the layers is a hyperbolic tangent, and the last is clipped to the
 bounds of the action. So networks of any library fit, and none of them is needed to use one.
 """
 
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from simnav.environment.seeds import require_disjoint
+from simnav.estimators.learning.features import Numbers
 from simnav.estimators.learning.filters import Layout
 from simnav.estimators.learning.tasks import TASKS
 from simnav.types import Array
@@ -78,7 +79,8 @@ class Policy:
         self.version = now if version is None else version
         if self.version != now:
             raise PolicyError(
-                f"{source}: it was trained on version {self.version} of {task}, but this is version {now}; train it again"
+                f"{source}: it was trained on version {self.version} of {task}, but this is version {now}; "
+                "train it again"
             )
         self.layers = [(np.array(w, dtype=np.float64), np.array(b, dtype=np.float64)) for w, b in layers]
         self.task, self.kinds, self.most, self.instruments = task, list(kinds), int(most), instruments
@@ -91,8 +93,8 @@ class Policy:
         for i, (w, b) in enumerate(self.layers):
             if w.ndim != 2 or b.shape != w.shape[:1] or w.shape[1] != size:
                 raise PolicyError(
-                    f"{source}: layer {i} has a weight of shape {w.shape} and a bias of shape {b.shape}; it should take "
-                    f"{size} numbers"
+                    f"{source}: layer {i} has a weight of shape {w.shape} and a bias of shape {b.shape}; it should "
+                    f"take {size} numbers"
                 )
             size = w.shape[0]
         arrays = [self.mean, self.deviation, *(a for layer in self.layers for a in layer)]
@@ -101,7 +103,7 @@ class Policy:
         if not all(np.isfinite(a).all() for a in arrays) or not (self.deviation > 0.0).all():
             raise PolicyError(f"{source}: its numbers should be finite, and the deviations positive")
 
-    def __call__(self, observation: Array) -> Array:
+    def __call__(self, observation: Numbers) -> Numbers:
         """The action for one observation, or for several in rows."""
         x = (np.asarray(observation, dtype=np.float64) - self.mean) / self.deviation
         for i, (weight, bias) in enumerate(self.layers):
@@ -116,8 +118,8 @@ class Policy:
         """Refuse instruments that it was not trained for: PolicyError."""
         if layout.kinds != self.kinds or layout.most != self.most:
             raise PolicyError(
-                f"{self.source}: it was trained for {', '.join(self.kinds)} with at most {self.most} measurements a step "
-                f"of each, not for {', '.join(layout.kinds)} with {layout.most}"
+                f"{self.source}: it was trained for {', '.join(self.kinds)} with at most {self.most} measurements a "
+                f"step of each, not for {', '.join(layout.kinds)} with {layout.most}"
             )
         actions = {
             "Tuning": len(layout.names) + 1, "Correction": 7, "Detection": len(layout.names) * layout.most,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.estimators.learning.environment import TaskOptions
 from simnav.estimators.learning.reference import Linear
@@ -109,6 +110,6 @@ class Pool:
         self.covariance[at] = voyage.start_covariance
         self.start[at] = voyage.start
 
-    def rows(self, array: Array, slots: Array, steps: Array) -> Array:
+    def rows(self, array: Array, slots: NDArray[np.int64], steps: NDArray[np.int64]) -> Array:
         """Of each of b filters: the numbers of its voyage at its step."""
         return np.ascontiguousarray(array[slots, steps])

@@ -116,16 +116,19 @@ class ReferenceFilter(KalmanEstimator):
         self.count = 0
         self._moved: tuple[Array, Array] | None = None
         estimate = super().update(measurements)
+        self._end()
+        return estimate
+
+    def _end(self) -> None:
+        """A propagation without a measurement is an event of its own."""
         if self._moved is not None:
             self._append()
-        return estimate
 
     def _propagate(self, until: float) -> None:
         elapsed = until - self.model.time
         if elapsed <= 0.0:
             return
-        if self._moved is not None:  # a measurement was skipped: two propagations in a row
-            self._append()
+        self._end()  # a measurement was skipped: two propagations in a row
         before = self.covariance.copy()
         super()._propagate(until)
         transition = np.eye(self.model.size)

@@ -132,4 +132,3 @@ class Correction(Task):
 
 #: By name.
 TASKS: dict[str, type[Task]] = {task.name: task for task in (Tuning, Detection, Correction)}
-

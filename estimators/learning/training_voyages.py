@@ -8,6 +8,8 @@ changes.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from simnav.scenario import Scenario
@@ -39,18 +41,22 @@ def noise_and_multipath(seed: int) -> Scenario:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
     grade, sigma, speed = drawn(0.3, 10.0), drawn(0.5, 3.0), drawn(1.5, 12.0)
-    turns = [
-        {"kind": "turn", "angle_deg": float(rng.choice([-1.0, 1.0])) * drawn(20.0, 150.0), "rate_deg_s": drawn(0.7, 4.0)}
+    turns: list[dict[str, Any]] = [
+        {
+            "kind": "turn",
+            "angle_deg": float(rng.choice([-1.0, 1.0])) * drawn(20.0, 150.0),
+            "rate_deg_s": drawn(0.7, 4.0),
+        }
         for _ in range(4)
     ]
-    holds = [{"kind": "hold", "duration_s": drawn(10.0, 60.0)} for _ in range(4)]
-    faults = []
+    holds: list[dict[str, Any]] = [{"kind": "hold", "duration_s": drawn(10.0, 60.0)} for _ in range(4)]
+    faults: list[dict[str, Any]] = []
     for kind in ("noise_step", "multipath"):
         begin, length = float(rng.uniform(20.0, 160.0)), drawn(20.0, 120.0)
         factor, size, time = drawn(2.0, 20.0), drawn(2.0, 20.0), drawn(5.0, 100.0)
         if rng.random() < 0.2:
             continue
-        fault = {"kind": kind, "instruments": ["gnss"], "start_s": begin, "end_s": begin + length}
+        fault: dict[str, Any] = {"kind": kind, "instruments": ["gnss"], "start_s": begin, "end_s": begin + length}
         if kind == "noise_step":
             fault["factor"] = factor
         else:

@@ -1,8 +1,9 @@
 """The vector form of the tasks around a running filter: a bank of filters, stepped in one compiled pass.
 
-A voyage is prepared once (simulated, filtered by the plain filter and by the oracle, linearised) and kept; a step of the
-bank is then one pass over shared arrays. The numbers are those of `simnav.estimators.learning.environment.FilterTaskEnv`,
-bit for bit. What is new to the pool costs its preparation at the reset: learn from a number of ``voyages``.
+A voyage is prepared once (simulated, filtered by the plain filter and by the oracle, linearised) and kept. A step of the
+bank is then one pass over shared arrays. The numbers are those of `FilterTaskEnv`
+(`simnav.estimators.learning.environment`), bit for bit. What is new to the pool costs its preparation at the reset: learn
+from a number of ``voyages``.
 """
 
 from __future__ import annotations
@@ -20,16 +21,16 @@ from numpy.typing import NDArray
 
 from simnav.environment.vector import autoreset_of, reset_mask, seeds_of
 from simnav.estimators.learning.environment import FilterTaskEnv, TaskOptions, run_seed
+from simnav.estimators.learning.features import Numbers
 from simnav.estimators.learning.filters import Filters, checked_actions
 from simnav.estimators.learning.pool import Pool
 from simnav.estimators.learning.voyage import Family
 from simnav.scenario import Scenario
-from simnav.types import Array
 
 __all__ = ["FilterTaskVectorEnv"]
 
 
-class FilterTaskVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
+class FilterTaskVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
     """One of the tasks of `simnav.estimators.learning.tasks`, over n voyages at a time.
 
     Parameters
@@ -87,7 +88,7 @@ class FilterTaskVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         *,
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Numbers, dict[str, Any]]:
         """Begin the voyages.
 
         Parameters
@@ -119,7 +120,7 @@ class FilterTaskVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         assert filters is not None
         return filters.observation.copy(), infos
 
-    def step(self, actions: Array) -> tuple[Array, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+    def step(self, actions: Numbers) -> tuple[Numbers, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Decide on the steps that were observed.
 
         Raises
@@ -167,12 +168,13 @@ class FilterTaskVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
                 final[i] = filters.observation[i].copy()
             infos |= {"final_obs": final, "_final_obs": ended.copy(), "final_info": infos, "_final_info": ended.copy()}
             infos |= self._begin(np.flatnonzero(ended).tolist(), None)
-        truncated = ended if self.autoreset_mode != AutoresetMode.DISABLED else self._over.copy()
+        truncated: NDArray[Any] = ended if self.autoreset_mode != AutoresetMode.DISABLED else self._over.copy()
         return filters.observation.copy(), rewards, np.zeros(self.num_envs, np.bool_), truncated, infos
 
     def _begin(self, voyages: list[int], seeds: Sequence[int | None] | None) -> dict[str, Any]:
         """Begin some voyages; the infos."""
-        o, infos = self.options, {}
+        o = self.options
+        infos: dict[str, Any] = {}
         used = set(self._slots[~self._over].tolist()) if self._filters is not None else set()
         for i in voyages:
             run = run_seed(None if seeds is None else seeds[i], self._rngs[i], o.voyages)

@@ -1,9 +1,9 @@
 """The vector form of the environment: several independent runs of one scenario side by side.
 
-It behaves like Gymnasium's own vector environments: an integer seed is ``seed + i`` for sub-environment i, and a run that
-is over begins anew with the next step. Neighbouring base seeds then share most of their runs: who compares runs of
-different base seeds asks for ``independent_seeds``. Who follows n episodes to their ends takes `AutoresetMode.DISABLED`:
-episodes that are assigned beforehand do not favour those that end first.
+It behaves like Gymnasium's own vector environments: an integer seed is ``seed + i`` for sub-environment i, and a run
+that is over begins anew with the next step. Neighbouring base seeds then share most of their runs: who compares runs of
+different base seeds asks for ``independent_seeds``. Who follows n episodes to their ends takes
+`AutoresetMode.DISABLED`: episodes that are assigned beforehand do not favour those that end first.
 """
 
 from __future__ import annotations
