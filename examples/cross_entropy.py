@@ -43,7 +43,9 @@ def returns_of(envs, weights, seed, repeats):
     return total / repeats
 
 
-def train(scenario="noise-and-multipath", *, generations=40, population=64, repeats=4, voyages=128, steps=None, seed=0):
+def train(
+    scenario="training-gnss-faults", *, generations=40, population=64, repeats=4, voyages=128, steps=None, seed=0
+):
     """The policy, and the mean return of the whole population in each generation."""
     envs = FilterTaskVectorEnv(scenario, "Tuning", population, instruments="fixes", voyages=voyages, steps=steps)
     shape = envs.single_action_space.shape[0], len(SEEN) + 1

@@ -22,7 +22,7 @@ from simnav.estimators.learning.evaluation import interval, plain, scoring_envs,
 from simnav.estimators.learning.policy import Policy
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
-FAMILY = "noise-and-multipath"
+FAMILY = "training-gnss-faults"
 
 
 class BankOfFilters(VecEnv):

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         bound,
         campaign,
         check,
+        cite,
         evaluate,
         make,
         rank,
@@ -83,6 +84,7 @@ __all__ = [
     "bound",
     "campaign",
     "check",
+    "cite",
     "evaluate",
     "load",
     "load_plugin",
@@ -135,6 +137,7 @@ _HOMES = {
         "bound",
         "campaign",
         "check",
+        "cite",
         "evaluate",
         "make",
         "rank",
@@ -173,7 +176,6 @@ def _register_scenarios() -> None:
                 kwargs={"scenario": header.id},
             )
         _register_tasks(header.gym_id, header.id, recorded=header.recorded)
-    _register_tasks("simnav/NoiseAndMultipath-v1", "noise-and-multipath", recorded=True)
 
 
 # Learning tasks are of the second floor: their entry points are texts, so that the library does not import them.
@@ -181,7 +183,7 @@ _LEARNING = "simnav.estimators.learning"
 
 
 def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
-    """Give the learning tasks over a scenario, or over a training family, their Gymnasium ids (docs/tasks.md)."""
+    """Give the learning tasks over a scenario their Gymnasium ids."""
     name, _, version = gym_id.rpartition("-v")
     for task in ("Tuning", "Detection", "Correction"):
         task_id = f"{name}-{task}-v{version}"

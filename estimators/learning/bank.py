@@ -56,7 +56,7 @@ def _clipped(value):  # type: ignore[no-untyped-def]
 
 @kernel(
     "void(f8[:, :, ::1], b1[::1], i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], "
-    "i8[::1], i8[::1], f8[::1], f8[:, ::1], i8[::1], f8[::1], i8, b1[::1], "
+    "i8[::1], i8[::1], f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, b1[::1], "
     "f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f4[:, ::1])"
 )
 def observe(  # type: ignore[no-untyped-def]
@@ -79,7 +79,7 @@ def observe(  # type: ignore[no-untyped-def]
         As of `simnav.estimators.learning.features.Context`.
     place : (k,) int array
         Of each instrument: its place in the observation; -1 for none.
-    period : (p,) array
+    period : (b, p) array
         Of each place: nominal time between two measurements [s].
     most : int
         Measurements a step that have room in the observation.
@@ -93,7 +93,7 @@ def observe(  # type: ignore[no-untyped-def]
         Overwritten for the filters that are active.
     """
     n = delta.shape[1]
-    places = period.size
+    places = period.shape[1]
     width = PER_INSTRUMENT + PER_MEASUREMENT * most
     ahead, moved = np.empty(n), np.empty(n)
     counts = np.empty(places, np.int64)
@@ -175,7 +175,7 @@ def observe(  # type: ignore[no-untyped-def]
                 row[base + i] = _clipped(memory[b, at, i])
             x = memory[b, at, 1] ** 2 + memory[b, at, 2] ** 2 + memory[b, at, 3] ** 2
             row[base + 4] = log1p(sqrt(x))
-            row[base + 5] = _clipped(log1p(max(end[b] - memory[b, at, 4], 0.0) / period[at]))
+            row[base + 5] = _clipped(log1p(max(end[b] - memory[b, at, 4], 0.0) / period[b, at]))
             row[base + 6] = _clipped(counts[at] / most)
             row[base + 7] = memory[b, at, 5]
         base = places * width

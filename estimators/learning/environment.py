@@ -21,14 +21,14 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from simnav.earth import displace
 from simnav.environment.rendering import Chart
 from simnav.environment.seeds import training_seed
 from simnav.estimators.learning.features import LIMIT, Numbers
 from simnav.estimators.learning.filters import Filters, checked_actions, layout_of_scenario
 from simnav.estimators.learning.tasks import TASKS, Task
-from simnav.estimators.learning.voyage import Family, Voyage, as_family
-from simnav.scenario import Scenario
+from simnav.estimators.learning.voyage import Voyage
+from simnav.geometry.earth import displace
+from simnav.scenario import Scenario, load
 from simnav.types import KINDS
 
 __all__ = ["FilterTaskEnv", "TaskOptions", "run_seed"]
@@ -41,9 +41,8 @@ class TaskOptions:
 
     Parameters
     ----------
-    scenario : Scenario, str, path or family
-        A scenario, its name in the catalogue, a TOML file, or a function from the seed of a voyage to its scenario;
-        all scenarios of a family have the same instruments and the same step.
+    scenario : Scenario, str or path
+        A scenario, its name in the catalogue, or a TOML file.
     task : str
         One of `simnav.estimators.learning.tasks.TASKS`.
     reward : str, optional
@@ -67,7 +66,7 @@ class TaskOptions:
     """
 
     def __init__(
-        self, scenario: Scenario | Family | str | Path, task: str, reward: str | None, instruments: str,
+        self, scenario: Scenario | str | Path, task: str, reward: str | None, instruments: str,
         steps: int | None, voyages: int | None, reveal_truth: bool,
     ):  # fmt: skip
         if task not in TASKS:
@@ -75,8 +74,8 @@ class TaskOptions:
         for name, value in (("steps", steps), ("voyages", voyages)):
             if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
                 raise ValueError(f"{name} is a positive integer or None, not {value!r}")
-        self.family, self.steps, self.voyages, self.reveal_truth = as_family(scenario), steps, voyages, reveal_truth
-        self.scenario = self.family(training_seed(0) if voyages else 0)
+        self.scenario = load(scenario) if isinstance(scenario, (str, Path)) else scenario
+        self.steps, self.voyages, self.reveal_truth = steps, voyages, reveal_truth
         self.layout = layout_of_scenario(self.scenario, instruments)
         self.task: Task = TASKS[task](self.layout.names, self.layout.most)
         self.reward = self.task.rewards[0] if reward is None else reward
@@ -119,7 +118,7 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
 
     def __init__(
         self,
-        scenario: Scenario | Family | str | Path,
+        scenario: Scenario | str | Path,
         task: str = "Tuning",
         *,
         reward: str | None = None,
@@ -160,11 +159,11 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
         super().reset(seed=seed)
         o = self.options
         run = run_seed(seed, self.np_random, o.voyages)
-        scenario = o.family(run)
-        self._voyage = voyage = Voyage(scenario, run, o.steps, oracle=o.oracle)
+        scenario = o.scenario
+        self._voyage = voyage = Voyage(scenario, run, o.layout.watched, o.steps, oracle=o.oracle)
         n = voyage.filter.model.size
         self._filters = Filters(o.task, o.layout, o.reward, 1, n)
-        self._filters.begin(0, voyage.filter.start_covariance)
+        self._filters.begin(0, voyage.filter.start_covariance, o.layout.periods(voyage.recording.instruments))
         if self.render_mode is not None:
             if self._chart is None:
                 self._chart = Chart(scenario.id, scenario.duration, human=self.render_mode == "human")
@@ -239,7 +238,7 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
             return
         linear, data = voyage.filter.linear, voyage.recording.data
         for e in range(voyage.filter.count):
-            name = voyage.filter.watched[linear.instrument[e]] if linear.size[e] else ""
+            name = self.options.layout.watched[linear.instrument[e]] if linear.size[e] else ""
             if name and KINDS[data.aids[name].kind].role == "fix":
                 stream = data.aids[name]
                 k = min(int(np.searchsorted(stream.time, linear.time[e] - 1e-9)), len(stream.time) - 1)

@@ -12,7 +12,6 @@ from gymnasium.vector import AutoresetMode
 from simnav.environment.seeds import is_training
 from simnav.estimators.learning.features import Numbers
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
-from simnav.estimators.learning.voyage import Family
 from simnav.scenario import Scenario
 from simnav.types import Array
 
@@ -45,7 +44,7 @@ def by_chance(envs: FilterTaskVectorEnv, seed: int = 0) -> Agent:
 
 
 def scoring_envs(
-    scenario: Scenario | Family | str | Path, seeds: Sequence[int], task: str = "Tuning", **options: object
+    scenario: Scenario | str | Path, seeds: Sequence[int], task: str = "Tuning", **options: object
 ) -> FilterTaskVectorEnv:
     """The voyages to score on, side by side; ValueError where a seed is one of training."""
     if wrong := [s for s in seeds if is_training(s)]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,41 +24,45 @@ class Layout:
     Parameters
     ----------
     watched : list of str
-        The instruments that the plain filter uses.
-    instruments : Instruments
+        The instruments that the plain filter uses in any run.
+    kinds : list of str
+        Of those that the agent is asked about.
     names : list of str
         Those that the agent is asked about.
     most : int
         Room for so many measurements a step of each.
+    states : int
+        Most states of the filter.
 
     Attributes
     ----------
     place : (k,) int array
         Of each watched instrument; -1 where the agent is not asked.
-    period : (p,) array
-        Nominal time between two measurements [s].
     size : int
         Length of the observation.
     """
 
-    def __init__(self, watched: list[str], instruments: Instruments, names: list[str], most: int):
-        self.watched, self.names, self.most = watched, names, most
-        self.kinds = [instruments[name].kind for name in names]
+    def __init__(self, watched: list[str], names: list[str], kinds: list[str], most: int, states: int):
+        self.watched, self.names, self.kinds, self.most, self.states = watched, names, kinds, most, states
         self.place = np.array([names.index(name) if name in names else -1 for name in watched], dtype=np.int64)
-        self.period = np.array([1.0 / instruments[name].rate for name in names])
         self.size = observation_size(len(names), most)
 
+    def periods(self, instruments: Instruments) -> Array:
+        """(p,) array: nominal time between two measurements of each in a run [s]; 1 where it is not there."""
+        return np.array([1.0 / instruments[name].rate if name in instruments else 1.0 for name in self.names])
 
-def layout_of(instruments: Instruments, which: str, most: dict[str, int] | None = None) -> Layout:
-    """The layout for the instruments of a run.
+
+def layout_of(runs: Sequence[Instruments], which: str, most: Sequence[Mapping[str, int]] | None = None) -> Layout:
+    """The layout that holds the instruments of any run.
 
     Parameters
     ----------
-    instruments : Instruments
+    runs : sequence of Instruments
+        Of all that a run may have.
     which : "all" or "fixes"
         Whom the agent is asked about: every instrument that the filter uses, or those that give a position.
-    most : dict, optional
-        Most measurements of each in one step; by default of its rate.
+    most : sequence of mapping, optional
+        For each, most measurements of each instrument in one step; by default of its rate.
 
     Raises
     ------
@@ -69,19 +75,29 @@ def layout_of(instruments: Instruments, which: str, most: dict[str, int] | None 
         raise ValueError(f"instruments is 'all' or 'fixes', not {which!r}")
     # Any start does: it is the instruments that decide on the states.
     start = InitialState(0.0, np.array([0.5, 0.5, 0.0]), np.zeros(3), np.zeros(3), np.eye(9))
-    trial = ReferenceFilter()
-    trial.reset(start, instruments)
-    names = [n for n in trial.watched if which == "all" or instruments[n].role == "fix"]
+    watched: dict[str, str] = {}
+    names: dict[str, str] = {}
+    room, states = 1, 0
+    for i, instruments in enumerate(runs):
+        trial = ReferenceFilter(list(instruments))
+        trial.reset(start, instruments)
+        states = max(states, trial.model.size)
+        for name in trial.watched:
+            sheet = instruments[name]
+            watched.setdefault(name, sheet.kind)
+            if which == "all" or sheet.role == "fix":
+                names.setdefault(name, sheet.kind)
+                by_rate = max(1, int(np.ceil(sheet.rate * instruments.step - 1e-6)))
+                room = max(room, by_rate if most is None else most[i][name])
     if not names:
         raise ValueError("there is no instrument that gives a position; say instruments='all'")
-    if most is None:
-        most = {n: max(1, int(np.ceil(instruments[n].rate * instruments.step - 1e-6))) for n in names}
-    return Layout(trial.watched, instruments, names, max(most[n] for n in names))
+    return Layout(list(watched), list(names), list(names.values()), room, states)
 
 
 def layout_of_scenario(scenario: Scenario, which: str) -> Layout:
-    """The layout for a scenario; that of a log has room for measurements that come late."""
-    return layout_of(scenario.instruments_sheet(), which, most_samples(scenario))
+    """The layout for a scenario, whatever is drawn; that of a log has room for measurements that come late."""
+    possible = scenario.extremes()
+    return layout_of([s.instruments_sheet() for s in possible], which, [most_samples(s) for s in possible])
 
 
 class Filters:
@@ -113,11 +129,13 @@ class Filters:
         self.memory = np.zeros((b, p, MEMORY_COLUMNS))
         self.decision = Decision(b, p, layout.most)
         self.observation = np.zeros((b, layout.size), np.float32)
-        self.rewards = np.zeros(b)
+        self.rewards, self.period = np.zeros(b), np.ones((b, p))
 
-    def begin(self, i: int, start_covariance: Array) -> None:
-        """Begin a voyage with the i-th filter."""
-        self.covariance[i], self.delta[i], self.memory[i] = start_covariance, 0.0, 0.0
+    def begin(self, i: int, start_covariance: Array, period: Array) -> None:
+        """Begin a voyage with the i-th filter; ``period`` as of `Layout.periods`."""
+        n = len(start_covariance)
+        self.covariance[i], self.delta[i], self.memory[i] = 0.0, 0.0, 0.0
+        self.covariance[i, :n, :n], self.period[i] = start_covariance, period
         self.observation[i] = 0.0
 
     def observe(
@@ -128,7 +146,7 @@ class Filters:
         observe(
             linear.transition, linear.moves, linear.instrument, linear.time, linear.size, linear.innovation,
             linear.jacobian, linear.noise, linear.correction, first, last, end, context, self.layout.place,
-            self.layout.period, self.layout.most, active, self.covariance, self.delta, self.memory, self.observation,
+            self.period, self.layout.most, active, self.covariance, self.delta, self.memory, self.observation,
         )  # fmt: skip
 
     def decide(self, actions: Array) -> None:

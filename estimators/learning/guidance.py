@@ -4,9 +4,9 @@ The track is the one that the scenario's manoeuvres plan (`simnav.world.track.Pl
 filter, or any estimator) runs on what the instruments deliver; the agent sees its estimate and never the truth, and the
 vessel goes where the agent steers it, so that an error of the estimate becomes an error of the track.
 
-Action: two numbers in [-1, 1], clipped. The first is the heading that is steered, as the navigator believes it, less the
-planned one (ahead by the time that the vessel needs to answer), over `LARGEST_TURN`. The second, a, is the speed through
-the water: ``1 + a / 2`` times the planned one. 0, 0 is the planned heading and speed.
+Action: two numbers in [-1, 1], clipped. The first is the heading that is steered, as the navigator believes it, less
+the planned one (ahead by the time that the vessel needs to answer), over `LARGEST_TURN`. The second, a, is the speed
+through the water: ``1 + a / 2`` times the planned one. 0, 0 is the planned heading and speed.
 
 Observation, float32, clipped to +-`LIMIT`, all as estimated:
 
@@ -41,7 +41,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from simnav.earth import relative_position
 from simnav.environment.rendering import Chart
 from simnav.estimator import Estimator, make
 from simnav.estimators.learning.environment import run_seed
@@ -49,6 +48,7 @@ from simnav.estimators.learning.features import LIMIT, SPEED, TURN_RATE, Numbers
 from simnav.estimators.learning.filters import checked_actions
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.geometry.earth import relative_position
 from simnav.recording import packets
 from simnav.scenario import Scenario, load
 from simnav.simulator import Simulator
@@ -178,14 +178,7 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         self.navigator: Estimator = KalmanEstimator(Suitable()) if navigator is None else navigator
         if self.navigator.reference:
             raise ValueError(f"navigator {self.navigator.name!r} is a reference that is told the truth")
-        vessel = scenario.vessel or Vessel()
-        planned = World(
-            scenario.start, vessel, scenario.manoeuvres, None, scenario.current, rate=PlannedTrack.RATE, seed=0
-        )
-        self._route = Route(PlannedTrack(planned), scenario.duration)
-        self._ahead = round(2.0 * vessel.turn_time_constant)
-        self._adrift = scenario.model_copy(update={"manoeuvres": (), "world_seed": None})
-        self._fixes = [n for n, s in scenario.instruments_sheet().items() if s.role == "fix"]
+        self._fixes = {n for r in scenario.extremes() for n, s in r.instruments_sheet().items() if s.role == "fix"}
         self.observation_space = spaces.Box(-LIMIT, LIMIT, (SIZE,), dtype=np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), dtype=np.float32)
         self._chart: Chart | None = None
@@ -197,7 +190,14 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         """Begin a voyage; the observation is of the start. The arguments as of `NavigationEnv.reset`."""
         super().reset(seed=seed)
         run = run_seed(seed, self.np_random, self.voyages)
-        self._source = source = Simulator(self._adrift, run)
+        scenario = self.scenario.drawn(run)
+        assert scenario.start is not None
+        vessel = scenario.vessel or Vessel()
+        planned = World.plan(scenario.start, vessel, scenario.manoeuvres, scenario.current)
+        self._route = Route(planned, scenario.duration)
+        self._ahead = round(2.0 * vessel.turn_time_constant)
+        adrift = scenario.model_copy(update={"manoeuvres": (), "world_seed": None})
+        self._source = source = Simulator(adrift, run)
         self.navigator.reset(source.start, source.instruments)
         start, truth = source.start, source.initial_truth
         self._truth = np.stack([truth.position[0], truth.velocity[0], truth.attitude[0]])

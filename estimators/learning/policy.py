@@ -1,8 +1,8 @@
 """A trained policy as a file of plain arrays: a network, what it expects, and what it was trained on.
 
 The file is an ``.npz`` without pickle: ``meta`` (JSON), ``mean`` and ``deviation`` of the observation, and
-``weight_0``, ``bias_0``, ``weight_1``, ... of the layers. Between the layers is a hyperbolic tangent, and the last is clipped to the
-bounds of the action. So networks of any library fit, and none of them is needed to use one.
+``weight_0``, ``bias_0``, ``weight_1``, ... of the layers. Between the layers is a hyperbolic tangent, and the last is
+clipped to the bounds of the action. So networks of any library fit, and none of them is needed to use one.
 """
 
 from __future__ import annotations

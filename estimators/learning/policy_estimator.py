@@ -40,16 +40,16 @@ class PolicyEstimator(Estimator):
         """Begin a run; UnsuitableScenario for other instruments than the policy was trained for."""
         policy = self.policy
         try:
-            layout = layout_of(instruments, policy.instruments)
+            layout = layout_of([instruments], policy.instruments)
             policy.require(layout)
         except (PolicyError, ValueError) as error:
             raise UnsuitableScenario(str(error)) from None
         self._instruments, self._layout = instruments, layout
-        self._filter = ReferenceFilter()
+        self._filter = ReferenceFilter(layout.watched)
         self._filter.reset(start, instruments)
         task = TASKS[policy.task](layout.names, layout.most)
         self._filters = Filters(task, layout, task.rewards[0], 1, self._filter.model.size)
-        self._filters.begin(0, self._filter.start_covariance)
+        self._filters.begin(0, self._filter.start_covariance, layout.periods(instruments))
         self._context = Context(start, instruments.step)
         self._first, self._last = np.zeros(1, np.int64), np.zeros(1, np.int64)
 

@@ -43,7 +43,7 @@ class Pool:
 
     def __init__(self, options: TaskOptions, capacity: int):
         self.options, self.capacity = options, capacity
-        self.n = 0
+        self.n = options.layout.states
         self._slots: OrderedDict[int, int] = OrderedDict()
 
     def slot(self, seed: int, used: set[int]) -> int:
@@ -52,17 +52,9 @@ class Pool:
             self._slots.move_to_end(seed)
             return self._slots[seed]
         o = self.options
-        scenario = o.family(seed)
-        voyage = prepare(scenario, seed, o.steps, oracle=o.oracle)
-        if voyage.watched != o.layout.watched:
-            raise ValueError(
-                f"the scenarios of a family have the same instruments; that of seed {seed} has {voyage.watched}, "
-                f"not {o.layout.watched}"
-            )
-        if self.n == 0:
+        voyage = prepare(o.scenario, seed, o.layout.watched, o.steps, oracle=o.oracle)
+        if not self._slots:
             self._allocate(voyage)
-        if voyage.start_covariance.shape[0] != self.n:
-            raise ValueError(f"seed {seed}: its filter has {voyage.start_covariance.shape[0]} states, not {self.n}")
         at = self._free(used)
         self._slots[seed] = at
         self._put(at, voyage)
@@ -76,12 +68,12 @@ class Pool:
 
     def _allocate(self, voyage: Prepared) -> None:
         """Room for the voyages; memory that is not used yet costs nothing."""
-        self.n = voyage.start_covariance.shape[0]
-        instruments, o = voyage.instruments, self.options
+        o = self.options
         longest = o.scenario.epochs + 1 if o.steps is None else o.steps
-        rate = sum(sheet.rate for sheet in instruments.values())
+        runs = [s.instruments_sheet() for s in o.scenario.extremes()]
+        rate = max(sum(sheet.rate for sheet in run.values()) for run in runs)
         # A measurement is an event, and so is the end of a step; a log may deliver some late.
-        self._room = int(longest * (2.0 + rate * instruments.step)) + 64
+        self._room = int(longest * (2.0 + rate * o.scenario.step)) + 64
         self._room = max(self._room, int(1.5 * len(voyage.faulty)))
         self._steps = max(longest, len(voyage.end)) + 1
         c, s = self.capacity, self._steps
@@ -91,6 +83,7 @@ class Pool:
         self.end, self.context = np.zeros((c, s)), np.zeros((c, s, voyage.context.shape[1]))
         self.error, self.oracle = np.zeros((c, s, 9)), np.zeros((c, s, 2))
         self.covariance = np.zeros((c, self.n, self.n))
+        self.period = np.ones((c, len(o.layout.names)))
         self.start: list[InitialState | None] = [None] * c
 
     def _put(self, at: int, voyage: Prepared) -> None:
@@ -98,7 +91,12 @@ class Pool:
         if events > self._room or steps > self._steps:
             raise ValueError(f"a voyage of {steps} steps and {events} measurements is longer than its scenario says")
         begin = at * self._room
-        self.linear.put(begin, voyage.linear, events)
+        small = voyage.linear.transition.shape[1]
+        for mine, theirs in zip(self.linear, voyage.linear, strict=True):
+            # States that this run does not have stay zero.
+            place = tuple(slice(0, small) if n == self.n else slice(None) for n in mine.shape[1:])
+            mine[begin : begin + events] = 0
+            mine[(slice(begin, begin + events), *place)] = theirs
         self.faulty[begin : begin + events] = voyage.faulty
         self.edges[at, : steps + 1] = begin + voyage.edges
         self.length[at] = steps
@@ -107,7 +105,9 @@ class Pool:
             (self.oracle, voyage.oracle),
         ):  # fmt: skip
             mine[at, :steps] = theirs
-        self.covariance[at] = voyage.start_covariance
+        self.covariance[at] = 0.0
+        self.covariance[at, :small, :small] = voyage.start_covariance
+        self.period[at] = self.options.layout.periods(voyage.instruments)
         self.start[at] = voyage.start
 
     def rows(self, array: Array, slots: NDArray[np.int64], steps: NDArray[np.int64]) -> Array:

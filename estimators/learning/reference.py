@@ -85,10 +85,15 @@ class Linear(NamedTuple):
 class ReferenceFilter(KalmanEstimator):
     """The filter of ``ekf`` (of ``ship-ekf`` without an IMU), which notes its linear problem.
 
+    Parameters
+    ----------
+    names : list of str
+        The instruments, by the numbers of ``Linear.instrument``; those that a run does not have do no harm.
+
     Attributes
     ----------
     watched : list of str
-        The instruments that it uses, by the numbers of ``Linear.instrument``.
+        The instruments that it uses.
     linear : Linear
         Of the last step.
     count : int
@@ -99,15 +104,17 @@ class ReferenceFilter(KalmanEstimator):
 
     assimilates = False
 
-    def __init__(self) -> None:
+    def __init__(self, names: list[str]) -> None:
         super().__init__(Suitable())
+        self._number = {name: i for i, name in enumerate(names)}
         self.row = "the plain filter of a learning task"
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where no filter fits the instruments."""
         super().reset(start, instruments)
         self.watched = list(self._names)
-        self._number = {name: i for i, name in enumerate(self.watched)}
+        if unknown := [name for name in self.watched if name not in self._number]:
+            raise ValueError(f"instrument {unknown[0]!r} is not one of {', '.join(self._number)}")
         self.start_covariance = self.covariance.copy()
         self.linear, self.count = Linear.empty(8, self.model.size), 0
 

@@ -1,9 +1,9 @@
 """The vector form of the tasks around a running filter: a bank of filters, stepped in one compiled pass.
 
-A voyage is prepared once (simulated, filtered by the plain filter and by the oracle, linearised) and kept. A step of the
-bank is then one pass over shared arrays. The numbers are those of `FilterTaskEnv`
-(`simnav.estimators.learning.environment`), bit for bit. What is new to the pool costs its preparation at the reset: learn
-from a number of ``voyages``.
+A voyage is prepared once (simulated, filtered by the plain filter and by the oracle, linearised) and kept. A step of
+the bank is then one pass over shared arrays. The numbers are those of `FilterTaskEnv`
+(`simnav.estimators.learning.environment`), bit for bit. What is new to the pool costs its preparation at the reset:
+learn from a number of ``voyages``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from simnav.estimators.learning.environment import FilterTaskEnv, TaskOptions, r
 from simnav.estimators.learning.features import Numbers
 from simnav.estimators.learning.filters import Filters, checked_actions
 from simnav.estimators.learning.pool import Pool
-from simnav.estimators.learning.voyage import Family
 from simnav.scenario import Scenario
 
 __all__ = ["FilterTaskVectorEnv"]
@@ -52,7 +51,7 @@ class FilterTaskVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
 
     def __init__(
         self,
-        scenario: Scenario | Family | str | Path,
+        scenario: Scenario | str | Path,
         task: str = "Tuning",
         num_envs: int = 1,
         *,
@@ -183,7 +182,7 @@ class FilterTaskVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
                 self._filters = Filters(o.task, o.layout, o.reward, self.num_envs, self._pool.n)
             used.add(slot)
             self._slots[i], self._k[i], self._over[i] = slot, 0, False
-            self._filters.begin(i, self._pool.covariance[slot])
+            self._filters.begin(i, self._pool.covariance[slot], self._pool.period[slot])
             infos = self._add_info(infos, {"seed": run, "start": self._pool.start[slot]}, i)
         mask = np.zeros(self.num_envs, np.bool_)
         mask[voyages] = True

@@ -4,47 +4,24 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
-from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.earth import radii_scalar
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.truth import TrueNoise
 from simnav.estimators.learning.features import Context
 from simnav.estimators.learning.reference import Linear, ReferenceFilter
-from simnav.estimators.learning.training_voyages import noise_and_multipath
 from simnav.estimators.solvers.oracle import OracleEstimator
+from simnav.geometry.earth import radii_scalar
 from simnav.log import LogWarning
 from simnav.recording import AidStream, Recording
-from simnav.scenario import Scenario, load
+from simnav.scenario import Scenario
 from simnav.source import open_source
 from simnav.types import Array, Estimate, InitialState, Instruments
 
-__all__ = ["FAMILIES", "Family", "Prepared", "Voyage", "as_family", "prepare", "recorded"]
-
-#: From the seed of a voyage to its scenario; all of them with the same instruments and the same step.
-Family = Callable[[int], Scenario]
-
-#: Families that are known by name.
-FAMILIES: Mapping[str, Family] = {"noise-and-multipath": noise_and_multipath}
-
-
-def as_family(scenario: Scenario | Family | str | Path) -> Family:
-    """What a task is given for a scenario, as a family: by name, a scenario as the family of itself, or a family."""
-    if isinstance(scenario, str) and scenario in FAMILIES:
-        return FAMILIES[scenario]
-    if isinstance(scenario, (str, Path)):
-        scenario = load(scenario)
-    return partial(_itself, scenario) if isinstance(scenario, Scenario) else scenario
-
-
-def _itself(scenario: Scenario, seed: int) -> Scenario:
-    return scenario
+__all__ = ["Prepared", "Voyage", "prepare", "recorded"]
 
 
 def recorded(scenario: Scenario, seed: int, steps: int | None = None) -> Recording:
@@ -66,6 +43,8 @@ class Voyage:
     ----------
     scenario : Scenario
     seed : int
+    names : list of str
+        The instruments, as the events are to number them (`ReferenceFilter`).
     steps : int, optional
         The voyage ends after so many; None: with the run.
     oracle : bool
@@ -93,12 +72,14 @@ class Voyage:
         At the end of the step: position, velocity, attitude.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, steps: int | None = None, *, oracle: bool = True):
+    def __init__(
+        self, scenario: Scenario, seed: int, names: list[str], steps: int | None = None, *, oracle: bool = True
+    ):
         self.recording = recording = recorded(scenario, seed, steps)
         if not len(recording.data.truth):
             raise ValueError(f"scenario {scenario.id}: the run is shorter than one step")
         self._packets = list(recording.steps())
-        self.filter = ReferenceFilter()
+        self.filter = ReferenceFilter(names)
         self.filter.reset(recording.start, recording.instruments)
         self._knowing: OracleEstimator | None = None
         if oracle:
@@ -109,7 +90,7 @@ class Voyage:
             except UnsuitableScenario:
                 self._knowing = None
         self._context = Context(recording.start, recording.instruments.step)
-        self._streams = [recording.data.aids[name] for name in self.filter.watched]
+        self._streams = [recording.data.aids.get(name) for name in names]
         self.oracle = np.full(2, np.nan)
         self.step, self.steps = -1, len(recording.data.truth)
 
@@ -135,7 +116,9 @@ class Voyage:
         self.faulty = np.zeros(self.filter.count, np.bool_)
         for e in range(self.filter.count):
             if linear.size[e]:
-                self.faulty[e] = _touched(self._streams[linear.instrument[e]], linear.time[e])
+                stream = self._streams[linear.instrument[e]]
+                assert stream is not None
+                self.faulty[e] = _touched(stream, linear.time[e])
         return True
 
 
@@ -150,14 +133,15 @@ class Prepared(NamedTuple):
     oracle: Array  # (S, 2)
     faulty: NDArray[np.bool_]  # (e,)
     start_covariance: Array  # (n, n)
-    watched: list[str]
     instruments: Instruments
     start: InitialState
 
 
-def prepare(scenario: Scenario, seed: int, steps: int | None = None, *, oracle: bool = True) -> Prepared:
+def prepare(
+    scenario: Scenario, seed: int, names: list[str], steps: int | None = None, *, oracle: bool = True
+) -> Prepared:
     """A whole `Voyage`, its steps one after the other: the same numbers."""
-    voyage = Voyage(scenario, seed, steps, oracle=oracle)
+    voyage = Voyage(scenario, seed, names, steps, oracle=oracle)
     n = voyage.filter.model.size
     parts: list[Linear] = []
     faulty, edges, ends, contexts, errors, oracles = [], [0], [], [], [], []
@@ -174,7 +158,7 @@ def prepare(scenario: Scenario, seed: int, steps: int | None = None, *, oracle: 
     assert linear.transition.shape[1] == n
     return Prepared(
         linear, np.array(edges), np.array(ends), np.stack(contexts), np.stack(errors), np.stack(oracles),
-        np.concatenate(faulty), voyage.filter.start_covariance, voyage.filter.watched, voyage.recording.instruments,
+        np.concatenate(faulty), voyage.filter.start_covariance, voyage.recording.instruments,
         voyage.recording.start,
     )  # fmt: skip
 

@@ -52,12 +52,14 @@ class OracleEstimator(KalmanEstimator):
             raise ValueError(f"{type(adaptation).__name__} does not know what the faults added; NominalNoise does")
         self.truth, self.restore = adaptation, restore
         self._imu_faults: tuple[Array, Array] | None = None
+        self._actual: Instruments | None = None
         self._revealed = False
 
     def reveal(self, recording: Recording) -> None:
-        """Take the labels."""
+        """Take the labels, and the true datasheets where those that are given are wrong."""
         self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
+        self._actual = recording.actual
         self._revealed = True
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -66,7 +68,7 @@ class OracleEstimator(KalmanEstimator):
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
-        super().reset(start, instruments)
+        super().reset(start, instruments if self._actual is None else self._actual)
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
         inner: ErrorModel = InertialModel() if instruments.imu is not None else ShipModel()

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.rotation import wrap_angle
+from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world import motion
-from simnav.world.current import Current
+from simnav.world.current import Current, eddies
 from simnav.world.manoeuvres import Manoeuvre, table
 from simnav.world.sea import Sea, components
 from simnav.world.track import PlannedTrack
@@ -56,7 +56,7 @@ class World:
     rate : float
         Samples of the ideal IMU per second [Hz].
     seed : int
-        Seed of the wave components.
+        Seed of the wave components and of what changes in the current.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class World:
         if current is not None and current.speed > 0.0:
             p[motion.CURRENT_N] = current.speed * np.cos(current.direction)
             p[motion.CURRENT_E] = current.speed * np.sin(current.direction)
-            p[motion.SHEAR] = current.shear / current.speed
+            p[motion.SHEAR] = current.shear / current.speed  # what changes falls with depth as the mean does
         if sea is not None and vessel.kind == "uuv":
             # Waves die off as exp(-k z); the wave number at the peak stands for all, to keep the motion smooth.
             p[motion.ATTENUATION] = (2.0 * np.pi / sea.peak_period) ** 2 / 9.81
@@ -99,7 +99,8 @@ class World:
         self._index = np.zeros(4, dtype=np.int64)
         self._rows, self._points = table(manoeuvres)
         self._phase, self._waves = components(sea, seed)
-        motion.initialise(self._x, self._p, self._phase, self._waves)
+        self._eddies = eddies(current, seed)
+        motion.initialise(self._x, self._p, self._phase, self._waves, self._eddies)
 
     @property
     def time(self) -> float:
@@ -131,10 +132,18 @@ class World:
         x = self._x
         x[motion.ERROR_NORTH], x[motion.ERROR_EAST], x[motion.ERROR_HEADING] = north, east, heading
         if self._plan is None:
-            self._plan = PlannedTrack(World(*self._told[:3], None, self._told[3], rate=PlannedTrack.RATE, seed=0))
+            self._plan = World.plan(*self._told)
         aside, speed = self._plan.aside(float(x[motion.NORTH]) + north, float(x[motion.EAST]) + east, self.time)
         ahead = max(LEAST_LOOKAHEAD, LOOKAHEAD_TIME * speed)
         x[motion.TO_TRACK] = -np.arctan(aside / ahead)
+
+    @classmethod
+    def plan(
+        cls, start: Start, vessel: Vessel, manoeuvres: Sequence[Manoeuvre] = (), current: Current | None = None
+    ) -> PlannedTrack:
+        """The track that is planned: without waves, in the mean current."""
+        steady = None if current is None else current.model_copy(update={"variation": 0.0})
+        return PlannedTrack(cls(start, vessel, manoeuvres, None, steady, rate=PlannedTrack.RATE, seed=0))
 
     def command(self, heading: float, speed: float) -> None:
         """Steer a heading, as it is believed [rad], and a speed through the water [m/s]; without manoeuvres only.
@@ -184,7 +193,7 @@ class World:
         order = np.argsort(times, kind="stable")
         sorted_states = np.empty((len(times), motion.TAP_COLUMNS))
         motion.advance(
-            self._x, self._index, self._p, self._rows, self._points, self._phase, self._waves,
+            self._x, self._index, self._p, self._rows, self._points, self._phase, self._waves, self._eddies,
             times[order], sorted_states, rate, force,
         )  # fmt: skip
         states = np.empty_like(sorted_states)
