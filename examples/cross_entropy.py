@@ -43,9 +43,7 @@ def returns_of(envs, weights, seed, repeats):
     return total / repeats
 
 
-def train(
-    scenario="training-gnss-faults", *, generations=40, population=64, repeats=4, voyages=128, steps=None, seed=0
-):
+def train(scenario="training-gnss-faults", *, generations=25, population=64, repeats=3, voyages=64, steps=None, seed=0):
     """The policy, and the mean return of the whole population in each generation."""
     envs = FilterTaskVectorEnv(scenario, "Tuning", population, instruments="fixes", voyages=voyages, steps=steps)
     shape = envs.single_action_space.shape[0], len(SEEN) + 1
@@ -77,7 +75,7 @@ def train(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--generations", type=int, default=40)
+    parser.add_argument("--generations", type=int, default=25)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", default="policy.npz")
     arguments = parser.parse_args()

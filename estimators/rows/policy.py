@@ -15,7 +15,8 @@ class PolicyEkf(PolicyEstimator):
     The policy that comes with it was trained by PPO on ``training-gnss-faults``, a family of voyages with an IMU and a
     GNSS receiver, noise steps and multipath, whose seeds are never scored; on other voyages it does what it can. It
     asks for one instrument that gives positions, a GNSS receiver with one fix a step. ``file`` names another policy
-    (docs/how-to/learn-to-navigate.md). Source: ours; PPO is of J. Schulman et al., *Proximal policy optimization algorithms*, 2017.
+    (docs/how-to/learn-to-navigate.md). Source: ours; PPO is of J. Schulman et al., *Proximal policy
+    optimization algorithms*, 2017.
 
     Parameters
     ----------
