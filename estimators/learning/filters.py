@@ -33,6 +33,8 @@ class Layout:
         Room for so many measurements a step of each.
     states : int
         Most states of the filter.
+    events : float
+        Most measurements a step of all instruments together.
 
     Attributes
     ----------
@@ -42,8 +44,11 @@ class Layout:
         Length of the observation.
     """
 
-    def __init__(self, watched: list[str], names: list[str], kinds: list[str], most: int, states: int):
-        self.watched, self.names, self.kinds, self.most, self.states = watched, names, kinds, most, states
+    def __init__(
+        self, watched: list[str], names: list[str], kinds: list[str], most: int, states: int, events: float
+    ):
+        self.watched, self.names, self.kinds, self.most = watched, names, kinds, most
+        self.states, self.events = states, events
         self.place = np.array([names.index(name) if name in names else -1 for name in watched], dtype=np.int64)
         self.size = observation_size(len(names), most)
 
@@ -77,11 +82,12 @@ def layout_of(runs: Sequence[Instruments], which: str, most: Sequence[Mapping[st
     start = InitialState(0.0, np.array([0.5, 0.5, 0.0]), np.zeros(3), np.zeros(3), np.eye(9))
     watched: dict[str, str] = {}
     names: dict[str, str] = {}
-    room, states = 1, 0
+    room, states, events = 1, 0, 0.0
     for i, instruments in enumerate(runs):
         trial = ReferenceFilter(list(instruments))
         trial.reset(start, instruments)
         states = max(states, trial.model.size)
+        events = max(events, instruments.step * sum(sheet.rate for sheet in instruments.values()))
         for name in trial.watched:
             sheet = instruments[name]
             watched.setdefault(name, sheet.kind)
@@ -91,13 +97,19 @@ def layout_of(runs: Sequence[Instruments], which: str, most: Sequence[Mapping[st
                 room = max(room, by_rate if most is None else most[i][name])
     if not names:
         raise ValueError("there is no instrument that gives a position; say instruments='all'")
-    return Layout(list(watched), list(names), list(names.values()), room, states)
+    return Layout(list(watched), list(names), list(names.values()), room, states, events)
+
+
+_layouts: dict[tuple[str, str], Layout] = {}
 
 
 def layout_of_scenario(scenario: Scenario, which: str) -> Layout:
     """The layout for a scenario, whatever is drawn; that of a log has room for measurements that come late."""
-    possible = scenario.extremes()
-    return layout_of([s.instruments_sheet() for s in possible], which, [most_samples(s) for s in possible])
+    key = scenario.content_hash(), which
+    if key not in _layouts:  # a family has hundreds of extremes
+        possible = scenario.extremes()
+        _layouts[key] = layout_of([s.instruments_sheet() for s in possible], which, [most_samples(s) for s in possible])
+    return _layouts[key]
 
 
 class Filters:

@@ -178,7 +178,7 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         self.navigator: Estimator = KalmanEstimator(Suitable()) if navigator is None else navigator
         if self.navigator.reference:
             raise ValueError(f"navigator {self.navigator.name!r} is a reference that is told the truth")
-        self._fixes = {n for r in scenario.extremes() for n, s in r.instruments_sheet().items() if s.role == "fix"}
+        self._fixes: set[str] = set()
         self.observation_space = spaces.Box(-LIMIT, LIMIT, (SIZE,), dtype=np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), dtype=np.float32)
         self._chart: Chart | None = None
@@ -199,6 +199,7 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         adrift = scenario.model_copy(update={"manoeuvres": (), "world_seed": None})
         self._source = source = Simulator(adrift, run)
         self.navigator.reset(source.start, source.instruments)
+        self._fixes = {sheet.name for sheet in source.instruments.of_role("fix")}
         start, truth = source.start, source.initial_truth
         self._truth = np.stack([truth.position[0], truth.velocity[0], truth.attitude[0]])
         self._estimate = Estimate(0.0, start.position, start.velocity, start.attitude, start.covariance)

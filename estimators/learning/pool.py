@@ -70,10 +70,8 @@ class Pool:
         """Room for the voyages; memory that is not used yet costs nothing."""
         o = self.options
         longest = o.scenario.epochs + 1 if o.steps is None else o.steps
-        runs = [s.instruments_sheet() for s in o.scenario.extremes()]
-        rate = max(sum(sheet.rate for sheet in run.values()) for run in runs)
         # A measurement is an event, and so is the end of a step; a log may deliver some late.
-        self._room = int(longest * (2.0 + rate * o.scenario.step)) + 64
+        self._room = int(longest * (2.0 + o.layout.events)) + 64
         self._room = max(self._room, int(1.5 * len(voyage.faulty)))
         self._steps = max(longest, len(voyage.end)) + 1
         c, s = self.capacity, self._steps
