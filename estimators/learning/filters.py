@@ -44,9 +44,7 @@ class Layout:
         Length of the observation.
     """
 
-    def __init__(
-        self, watched: list[str], names: list[str], kinds: list[str], most: int, states: int, events: float
-    ):
+    def __init__(self, watched: list[str], names: list[str], kinds: list[str], most: int, states: int, events: float):
         self.watched, self.names, self.kinds, self.most = watched, names, kinds, most
         self.states, self.events = states, events
         self.place = np.array([names.index(name) if name in names else -1 for name in watched], dtype=np.int64)
