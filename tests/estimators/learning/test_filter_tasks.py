@@ -132,7 +132,7 @@ def test_the_vector_form_is_gymnasiums_over_single_environments_bit_for_bit(scen
 def test_runs_of_a_family_may_differ_in_their_instruments():
     envs = FilterTaskVectorEnv("random-voyages", "Tuning", 4, steps=4)
     alone = [FilterTaskEnv("random-voyages", steps=4) for _ in range(4)]
-    ours, infos = envs.reset(seed=1)
+    ours, _ = envs.reset(seed=1)
     begun = [env.reset(seed=1 + i) for i, env in enumerate(alone)]
     assert len({tuple(info["instruments"]) for _, info in begun}) > 1
     actions = np.full((4, envs.single_action_space.shape[0]), 0.3, np.float32)

@@ -83,7 +83,7 @@ def test_a_file_of_another_task_version_or_shape_is_named(tmp_path, monkeypatch)
     for policy, message in (
         (
             made(kinds=["terrain_fix"]),
-            "was trained for terrain_fix with at most 1 measurements a step of each, not for",
+            "was trained for terrain_fix with at most 1 measurements a step of each",
         ),
         (made(size=30), "it takes 30 numbers and gives 2; Tuning has 24 and 2 here"),
         (made("Correction", actions=3), "it takes 24 numbers and gives 3; Correction has 24 and 7 here"),
