@@ -12,7 +12,8 @@ status              meaning
                     is not symmetric or not positive semi-definite
 ``diverged``        finite, but horizontally more than `DIVERGENCE_LIMIT` from the truth
 ``out-of-memory``   the estimator raised MemoryError
-``unsuitable``      ``reset`` raised `UnsuitableScenario`: no failure, the estimator needs other instruments
+``unsuitable``      an instrument is lacking that `Estimator.needs` names: no failure. To refuse a scenario that has all
+                    of them (`UnsuitableScenario`) is an ``error``
 ==================  ==================================================================================================
 """
 
@@ -31,7 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimator import Estimator, NeedsError, UnsuitableScenario, lacking
 from simnav.recording import Recording
 from simnav.types import COMPONENTS, Array, Estimate, ImuSamples, Measurements, NavigationStates
 
@@ -134,6 +135,9 @@ def run_trial(estimator: Estimator, recording: Recording, *, keep_covariance: bo
     smoothed = None
     where = "reset()"
     try:
+        lack = lacking(estimator.needs, recording.instruments)
+        if lack:
+            return log.trial(estimator.name or type(estimator).__name__, "unsuitable", lack)
         if estimator.reference:
             estimator.reveal(recording)
         begun = time.perf_counter_ns()
@@ -158,10 +162,11 @@ def run_trial(estimator: Estimator, recording: Recording, *, keep_covariance: bo
     except MemoryError as e:
         status, reason = "out-of-memory", f"{where}: {_describe(e, estimator)}"
     except (Exception, SystemExit) as e:
-        if isinstance(e, UnsuitableScenario) and where == "reset()":
-            status, reason = "unsuitable", str(e)
-        else:
-            status, reason = "error", f"{where}: {_describe(e, estimator)}"
+        status, reason = "error", f"{where}: {_describe(e, estimator)}"
+        if isinstance(e, UnsuitableScenario):
+            reason = f"{where}: it refuses a scenario that has all instruments that its needs name ({e})"
+        elif isinstance(e, NeedsError):
+            reason = str(e)
     if status != "ok":
         try:
             log.check_covariances()

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
+from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
@@ -243,6 +244,11 @@ class Chain(ABC):
         self.prior, self.prior_shift = covariance.copy(), shift.copy()
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
+
+    @property
+    def needs(self) -> Needs:
+        """What its model needs."""
+        return self.front.needs
 
     def choose(self, instruments: Instruments, name: str) -> Chain:
         """Itself; UnsuitableScenario where its model lacks an instrument."""

@@ -8,14 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from simnav.estimator import UnsuitableScenario
+from simnav.estimator import Needs, UnsuitableScenario
+from simnav.estimator.needs import AID, IMU
 from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_faults
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.ship import OBSERVED, ShipModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
+from simnav.kinds import kinds_with
 from simnav.recording import Recording
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
@@ -54,6 +56,11 @@ class OracleEstimator(KalmanEstimator):
         self._imu_faults: tuple[Array, Array] | None = None
         self._actual: Instruments | None = None
         self._revealed = False
+
+    @property
+    def needs(self) -> Needs:
+        """An instrument beside the IMU; without an IMU, one that the ship model observes."""
+        return (AID, (IMU, *kinds_with(*OBSERVED)))
 
     def reveal(self, recording: Recording) -> None:
         """Take the labels, and the true datasheets where those that are given are wrong."""
