@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from simnav.environment.seeds import require_disjoint
-from simnav.estimators.learning.features import Numbers
+from simnav.estimators.learning.features import Numbers, observation_size
 from simnav.estimators.learning.filters import Layout
-from simnav.estimators.learning.tasks import TASKS
+from simnav.estimators.learning.tasks import CORRECTIONS, TASKS
 from simnav.types import Array
 
 __all__ = ["FORMAT", "Policy", "PolicyError"]
@@ -97,6 +97,18 @@ class Policy:
                     f"take {size} numbers"
                 )
             size = w.shape[0]
+        wanted = observation_size(len(self.kinds), self.most)
+        actions = {
+            "Tuning": len(self.kinds) + 1,
+            "Correction": len(CORRECTIONS),
+            "Detection": len(self.kinds) * self.most,
+        }
+        shape = self.layers[0][0].shape[1], size
+        if shape != (wanted, actions[task]):
+            raise PolicyError(
+                f"{source}: it takes {shape[0]} numbers and gives {shape[1]}; {task} with {', '.join(self.kinds)} has "
+                f"{wanted} and {actions[task]}"
+            )
         arrays = [self.mean, self.deviation, *(a for layer in self.layers for a in layer)]
         if self.mean.shape != self.deviation.shape or self.mean.shape != (self.layers[0][0].shape[1],):
             raise PolicyError(f"{source}: mean and deviation should be of the observation's length")
@@ -115,20 +127,11 @@ class Policy:
         return np.clip(x, -1.0, 1.0)
 
     def require(self, layout: Layout) -> None:
-        """Refuse instruments that it was not trained for: PolicyError."""
+        """Refuse an environment with other instruments than it was trained for: PolicyError."""
         if layout.kinds != self.kinds or layout.most != self.most:
             raise PolicyError(
                 f"{self.source}: it was trained for {', '.join(self.kinds)} with at most {self.most} measurements a "
                 f"step of each, not for {', '.join(layout.kinds)} with {layout.most}"
-            )
-        actions = {
-            "Tuning": len(layout.names) + 1, "Correction": 7, "Detection": len(layout.names) * layout.most,
-        }[self.task]  # fmt: skip
-        shape = self.layers[0][0].shape[1], self.layers[-1][0].shape[0]
-        if shape != (layout.size, actions):
-            raise PolicyError(
-                f"{self.source}: it takes {shape[0]} numbers and gives {shape[1]}; {self.task} has {layout.size} and "
-                f"{actions} here"
             )
 
     def require_unseen(self, seeds: Sequence[int]) -> None:

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimator.needs import Needs
 from simnav.estimators.learning.features import Context
-from simnav.estimators.learning.filters import Filters, layout_of
-from simnav.estimators.learning.policy import Policy, PolicyError
+from simnav.estimators.learning.filters import Filters, Layout
+from simnav.estimators.learning.policy import Policy
 from simnav.estimators.learning.reference import ReferenceFilter
 from simnav.estimators.learning.tasks import TASKS
+from simnav.estimators.models.suitable import Suitable
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
 
 __all__ = ["PolicyEstimator"]
@@ -36,17 +38,28 @@ class PolicyEstimator(Estimator):
     def __init__(self, file: str):
         self.policy = Policy.load(Path(file).expanduser())
 
+    @property
+    def needs(self) -> Needs:
+        """What the plain filter needs, and an instrument of each kind that the policy is asked about."""
+        return (*Suitable().needs, *self.policy.kinds)
+
     def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run; UnsuitableScenario for other instruments than the policy was trained for."""
+        """Begin a run; UnsuitableScenario where an instrument is lacking.
+
+        The policy is asked about the first instrument of each of its kinds; all others keep their noise.
+        """
         policy = self.policy
-        try:
-            layout = layout_of([instruments], policy.instruments)
-            policy.require(layout)
-        except (PolicyError, ValueError) as error:
-            raise UnsuitableScenario(str(error)) from None
-        self._instruments, self._layout = instruments, layout
-        self._filter = ReferenceFilter(layout.watched)
+        self._filter = ReferenceFilter(list(instruments))
         self._filter.reset(start, instruments)
+        names: list[str] = []
+        for kind in policy.kinds:
+            name = next((n for n in self._filter.watched if instruments[n].kind == kind and n not in names), None)
+            if name is None:
+                raise UnsuitableScenario(f"{policy.source}: it was trained for a {kind}; there is none")
+            names.append(name)
+        kinds, every = policy.kinds, list(instruments)
+        layout = Layout(every, names, kinds, policy.most, self._filter.model.size, 0.0)
+        self._instruments, self._layout = instruments, layout
         task = TASKS[policy.task](layout.names, layout.most)
         self._filters = Filters(task, layout, task.rewards[0], 1, self._filter.model.size)
         self._filters.begin(0, self._filter.start_covariance, layout.periods(instruments))

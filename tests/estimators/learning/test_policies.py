@@ -67,6 +67,11 @@ def test_a_policy_comes_back_from_its_file(tmp_path):
     [
         ({"task": "Turning"}, "it is for the task 'Turning'; there are: Tuning, Detection, Correction"),
         ({"version": 7}, "it was trained on version 7 of Tuning, but this is version 1; train it again"),
+        ({"size": 30}, "it takes 30 numbers and gives 2; Tuning with gnss_position has 24 and 2"),
+        (
+            {"task": "Correction", "actions": 3},
+            "it takes 24 numbers and gives 3; Correction with gnss_position has 24 and 7",
+        ),
         ({"mean": np.zeros(3)}, "mean and deviation should be of the observation's length"),
         ({"deviation": np.zeros(24)}, "its numbers should be finite, and the deviations positive"),
     ],
@@ -78,21 +83,16 @@ def test_a_policy_that_does_not_fit_is_refused(change, message):
 
 def test_a_file_of_another_task_version_or_shape_is_named(tmp_path, monkeypatch):
     path = tmp_path / "policy.npz"
-    scenario = load("gnss-noise-step").model_copy(update={"duration": 5.0, "faults": ()})
-    recording = record(scenario, 1)
-    for policy, message in (
-        (
-            made(kinds=["terrain_fix"]),
-            "was trained for terrain_fix with at most 1 measurements a step of each",
-        ),
-        (made(size=30), "it takes 30 numbers and gives 2; Tuning has 24 and 2 here"),
-        (made("Correction", actions=3), "it takes 24 numbers and gives 3; Correction has 24 and 7 here"),
+    made(kinds=["terrain_fix"]).save(path)
+    recording = record(load("gnss-noise-step").model_copy(update={"duration": 5.0, "faults": ()}), 1)
+    trial = run_trial(PolicyEstimator(str(path)), recording)
+    assert trial.status == "unsuitable"
+    assert "terrain_fix" in trial.reason
+    env = FilterTaskEnv("gnss-noise-step", instruments="fixes")
+    with pytest.raises(
+        PolicyError, match=r"policy\.npz: it was trained for terrain_fix .* not for gnss_position with 1"
     ):
-        policy.save(path)
-        trial = run_trial(PolicyEstimator(str(path)), recording)
-        assert trial.status == "unsuitable"
-        assert str(path) in trial.reason
-        assert message in trial.reason
+        Policy.load(path).require(env.options.layout)
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(PolicyError, match=r"policy\.npz: not a policy of simnav, or damaged"):
         Policy.load(path)
@@ -101,6 +101,19 @@ def test_a_file_of_another_task_version_or_shape_is_named(tmp_path, monkeypatch)
     monkeypatch.undo()
     with pytest.raises(PolicyError, match=r"policy\.npz: written in format 9 of policies; this version reads 1"):
         PolicyEstimator(str(path))
+
+
+def test_a_policy_sees_the_first_receiver_and_leaves_the_others_alone(tmp_path):
+    """Needs say what is enough: a second receiver, or a faster one, is no reason to refuse a run."""
+    made().save(tmp_path / "policy.npz")
+    scenario = load("gnss-noise-step")
+    gnss = scenario.instruments["gnss"]
+    second = {**scenario.instruments, "second": gnss, "gnss": gnss.model_copy(update={"rate": 4.0})}
+    recording = record(scenario.model_copy(update={"duration": 8.0, "faults": (), "instruments": second}), 1)
+    trial = run_trial(PolicyEstimator(str(tmp_path / "policy.npz")), recording)
+    assert trial.status == "ok", trial.reason
+    assert "sigma_north.gnss" in trial.diagnostics
+    assert "sigma_north.second" not in trial.diagnostics
 
 
 def test_layers_that_do_not_follow_each_other():
