@@ -86,6 +86,7 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     Parameters
     ----------
     estimator : str, Path, type or pair
+        Name, file or class, also with parameters.
     **parameters
         Of its constructor; texts are converted as on the command line.
 
@@ -108,7 +109,9 @@ def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     seed : int
+        Seed of the run.
 
     Raises
     ------
@@ -215,14 +218,16 @@ def run(
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> RunReport:
-    """Run estimators once over one scenario, in this process, and score them.
+    """Run estimators once on one scenario, in this process, and score them.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     estimators : estimators, optional
         Default: all registered ones.
     seed : int
+        Seed of the run.
     parameters : mapping, optional
         Of the estimators; of several each gets those that it has.
     progress : callable, optional
@@ -252,13 +257,14 @@ def evaluate(
     results: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> EvaluationReport:
-    """Run estimators beside the baselines on the same seeds, and say where they stand.
+    """Compare estimators with the baselines on the same seeds.
 
     Parameters
     ----------
     estimators : estimators
         Those in question.
     scenarios : scenarios
+        One scenario or several, by name, file or themselves.
     runs : int
         Seeds a scenario.
     seed : int
@@ -327,7 +333,7 @@ def campaign(
     covariance_interval: float = 0.0,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
-    """Run scenarios x estimators x seeds; started again, it goes on where it was.
+    """Run estimators on scenarios and seeds. Started again, the campaign continues.
 
     Parameters
     ----------
@@ -517,11 +523,12 @@ def bound(
     smoothed: bool = False,
     progress: Callable[..., None] | None = None,
 ) -> BoundReport:
-    """The posterior Cramer-Rao bound of a simulated scenario: no estimator can be better.
+    """The posterior Cramer-Rao bound of a simulated scenario: a lower limit of the error.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     runs : int
         Seeds over which it is averaged.
     smoothed : bool
