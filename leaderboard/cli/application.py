@@ -30,6 +30,7 @@ from simnav.leaderboard.cli import (
     simulate,
     sweep,
     train,
+    tune,
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
@@ -92,6 +93,7 @@ for _module in (
     rescore,
     cite,
     merge,
+    tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)

@@ -72,7 +72,7 @@ _LOOSE, _COMPACTED, _TRIALS, _PROVENANCE = "results", "compacted", "trials", "pr
 #: Folders inside a folder of results, those first that others refer to.
 FILES = (_PROVENANCE, _TRIALS, _COMPACTED, _LOOSE)
 _MOST_PARTS = 16  # more are merged into one
-_STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
+_STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
 T = TypeVar("T")
@@ -84,6 +84,7 @@ class Ending(NamedTuple):
     Attributes
     ----------
     status : str
+        Status of the run.
     time_limit : float
         That it ran under [s]; 0 where it is not known.
     memory_limit : int
@@ -198,6 +199,7 @@ def select(folder: str | os.PathLike[str], current: Mapping[str, tuple[str, Mapp
     Parameters
     ----------
     folder : path
+        Folder of the results.
     current : mapping
         Versioned id of a scenario -> (``Result.recording``, {label: ``Result.variant``}). Other estimators
         of the scenario stay current if they were run on the same recordings.
@@ -394,7 +396,9 @@ def drop(folder: str | os.PathLike[str], keys: Collection[str]) -> None:
     Parameters
     ----------
     folder : path
+        Folder of the results.
     keys : collection of str
+        Keys of the results.
 
     Raises
     ------
@@ -421,6 +425,7 @@ def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, fl
     Parameters
     ----------
     folder : path
+        Folder of the results.
     scores : mapping of str to mapping
         By key: all scores of the result.
     scoring : str
@@ -466,6 +471,7 @@ def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]
     Parameters
     ----------
     folder : path
+        Folder of the results.
     series : bool
         False leaves the series out, which is quicker.
 
