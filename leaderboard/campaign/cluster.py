@@ -7,8 +7,11 @@ many processes as the machine has cores: each estimator runs in a process that t
 
 from __future__ import annotations
 
+import atexit
 import importlib
+import shutil
 import tempfile
+import threading
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
@@ -32,6 +35,9 @@ class ClusterError(RuntimeError):
     """The cluster was lost, or cannot be used; the message is one sentence."""
 
 
+_one_at_a_time = threading.Lock()  # a worker with several threads has one folder
+
+
 @lru_cache(maxsize=1)
 def _simulator() -> str:
     return simulator_version()
@@ -43,11 +49,24 @@ def _run_remotely(index: int, unit: Unit) -> tuple[int, Counter[str], dict[str, 
         raise ClusterError(
             f"a worker of the cluster has simnav {_simulator()}, and the campaign {unit.simulator}: install the same"
         )
-    with tempfile.TemporaryDirectory(prefix="simnav-unit-", ignore_cleanup_errors=True) as name:
-        folder = store.create(Path(name) / "results")
-        _, statuses = run_unit(index, replace(unit, folder=folder, parent=0))
-        files = [p for p in folder.rglob("*") if p.is_file() and p.parent != folder]
-        return index, statuses, {p.relative_to(folder).as_posix(): p.read_bytes() for p in files}
+    with _one_at_a_time:
+        folder = _workspace()
+        try:
+            _, statuses = run_unit(index, replace(unit, folder=folder, parent=0))
+            files = [p for p in folder.rglob("*") if p.is_file() and p.parent != folder]
+            return index, statuses, {p.relative_to(folder).as_posix(): p.read_bytes() for p in files}
+        finally:
+            for part in store.FILES:
+                shutil.rmtree(folder / part, ignore_errors=True)
+            store.create(folder)
+
+
+@lru_cache(maxsize=1)
+def _workspace() -> Path:
+    """Folder of this worker's results: one for all units, because its estimators' processes are made for one."""
+    home = tempfile.mkdtemp(prefix="simnav-worker-")
+    atexit.register(shutil.rmtree, home, ignore_errors=True)
+    return store.create(Path(home) / "results")
 
 
 def _keep(folder: Path, files: Mapping[str, bytes]) -> None:
