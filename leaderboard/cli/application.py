@@ -29,6 +29,7 @@ from simnav.leaderboard.cli import (
     simulate,
     sweep,
     train,
+    verify,
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
@@ -89,6 +90,7 @@ for _module in (
     bound,
     reproduce,
     rescore,
+    verify,
     cite,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
