@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.tuning.space import Range
+    from simnav.leaderboard.tuning.tuning import Method, Tuning
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
@@ -72,6 +74,7 @@ __all__ = [
     "scenario_of",
     "scenarios_of",
     "sweep",
+    "tune",
     "verify",
 ]
 
@@ -85,6 +88,7 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     Parameters
     ----------
     estimator : str, Path, type or pair
+        Name, file or class, also with parameters.
     **parameters
         Of its constructor; texts are converted as on the command line.
 
@@ -107,7 +111,9 @@ def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     seed : int
+        Seed of the run.
 
     Raises
     ------
@@ -214,14 +220,16 @@ def run(
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> RunReport:
-    """Run estimators once over one scenario, in this process, and score them.
+    """Run estimators once on one scenario, in this process, and score them.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     estimators : estimators, optional
         Default: all registered ones.
     seed : int
+        Seed of the run.
     parameters : mapping, optional
         Of the estimators; of several each gets those that it has.
     progress : callable, optional
@@ -251,13 +259,14 @@ def evaluate(
     results: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> EvaluationReport:
-    """Run estimators beside the baselines on the same seeds, and say where they stand.
+    """Compare estimators with the baselines on the same seeds.
 
     Parameters
     ----------
     estimators : estimators
         Those in question.
     scenarios : scenarios
+        One scenario or several, by name, file or themselves.
     runs : int
         Seeds a scenario.
     seed : int
@@ -328,7 +337,7 @@ def campaign(
     sealed: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
-    """Run scenarios x estimators x seeds; started again, it goes on where it was.
+    """Run estimators on scenarios and seeds. Started again, the campaign continues.
 
     Parameters
     ----------
@@ -564,11 +573,12 @@ def bound(
     smoothed: bool = False,
     progress: Callable[..., None] | None = None,
 ) -> BoundReport:
-    """The posterior Cramer-Rao bound of a simulated scenario: no estimator can be better.
+    """The posterior Cramer-Rao bound of a simulated scenario: a lower limit of the error.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     runs : int
         Seeds over which it is averaged.
     smoothed : bool
@@ -654,6 +664,72 @@ def reproduce(
         if until_decided:
             return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
         return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
+
+
+def tune(
+    estimator: EstimatorLike,
+    families: Scenarios = ("training-voyages", "training-clean"),
+    vary: Sequence[str | Range] | str | None = None,
+    *,
+    runs: int = 20,
+    unseen: int = 20,
+    seed: int = 0,
+    evaluations: int = 40,
+    method: Method = "differential-evolution",
+    search_seed: int = 0,
+    progress: Callable[..., None] | None = None,
+) -> Tuning:
+    """Choose parameters of an estimator on training families.
+
+    Parameters
+    ----------
+    estimator : str, Path, type or pair
+        Parameters that it sets hold.
+    families : scenarios
+        Training families; their voyages share no random stream with any other scenario's.
+    vary : sequence of str or Range, or str, optional
+        What is varied, like ``"dof=2:50:log"``; several are a list, or a text with commas. Default: what was varied
+        for the file that ships with the row (``estimators/tuned``).
+    runs, unseen : int
+        Voyages of each family for the search, and for the comparison afterwards.
+    seed : int
+        Of the first voyage; those for the comparison follow upon those for the search.
+    evaluations : int
+        Of the objective.
+    method : str
+        ``differential-evolution`` or ``nelder-mead``.
+    search_seed : int
+        Of the search's own random numbers.
+    progress : callable, optional
+        Called with how many of how many parts are done, and ``note=`` what is next.
+
+    Returns
+    -------
+    Tuning
+
+    Raises
+    ------
+    RequestError
+        If a scenario is not for training, or a parameter cannot be varied.
+    """
+    from simnav.leaderboard.tuning.tuning import TUNED, ranges_of, read, tune_row
+
+    request = one_request(estimator)
+    with mistakes():
+        request.make()
+    chosen = scenarios_of(families)
+    if vary is None:
+        path = TUNED / f"{request.name}.json"
+        if not path.is_file():
+            raise RequestError(f"{request.label} ships without a tuning: say what to vary, like vary='dof=2:50:log'")
+        vary = ranges_of(read(path))
+    ranges = [text for text in vary.split(",") if text.strip()] if isinstance(vary, str) else list(vary)
+    if min(runs, unseen) < 2:
+        raise RequestError(f"runs = {runs}, unseen = {unseen}: both should be 2 or more")
+    return tune_row(
+        request, chosen, ranges, runs=runs, unseen=unseen, seed=seed, evaluations=evaluations, method=method,
+        search_seed=search_seed, progress=progress,
+    )  # fmt: skip
 
 
 @contextlib.contextmanager

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         rescore,
         run,
         sweep,
+        tune,
         verify,
     )
     from simnav.plugins import load_plugin
@@ -105,6 +106,7 @@ __all__ = [
     "run_trial",
     "score",
     "sweep",
+    "tune",
     "verify",
 ]
 
@@ -150,6 +152,7 @@ _HOMES = {
         "rescore",
         "run",
         "sweep",
+        "tune",
         "verify",
     ),
 }
@@ -181,6 +184,32 @@ def _register_scenarios() -> None:
                 vector_entry_point="simnav.environment:NavigationVectorEnv",
                 kwargs={"scenario": header.id},
             )
+        _register_tasks(header.gym_id, header.id, recorded=header.recorded)
+
+
+# Learning tasks are of the second floor: their entry points are texts, so that the library does not import them.
+_LEARNING = "simnav.estimators.learning"
+
+
+def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
+    """Give the learning tasks over a scenario their Gymnasium ids."""
+    name, _, version = gym_id.rpartition("-v")
+    for task in ("Tuning", "Detection", "Correction"):
+        task_id = f"{name}-{task}-v{version}"
+        if task_id not in _registry:
+            _register_env(
+                id=task_id,
+                entry_point=f"{_LEARNING}.environment:FilterTaskEnv",
+                vector_entry_point=f"{_LEARNING}.vector:FilterTaskVectorEnv",
+                kwargs={"scenario": scenario, "task": task},
+            )
+    task_id = f"{name}-Guidance-v{version}"
+    if not recorded and task_id not in _registry:
+        _register_env(
+            id=task_id,
+            entry_point=f"{_LEARNING}.guidance:GuidanceEnv",
+            kwargs={"scenario": scenario},
+        )
 
 
 _register_scenarios()

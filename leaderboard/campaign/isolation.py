@@ -97,10 +97,8 @@ def isolate(
         }[verdict]
         return Outcome(verdict, reason, None, seconds, peak)
     if message is None:
-        starved = (
-            out_of_memory_kills() > kills if death == "SIGKILL" else death.startswith("SIG") and peak > 0.9 * memory
-        )
-        if starved:
+        by_kernel = death == "SIGKILL" and out_of_memory_kills() > kills
+        if by_kernel or (death.startswith("SIG") and death != "SIGKILL" and peak > 0.9 * memory):
             return Outcome("out-of-memory", f"killed ({death}) for want of memory", None, seconds, peak)
         return Outcome("error", f"the process died ({death}) without an answer", None, seconds, peak)
     try:

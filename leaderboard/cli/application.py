@@ -29,6 +29,7 @@ from simnav.leaderboard.cli import (
     simulate,
     sweep,
     train,
+    tune,
     verify,
     warmup,
 )
@@ -92,6 +93,7 @@ for _module in (
     rescore,
     verify,
     cite,
+    tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)

@@ -51,6 +51,7 @@ class Result:
     scenario : str
         Versioned id.
     seed : int
+        Seed of the run.
     estimator : str
         Label, unique in a campaign.
     parameters : mapping
@@ -214,6 +215,7 @@ def rows(table: pa.Table, provenances: Mapping[str, Provenance]) -> Iterator[Res
     Parameters
     ----------
     table : pyarrow.Table
+        Part of a file of results.
     provenances : mapping of str to Provenance
         By id. A result whose provenance is not among them keeps the id alone.
     """

@@ -108,14 +108,14 @@ def test_a_thousand_million_runs_cost_no_memory() -> None:
 
 
 def test_a_campaign_of_a_thousand_million_runs_begins_at_once(tmp_path: Path) -> None:
-    class Enough(Exception):
+    class EnoughError(Exception):
         pass
 
     def stop(progress: object) -> None:
         if getattr(progress, "done", 0) and getattr(progress, "stage", "") == "run":
-            raise Enough
+            raise EnoughError
 
     scenario = load("harbour-multipath").model_copy(update={"duration": 5.0})
-    with pytest.raises(Enough):
+    with pytest.raises(EnoughError):
         run_campaign([scenario], [EstimatorRequest("gnss-only")], range(10**9), tmp_path, workers=1, progress=stop)
     assert json.dumps([r.seed for r in store.load(tmp_path)])[:2] == "[0"
