@@ -1,4 +1,4 @@
-"""What a caller gives to `simnav.leaderboard.interface`, made into what the rest works with: scenarios, results."""
+"""Conversion of the arguments of `simnav.leaderboard.interface`: scenarios and results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def scenario_of(given: ScenarioLike) -> Scenario:
 
 
 def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str], None] | None = None) -> list[Scenario]:
-    """The scenarios that were asked for; where none was, those of the catalogue.
+    """The requested scenarios; without a request, those of the catalogue.
 
     Of the catalogue, families for training are left out, and logs whose files are not here.
 

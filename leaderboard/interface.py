@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.sweep.report import Sweep
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
@@ -69,6 +70,7 @@ __all__ = [
     "run",
     "scenario_of",
     "scenarios_of",
+    "sweep",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -81,6 +83,7 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     Parameters
     ----------
     estimator : str, Path, type or pair
+        Name, file or class, also with parameters.
     **parameters
         Of its constructor; texts are converted as on the command line.
 
@@ -103,7 +106,9 @@ def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     seed : int
+        Seed of the run.
 
     Raises
     ------
@@ -210,14 +215,16 @@ def run(
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> RunReport:
-    """Run estimators once over one scenario, in this process, and score them.
+    """Run estimators once on one scenario, in this process, and score them.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     estimators : estimators, optional
         Default: all registered ones.
     seed : int
+        Seed of the run.
     parameters : mapping, optional
         Of the estimators; of several each gets those that it has.
     progress : callable, optional
@@ -247,13 +254,14 @@ def evaluate(
     results: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> EvaluationReport:
-    """Run estimators beside the baselines on the same seeds, and say where they stand.
+    """Compare estimators with the baselines on the same seeds.
 
     Parameters
     ----------
     estimators : estimators
         Those in question.
     scenarios : scenarios
+        One scenario or several, by name, file or themselves.
     runs : int
         Seeds a scenario.
     seed : int
@@ -322,7 +330,7 @@ def campaign(
     covariance_interval: float = 0.0,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
-    """Run scenarios x estimators x seeds; started again, it goes on where it was.
+    """Run estimators on scenarios and seeds. Started again, the campaign continues.
 
     Parameters
     ----------
@@ -363,6 +371,63 @@ def campaign(
                    keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
+
+
+def sweep(
+    scenario: ScenarioLike,
+    dials: Mapping[str, Sequence[float]] | Sequence[str] | str,
+    estimators: Estimators,
+    *,
+    runs: int = 30,
+    score: str = "horizontal_rmse",
+    limit: float | None = None,
+    output: str | os.PathLike[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    progress: CampaignProgress = None,
+    **options: Any,
+) -> Sweep:
+    """Turn a dial of a scenario, or two: error against the dial, and where each estimator breaks.
+
+    Every value has the same seeds: the same draws and noise, but for the dial. Started again, it goes on where it was.
+
+    Parameters
+    ----------
+    scenario, estimators, parameters : as for `run`
+    dials : mapping of str to sequence of float, or str
+        A dial of the scenario (``[[dial]]``), or a key path in its file, to values in the unit of the key; or as on the
+        command line, ``"multipath=0,1,2,4"``. Without values: seven over the range. The clean value is always added.
+    runs : int
+        Seeds a value.
+    score : str
+        Key of `simnav.scoring.SCORES`, one that is better when lower.
+    limit : float, optional
+        An error that must not be passed, in the unit of the score.
+    output : path, optional
+        Folder of the results; default: ``results/sweep-SCENARIO``.
+    seed, progress, **options
+        As for `evaluate`: ``workers``, ``time_limit``, ``memory_limit``.
+
+    Returns
+    -------
+    Sweep
+    """
+    from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.sweep.settings import checked_score, chosen_dials, parse_dials, settings
+
+    if not estimators:
+        raise RequestError("no estimator was asked for; name those whose error should be seen against the dial")
+    chosen, mine = scenario_of(scenario), requests(estimators, parameters)
+    checked_score(score, limit)
+    turned = chosen_dials(chosen, parse_dials(dials))
+    found, seeds = settings(chosen, turned), range(seed, seed + runs)
+    folder = absolute(output or Path("results") / f"sweep-{chosen.name}")
+    limits = {"workers": 2, "time_limit": None, "memory_limit": 2048.0} | options
+    summary = _run([s.scenario for s in found], mine, seeds, folder, progress=progress, **limits)
+    ids, labels = {s.scenario.id for s in found}, tuple(r.label for r in mine)
+    results = [r for r in results_of(folder) if r.scenario in ids and r.estimator in labels and r.seed in seeds]
+    return Sweep(chosen.id, tuple(d for d, _ in turned), tuple(tuple(v) for _, v in turned), labels, score, limit,
+                 results, tuple(found), summary)  # fmt: skip
 
 
 def rank(
@@ -456,11 +521,12 @@ def bound(
     smoothed: bool = False,
     progress: Callable[..., None] | None = None,
 ) -> BoundReport:
-    """The posterior Cramer-Rao bound of a simulated scenario: no estimator can be better.
+    """The posterior Cramer-Rao bound of a simulated scenario: a lower limit of the error.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     runs : int
         Seeds over which it is averaged.
     smoothed : bool

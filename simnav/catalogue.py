@@ -3,12 +3,11 @@
 A pack is an importable package that holds scenario files (``*.toml``, and those of families in ``families/*.toml``);
 installing it is all it takes. Only the heads of the files are read here, because ``import simnav`` asks for them to
 register its Gymnasium ids. A broken pack or file is named in a warning and
-harms nobody else.
+does not affect the others.
 """
 
 from __future__ import annotations
 
-import contextlib
 import importlib.metadata
 import importlib.util
 import re
@@ -17,9 +16,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-
-from simnav.draws import Template
-from simnav.spec import SpecError
+from typing import Any
 
 __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 
@@ -55,6 +52,8 @@ class Header:
         Parameters are chosen on it; campaigns leave it out unless it is named.
     path : Path
         Path of the TOML file.
+    recorded : bool
+        Whether the measurements come from a log.
     """
 
     name: str
@@ -66,6 +65,7 @@ class Header:
     group: str
     training: bool
     path: Path
+    recorded: bool = False
 
     @property
     def id(self) -> str:
@@ -136,15 +136,14 @@ def _own(point: importlib.metadata.EntryPoint) -> bool:
 
 def _header(path: Path) -> Header | None:
     try:
-        with path.open("rb") as file:
-            table = tomllib.load(file)
+        text = path.read_text(encoding="utf-8")
+        table = _head(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         _warn(f"{path}: left out, not valid TOML: {error}")
         return None
     name, version, duration = table.get("name"), table.get("version"), table.get("duration_s")
     if isinstance(duration, dict):
-        with contextlib.suppress(SpecError):
-            duration = Template(table, str(path)).middle()["duration_s"]
+        duration = _middle(text, str(path))
     if not isinstance(name, str) or not NAME.fullmatch(name):
         _warn(f"{path}: left out, name = {name!r} should be in kebab-case, like 'coastal-voyage'")
         return None
@@ -165,7 +164,30 @@ def _header(path: Path) -> Header | None:
         group=str(table.get("group", "other")),
         training=table.get("training") is True,
         path=path,
+        recorded="log" in table,
     )
+
+
+def _head(text: str) -> dict[str, Any]:
+    """What stands in a file before its first table: reading all of forty files would take longer than the import."""
+    lines = text.splitlines(keepends=True)
+    end = next((i for i, line in enumerate(lines) if line.startswith("[")), len(lines))
+    try:
+        return tomllib.loads("".join(lines[:end]))
+    except tomllib.TOMLDecodeError:  # a line of a text may begin like a table
+        return tomllib.loads(text)
+
+
+def _middle(text: str, source: str) -> float | None:
+    """The median duration of a scenario that draws it."""
+    from simnav.draws import Template
+    from simnav.spec import SpecError
+
+    try:
+        duration = Template(tomllib.loads(text), source).middle().get("duration_s")
+    except (SpecError, tomllib.TOMLDecodeError):
+        return None
+    return float(duration) if isinstance(duration, (int, float)) else None
 
 
 def _warn(message: str) -> None:

@@ -158,6 +158,7 @@ class SolutionSeparation(Solver):
     Parameters
     ----------
     model : ErrorModel or ModelChoice
+        The model of each filter.
     false_alarm : float
         Probability of each test to fail where nothing is wrong, in (0, 1).
     horizon : float

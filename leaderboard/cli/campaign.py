@@ -46,7 +46,7 @@ def command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Run scenarios x estimators x seeds; started again, it goes on where it was."""
+    """Run estimators on scenarios and seeds. Started again, the campaign continues."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking import tables

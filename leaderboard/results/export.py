@@ -57,6 +57,7 @@ class Document:
     Attributes
     ----------
     results : sequence of Result
+        The results.
     ranking : mapping
         Of the same results, plain (``Ranking.to_dict``).
     scenarios : sequence of mapping

@@ -52,6 +52,7 @@ class Result:
     scenario : str
         Versioned id.
     seed : int
+        Seed of the run.
     estimator : str
         Label, unique in a campaign.
     parameters : mapping
@@ -221,6 +222,7 @@ def rows(
     Parameters
     ----------
     table : pyarrow.Table
+        Part of a file of results.
     provenances : mapping of str to Provenance
         By id. A result whose provenance is not among them keeps the id alone.
     scores : collection of str, optional

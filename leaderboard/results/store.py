@@ -70,7 +70,7 @@ __all__ = [
 _MARKER = "simnav-results.json"
 _LOOSE, _COMPACTED, _TRIALS, _PROVENANCE = "results", "compacted", "trials", "provenance"
 _MOST_PARTS = 16  # more are merged into one
-_STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
+_STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
 T = TypeVar("T")
@@ -82,6 +82,7 @@ class Ending(NamedTuple):
     Attributes
     ----------
     status : str
+        Status of the run.
     time_limit : float
         That it ran under [s]; 0 where it is not known.
     memory_limit : int
@@ -196,6 +197,7 @@ def select(folder: str | os.PathLike[str], current: Mapping[str, tuple[str, Mapp
     Parameters
     ----------
     folder : path
+        Folder of the results.
     current : mapping
         Versioned id of a scenario -> (``Result.recording``, {label: ``Result.variant``}). Other estimators
         of the scenario stay current if they were run on the same recordings.
@@ -395,7 +397,9 @@ def drop(folder: str | os.PathLike[str], keys: Collection[str]) -> None:
     Parameters
     ----------
     folder : path
+        Folder of the results.
     keys : collection of str
+        Keys of the results.
 
     Raises
     ------
@@ -422,6 +426,7 @@ def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, fl
     Parameters
     ----------
     folder : path
+        Folder of the results.
     scores : mapping of str to mapping
         By key: all scores of the result.
     scoring : str
@@ -469,6 +474,7 @@ def load(folder: str | os.PathLike[str], *, series: bool = True, scores: Collect
     Parameters
     ----------
     folder : path
+        Folder of the results.
     series : bool
         False leaves the series out. Otherwise they stay in their files until they are asked for.
     scores : collection of str, optional
