@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.tuning.space import Range
+    from simnav.leaderboard.tuning.tuning import Method, Tuning
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
@@ -71,6 +73,7 @@ __all__ = [
     "scenario_of",
     "scenarios_of",
     "sweep",
+    "tune",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -612,6 +615,72 @@ def reproduce(
         if until_decided:
             return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
         return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
+
+
+def tune(
+    estimator: EstimatorLike,
+    families: Scenarios = ("training-voyages", "training-clean"),
+    vary: Sequence[str | Range] | str | None = None,
+    *,
+    runs: int = 20,
+    unseen: int = 20,
+    seed: int = 0,
+    evaluations: int = 40,
+    method: Method = "differential-evolution",
+    search_seed: int = 0,
+    progress: Callable[..., None] | None = None,
+) -> Tuning:
+    """Choose parameters of an estimator on training families.
+
+    Parameters
+    ----------
+    estimator : str, Path, type or pair
+        Parameters that it sets hold.
+    families : scenarios
+        Training families; their voyages share no random stream with any other scenario's.
+    vary : sequence of str or Range, or str, optional
+        What is varied, like ``"dof=2:50:log"``; several are a list, or a text with commas. Default: what was varied
+        for the file that ships with the row (``estimators/tuned``).
+    runs, unseen : int
+        Voyages of each family for the search, and for the comparison afterwards.
+    seed : int
+        Of the first voyage; those for the comparison follow upon those for the search.
+    evaluations : int
+        Of the objective.
+    method : str
+        ``differential-evolution`` or ``nelder-mead``.
+    search_seed : int
+        Of the search's own random numbers.
+    progress : callable, optional
+        Called with how many of how many parts are done, and ``note=`` what is next.
+
+    Returns
+    -------
+    Tuning
+
+    Raises
+    ------
+    RequestError
+        If a scenario is not for training, or a parameter cannot be varied.
+    """
+    from simnav.leaderboard.tuning.tuning import TUNED, ranges_of, read, tune_row
+
+    request = one_request(estimator)
+    with mistakes():
+        request.make()
+    chosen = scenarios_of(families)
+    if vary is None:
+        path = TUNED / f"{request.name}.json"
+        if not path.is_file():
+            raise RequestError(f"{request.label} ships without a tuning: say what to vary, like vary='dof=2:50:log'")
+        vary = ranges_of(read(path))
+    ranges = [text for text in vary.split(",") if text.strip()] if isinstance(vary, str) else list(vary)
+    if min(runs, unseen) < 2:
+        raise RequestError(f"runs = {runs}, unseen = {unseen}: both should be 2 or more")
+    return tune_row(
+        request, chosen, ranges, runs=runs, unseen=unseen, seed=seed, evaluations=evaluations, method=method,
+        search_seed=search_seed, progress=progress,
+    )  # fmt: skip
 
 
 @contextlib.contextmanager

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         rescore,
         run,
         sweep,
+        tune,
     )
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
@@ -104,6 +105,7 @@ __all__ = [
     "run_trial",
     "score",
     "sweep",
+    "tune",
 ]
 
 # Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
@@ -148,6 +150,7 @@ _HOMES = {
         "rescore",
         "run",
         "sweep",
+        "tune",
     ),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}

@@ -29,6 +29,7 @@ from simnav.leaderboard.cli import (
     simulate,
     sweep,
     train,
+    tune,
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
@@ -90,6 +91,7 @@ for _module in (
     reproduce,
     rescore,
     cite,
+    tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)
