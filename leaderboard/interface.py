@@ -505,9 +505,10 @@ def rank(
     -------
     simnav.leaderboard.ranking.board.Ranking
     """
-    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
 
-    given = results_of(results) if isinstance(results, (str, os.PathLike)) else results
+    wanted = RANKED_SCORES | ({score} if score else set())
+    given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else results
     return rank(given, score=score, tracks=tracks)
 
 
