@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
+    from simnav.leaderboard.campaign.verification import Verification
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.bounds import BoundReport
@@ -75,6 +76,7 @@ __all__ = [
     "scenarios_of",
     "sweep",
     "tune",
+    "verify",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -335,6 +337,8 @@ def campaign(
     backend: str = "loky",
     scheduler: str | None = None,
     shard: tuple[int, int] = (1, 1),
+    confinement: str = "auto",
+    sealed: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run estimators on scenarios and seeds. Started again, the campaign continues.
@@ -362,6 +366,10 @@ def campaign(
     backend, scheduler, shard
         As for `simnav.leaderboard.campaign.campaign.run_campaign`: processes of this machine or a Dask cluster, its
         address, and which of how many parts of the runs to do.
+    confinement : {"auto", "bubblewrap", "process", "none"}
+        How estimators are kept apart from the recording, see docs/security.md; default: the strongest that works here.
+    sealed : path, optional
+        File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
 
     Returns
     -------
@@ -369,6 +377,7 @@ def campaign(
         Of all that is in the folder.
     """
     from simnav.leaderboard.campaign.campaign import QUICK_RUNS, RUNS
+    from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
 
@@ -378,10 +387,51 @@ def campaign(
     chosen, folder = scenarios_of(scenarios, quick=quick), absolute(output)
     everyone = requests(estimators, parameters)
     summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
-                   keep_trials=keep_trials, covariance_interval=covariance_interval, backend=backend,
-                   scheduler=scheduler, shard=shard)  # fmt: skip
+                   keep_trials=keep_trials, covariance_interval=covariance_interval, confinement=confinement,
+                   backend=backend, scheduler=scheduler, shard=shard,
+                   seal=None if sealed is None else read_seal(sealed))  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
+
+
+def verify(
+    results: str | os.PathLike[str],
+    *,
+    key: str | os.PathLike[str] | None = None,
+    sample: int = 10,
+    scenarios: Scenarios = None,
+    estimators: Estimators = None,
+    progress: Callable[..., None] | None = None,
+) -> Verification:
+    """Check the seal of results, and repeat a sample of them: they should be the same to the bit.
+
+    Parameters
+    ----------
+    results : path
+        Folder that a campaign wrote.
+    key : path, optional
+        Published key of a sealed campaign.
+    sample : int
+        Runs that are repeated at most.
+    scenarios, estimators : optional
+        That are not in the catalogue or not registered.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the next.
+
+    Returns
+    -------
+    Verification
+    """
+    from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.leaderboard.campaign.verification import verify_results
+    from simnav.leaderboard.results.store import StoreError
+
+    given = [] if scenarios is None else scenarios_of(scenarios)
+    with mistakes(StoreError):
+        return verify_results(
+            absolute(results), None if key is None else read_seal(key), sample=sample, scenarios=given,
+            estimators=requests(estimators) if estimators else [], progress=progress,
+        )  # fmt: skip
 
 
 def sweep(
@@ -463,9 +513,10 @@ def rank(
     -------
     simnav.leaderboard.ranking.board.Ranking
     """
-    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
 
-    given = results_of(results) if isinstance(results, (str, os.PathLike)) else results
+    wanted = RANKED_SCORES | ({score} if score else set())
+    given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else results
     return rank(given, score=score, tracks=tracks)
 
 

@@ -79,13 +79,14 @@ def _keep(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def run_on_cluster(
-    units: Mapping[int, Unit], scheduler: str | None, workers: int
+    units: Iterator[tuple[int, Unit]], scheduler: str | None, workers: int
 ) -> Iterator[tuple[int, Counter[str]]]:
     """Run units on a Dask cluster, and yield what became of them as they end; their results are on disk then.
 
     Parameters
     ----------
-    units : mapping of int to Unit
+    units : iterator of (int, Unit)
+        They are made when the cluster has room for them.
     scheduler : str or None
         Address; None starts a cluster of processes on this machine.
     workers : int
@@ -107,19 +108,19 @@ def run_on_cluster(
             client.wait_for_workers(1, timeout=_WAIT)
         except lost as error:
             raise ClusterError(f"the Dask scheduler {scheduler or 'here'} cannot be used: {error}") from error
-        units = dict(units)  # the campaign takes out what is done
-        waiting = iter(units.items())
+        folders: dict[int, Path] = {}
         running = distributed.as_completed(loop=client.loop)
 
         def send(count: int) -> None:
-            for _, (index, unit) in zip(range(count), waiting, strict=False):
+            for _, (index, unit) in zip(range(count), units, strict=False):
+                folders[index] = unit.folder
                 running.add(client.submit(_run_remotely, index, unit, pure=False, retries=_RETRIES))
 
         send(_AHEAD * max(1, sum(client.nthreads().values())))
         try:
             for future in running:
                 index, statuses, files = future.result()
-                _keep(units[index].folder, files)
+                _keep(folders.pop(index), files)
                 future.release()
                 send(1)
                 yield index, statuses

@@ -31,6 +31,7 @@ from simnav.leaderboard.cli import (
     sweep,
     train,
     tune,
+    verify,
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
@@ -91,6 +92,7 @@ for _module in (
     bound,
     reproduce,
     rescore,
+    verify,
     cite,
     merge,
     tune,

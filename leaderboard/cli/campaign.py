@@ -71,6 +71,12 @@ def command(
     shard: Annotated[
         str, typer.Option(metavar="K/N", help="Do part K of N of the runs; 'simnav merge' puts the parts together.")
     ] = "1/1",
+    confinement: Annotated[
+        str, typer.Option(help="How estimators are kept from the truth: auto, bubblewrap, process, none.")
+    ] = "auto",
+    sealed: Annotated[
+        Path | None, typer.Option("--sealed", metavar="KEYFILE", help="Derive the seeds from the secret in this file.")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -88,7 +94,7 @@ def command(
             report = interface.campaign(
                 chosen, estimator, runs=runs, seed=seed, output=output, quick=quick, parameters=parameters(set_),
                 workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
-                covariance_interval=covariance_interval,
+                covariance_interval=covariance_interval, confinement=confinement, sealed=sealed,
                 backend=(Backend.DASK if scheduler else backend).value, scheduler=scheduler, shard=_shard(shard),
                 progress=campaign_progress(bar),
             )  # fmt: skip
