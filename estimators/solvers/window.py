@@ -153,7 +153,7 @@ class WindowEstimator(Solver):
         self._contraction = 1.0
         self._cost_test = CostTest()
         n = self.chain.size
-        self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,))
+        self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,), size=())
         self.chain.aids.add(cross=(3, n), white=(3, n), innovation=(3,), used=np.int64)
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
@@ -422,10 +422,10 @@ class WindowEstimator(Solver):
         sizes: tuple[float, float] = solve_chain(
             chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
             motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
-            aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
+            aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
             aids["weight"], damping, first,
             nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
-            aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"],
+            aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"], nodes["size"],
         )  # fmt: skip
         return sizes
 
