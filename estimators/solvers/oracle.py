@@ -13,21 +13,22 @@ from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_fau
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.true_motion import levelled, true_motion, with_imu
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.recording import Recording
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
+from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurements
 
 __all__ = ["OracleEstimator"]
 
 
 class OracleEstimator(KalmanEstimator):
-    """The solver of the module: the inertial model where there is an IMU, the ship model where there is none.
+    """The solver of the module: the inertial model, with the true motion where there is no IMU.
 
     Of the faults it knows the flags and the statistics, not what they added (`simnav.estimators.adaptations.truth`):
     gross errors are left out, errors that last, like multipath, are states (`simnav.estimators.models.fault_states`);
-    but a disturbance of the IMU is taken off its samples. On a run without faults it is ``ekf`` or ``ship-ekf``.
+    but a disturbance of the IMU is taken off its samples. On a run without faults it is ``ekf``. Without an IMU it is
+    told how the vessel moves (`simnav.estimators.models.true_motion`).
 
     Parameters
     ----------
@@ -52,30 +53,37 @@ class OracleEstimator(KalmanEstimator):
             raise ValueError(f"{type(adaptation).__name__} does not know what the faults added; NominalNoise does")
         self.truth, self.restore = adaptation, restore
         self._imu_faults: tuple[Array, Array] | None = None
-        self._revealed = False
+        self._motion: ImuSamples | None = None
+        self._recording: Recording | None = None
 
     def reveal(self, recording: Recording) -> None:
         """Take the labels."""
         self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
-        self._revealed = True
+        self._motion = true_motion(recording) if recording.instruments.imu is None else None
+        self._recording = recording
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run; needs an IMU or what the ship model needs, and `reveal` before."""
-        if not self._revealed:
+        """Begin a run; needs an instrument beside the IMU, and `reveal` before."""
+        if self._recording is None:
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
+        if self._motion is not None:
+            start, instruments = levelled(start, self._recording), with_imu(instruments)
         super().reset(start, instruments)
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
-        inner: ErrorModel = InertialModel() if instruments.imu is not None else ShipModel()
+        inner: ErrorModel = InertialModel()
         states = self.truth.states()
         return FaultStateModel(inner, states) if states else inner
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step, without what a fault did to the IMU."""
         imu, aids = measurements.imu, measurements.aids
+        if self._motion is not None:
+            first, last = np.searchsorted(self._motion.time, (measurements.start + 1e-9, measurements.time + 1e-9))
+            imu = self._motion[first:last]
         if self.restore and isinstance(self.truth, NominalNoise):
             aids = [self.truth.restore(m) for m in aids]
         if imu is not None and len(imu) and self._imu_faults is not None:

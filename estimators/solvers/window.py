@@ -114,7 +114,7 @@ class WindowEstimator(Solver):
         weighting: Weighting | None = None,
         *,
         window: int | None = 20,
-        tolerance: float = 1e-3,
+        tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.2,
         every_sample: bool = False,
