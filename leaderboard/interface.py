@@ -24,7 +24,6 @@ from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
 from simnav.scenario import Scenario
 
 if TYPE_CHECKING:
-    from simnav.contract_check import Report
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.rescoring import Rescored
@@ -34,8 +33,10 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.costs import CostReport
     from simnav.leaderboard.ranking.ranking import Ranking
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
+    from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.recording import Recording
+    from simnav.testing.contract_check import Report
 
 __all__ = [
     "EstimatorLike",
@@ -47,6 +48,7 @@ __all__ = [
     "bound",
     "campaign",
     "check",
+    "cite",
     "evaluate",
     "make",
     "quick_estimators",
@@ -121,14 +123,14 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
 
     Returns
     -------
-    simnav.contract_check.Report
+    simnav.testing.contract_check.Report
 
     Raises
     ------
     ValueError
         If there is no such estimator, or it cannot be made.
     """
-    from simnav.contract_check import check
+    from simnav.testing.contract_check import check
 
     return check(one_request(estimator, parameters).make)
 
@@ -408,6 +410,28 @@ def rescore(
         return rescore_results(_absolute(results), [n.strip() for n in names if n.strip()], given, progress)
 
 
+def cite(results: str | os.PathLike[str] | None = None) -> Citation:
+    """How to cite this version of simnav, or results.
+
+    Parameters
+    ----------
+    results : path, optional
+        Folder that a campaign wrote; default: simnav itself.
+
+    Returns
+    -------
+    Citation
+
+    Examples
+    --------
+    >>> print(cite().bibtex.splitlines()[0])
+    @software{simnav,
+    """
+    from simnav.leaderboard.results.citation import citation
+
+    return citation(None if results is None else [r.provenance for r in results_of(results)])
+
+
 def bound(
     scenario: ScenarioLike,
     *,
@@ -441,42 +465,70 @@ def reproduce(
     *,
     runs: int | None = None,
     methods: Sequence[str] = (),
+    until_decided: bool = False,
+    limit: int = 200,
+    minutes: float | None = None,
+    stored: bool = False,
     output: str | os.PathLike[str] | None = None,
     workers: int = 2,
     progress: Callable[[str, Progress], None] | None = None,
 ) -> Reproduction:
-    """Run a paper's comparison again: ours beside theirs, row by row.
+    """Repeat the comparison of a paper: our figures beside the paper's, with a verdict on each row.
 
     Parameters
     ----------
     paper : str
-        One of `simnav.leaderboard.papers.PAPERS`.
+        One of `simnav.leaderboard.papers.PAPERS`, such as ``guo-2026``, or an alias.
     runs : int, optional
-        Seeds a scenario; default: few, so that it ends within minutes.
+        Number of runs of each scenario; default: a few, so that it takes minutes.
     methods : sequence of str
-        Only what is about these methods of the paper.
+        Only the rows about these methods of the paper; default: all.
+    until_decided : bool
+        Run the methods of undecided rows again and again, until each row is decided (see
+        `simnav.leaderboard.papers.sequential`).
+    limit : int
+        With ``until_decided``: largest number of runs of a scenario.
+    minutes : float, optional
+        With ``until_decided``: time after which no further run is started.
+    stored : bool
+        Use the results that come with simnav, and run nothing.
     output : path, optional
-        Folder; default: ``reproduced/PAPER``. Its folder ``results`` keeps the results: started again, it goes on.
+        Folder; default: ``reproduced/PAPER``. Its folder ``results`` keeps the results: a later call continues there.
     workers : int
-        Processes.
+        Number of processes.
     progress : callable, optional
         Called with the name of the scenario and the campaign's progress.
 
     Returns
     -------
     Reproduction
+
+    Raises
+    ------
+    RequestError
+        If there is no such paper or method, or options contradict each other; one sentence.
     """
     from simnav.leaderboard.papers import paper as papers
+    from simnav.leaderboard.papers import sequential
+    from simnav.leaderboard.papers import stored as shipped
     from simnav.leaderboard.papers.reproduction import reproduce
     from simnav.leaderboard.results.store import StoreError
 
+    if stored and (until_decided or runs is not None):
+        raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")
+    if until_decided and runs is not None:
+        raise RequestError("'until_decided' chooses the number of runs itself: give 'limit' in place of 'runs'")
     with mistakes(ValueError):
         chosen = papers.load(paper)
         if methods:
             chosen = chosen.only(methods)
-    folder = _absolute(output or Path("reproduced") / paper)
+        if stored:
+            return shipped.load(chosen)
+    folder = _absolute(output or Path("reproduced") / chosen.key) / "results"
     with mistakes(StoreError):
-        return reproduce(chosen, runs or chosen.runs, folder / "results", workers=workers, progress=progress)
+        if until_decided:
+            return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
+        return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
 
 
 # -- what is given -----------------------------------------------------------------------------------------
@@ -493,27 +545,33 @@ def scenario_of(given: ScenarioLike) -> Scenario:
 
 
 def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str], None] | None = None) -> list[Scenario]:
-    """The scenarios that were asked for; where none was, all of the catalogue but logs whose files are not here.
+    """The scenarios that were asked for; where none was, those of the catalogue.
+
+    Of the catalogue, families for training are left out, and logs whose files are not here.
 
     Parameters
     ----------
     given : scenarios
-        A text may name several, separated by commas.
+        A text may name several, separated by commas. The name of a track stands for its scenarios.
     quick : bool
         Of the catalogue, leave out those that are tagged ``long``.
     note : callable, optional
         Called with a sentence on what is left out; default: a warning.
     """
-    from simnav.scenario import names
+    from simnav.scenario import headers, names
 
     items = [] if given is None else [given] if isinstance(given, (str, Path, Scenario)) else list(given)
     asked: list[ScenarioLike] = []
+    tracks: dict[str, list[ScenarioLike]] = {}
+    for header in headers():
+        tracks.setdefault(header.track, []).append(header.name)
     for item in items:
-        asked += [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]
+        for part in [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]:
+            asked += tracks.get(part, [part]) if isinstance(part, str) else [part]
     found = []
     for item in dict.fromkeys(asked or names()) if all(isinstance(i, str) for i in asked) else asked:
         chosen = scenario_of(item)
-        if quick and not asked and "long" in chosen.tags:
+        if not asked and (chosen.training or (quick and "long" in chosen.tags)):
             continue
         if chosen.log is not None:
             from simnav.source import open_source
@@ -542,7 +600,8 @@ def quick_estimators(note: Callable[[str], None] | None = None) -> list[str]:
 
 
 def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[Result]:
-    """The current results of a folder; ``series`` are what figures need."""
+    """The current results of a folder, all of one version of the benchmark; ``series`` are what charts need."""
+    from simnav.leaderboard.results.provenance import benchmark_of
     from simnav.leaderboard.results.store import StoreError, load
 
     path = _absolute(folder)
@@ -550,6 +609,7 @@ def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[
         results = load(path, series=series)
     if not results:
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
+    benchmark_of(r.provenance for r in results)
     return results
 
 

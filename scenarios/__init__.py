@@ -1,5 +1,5 @@
 """The catalogue of scenarios: one TOML file each, found by `simnav.catalogue` through the entry-point group
-``simnav.scenarios``. ``docs/scenarios.md`` describes the schema."""
+``simnav.scenarios``. ``docs/reference/scenarios.md`` describes the schema."""
 
 from __future__ import annotations
 

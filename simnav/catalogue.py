@@ -1,13 +1,14 @@
 """Where scenarios are found: the packs behind the entry-point group ``simnav.scenarios``.
 
-A pack is an importable package that holds scenario files (``*.toml``); installing it is all it takes.
-Only the heads of the files are read here, with nothing but the standard library, because ``import
-simnav`` asks for them to register its Gymnasium ids. A broken pack or file is named in a warning and
+A pack is an importable package that holds scenario files (``*.toml``, and those of families in ``families/*.toml``);
+installing it is all it takes. Only the heads of the files are read here, because ``import simnav`` asks for them to
+register its Gymnasium ids. A broken pack or file is named in a warning and
 harms nobody else.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import importlib.util
 import re
@@ -16,6 +17,9 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from simnav.draws import Template
+from simnav.spec import SpecError
 
 __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 
@@ -45,6 +49,10 @@ class Header:
         Length of a run [s].
     tags : tuple of str
         Words by which lists are filtered; ``long`` is left out of quick campaigns.
+    track, group : str
+        Scenarios of one track are ranked together; a group is what some of them have in common.
+    training : bool
+        Parameters are chosen on it; campaigns leave it out unless it is named.
     path : Path
         Path of the TOML file.
     """
@@ -54,6 +62,9 @@ class Header:
     title: str
     duration: float
     tags: tuple[str, ...]
+    track: str
+    group: str
+    training: bool
     path: Path
 
     @property
@@ -81,7 +92,7 @@ def headers() -> list[Header]:
     found: dict[str, Header] = {}
     ids: dict[str, Header] = {}
     for folder in _folders():
-        for path in sorted(folder.glob("*.toml")):
+        for path in (*sorted(folder.glob("*.toml")), *sorted(folder.glob("families/*.toml"))):
             header = _header(path)
             if header is None:
                 continue
@@ -131,6 +142,9 @@ def _header(path: Path) -> Header | None:
         _warn(f"{path}: left out, not valid TOML: {error}")
         return None
     name, version, duration = table.get("name"), table.get("version"), table.get("duration_s")
+    if isinstance(duration, dict):
+        with contextlib.suppress(SpecError):
+            duration = Template(table, str(path)).middle()["duration_s"]
     if not isinstance(name, str) or not NAME.fullmatch(name):
         _warn(f"{path}: left out, name = {name!r} should be in kebab-case, like 'coastal-voyage'")
         return None
@@ -147,6 +161,9 @@ def _header(path: Path) -> Header | None:
         title=str(table.get("title", "")),
         duration=float(duration),
         tags=tuple(map(str, tags)) if isinstance(tags, list) else (),
+        track=str(table.get("track", "other")),
+        group=str(table.get("group", "other")),
+        training=table.get("training") is True,
         path=path,
     )
 

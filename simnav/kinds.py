@@ -1,8 +1,9 @@
 """Kinds of aiding instruments: what each of them measures, and what follows from that for everybody else.
 
 A kind is declared once, beside the instrument of its name (``simnav/sensors/gnss.py`` and others, or a file of a third
-party; see ``docs/instruments.md``). Whatever depends on the kind of an instrument asks `KINDS`: how an error is added
-to a value, what is plausible, which role the instrument has, and how a navigation filter predicts its reading.
+party; see ``docs/how-to/add-an-instrument.md``). Whatever depends on the kind of an instrument asks `KINDS`: how an
+error is added to a value, what is plausible, which role the instrument has, and how a navigation filter predicts its
+reading.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from simnav.compiled import Array
-from simnav.earth import displace, relative_position
+from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.rotation import wrap_angle
 from simnav.plugins import PluginError, Registry
-from simnav.rotation import wrap_angle
 
 if TYPE_CHECKING:
     from simnav.types import Datasheet

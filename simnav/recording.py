@@ -186,6 +186,10 @@ class Recording:
         From time 0 to the end; ``data.truth`` holds the ends of all steps.
     note : str
         E.g. which recording of a folder of logs this is.
+    draws : mapping of str to object
+        What was drawn for this run, by key path, in the units of the scenario's file.
+    actual : Instruments or None
+        The datasheets that would be true, where those in ``instruments`` are wrong.
     """
 
     scenario: str
@@ -196,6 +200,8 @@ class Recording:
     faults: tuple[FaultLabel, ...]
     data: Block
     note: str = ""
+    draws: Mapping[str, Any] = field(default_factory=dict)
+    actual: Instruments | None = None
 
     @property
     def duration(self) -> float:
@@ -300,6 +306,11 @@ def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
     return {k: _plain(v) for k, v in asdict(sheet).items() if k != "details" or v}
 
 
+def _sheets(instruments: Instruments) -> dict[str, Any]:
+    imu = instruments.imu
+    return {"imu": None if imu is None else _sheet(imu), "aids": [_sheet(a) for a in instruments.values()]}
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {k: _plain(v) for k, v in value.items()}
@@ -317,12 +328,15 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         "step": instruments.step,
         "begin": data.start,
         "end": data.end,
-        "imu": None if instruments.imu is None else _sheet(instruments.imu),
-        "aids": [_sheet(a) for a in instruments.values()],
+        **_sheets(instruments),
         "streams": {name: s.kind for name, s in data.aids.items()},
         "faults": [asdict(f) for f in recording.faults],
         "start_time": recording.start.time,
     }
+    if recording.draws:
+        meta["draws"] = dict(recording.draws)
+    if recording.actual is not None:
+        meta["actual"] = _sheets(recording.actual)
     arrays: dict[str, Any] = {"meta": np.array(json.dumps(meta))}
 
     def add(prefix: str, holder: object, names: Sequence[str]) -> None:
@@ -340,20 +354,25 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
     return arrays
 
 
+def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
+    """The way back from `_sheets`."""
+    imu = sheets["imu"]
+    if imu is not None:
+        triads = {n: TriadDatasheet(**imu[n]) for n in ("gyroscope", "accelerometer")}
+        imu = ImuDatasheet(**{**imu, **triads})
+    aids = []
+    for aid in sheets["aids"]:
+        fields: dict[str, Any] = {
+            k: np.array(v, dtype=np.float64) if isinstance(v, list) else v for k, v in aid.items()
+        }
+        aids.append(Datasheet(**fields))
+    return Instruments(aids, imu, step)
+
+
 def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     def get(prefix: str, names: Sequence[str]) -> list[Any]:
         return [arrays[f"{prefix}.{n}"] for n in names]
 
-    imu_sheet = meta["imu"]
-    if imu_sheet is not None:
-        triads = {n: TriadDatasheet(**imu_sheet[n]) for n in ("gyroscope", "accelerometer")}
-        imu_sheet = ImuDatasheet(**{**imu_sheet, **triads})
-    sheets = []
-    for aid in meta["aids"]:
-        fields: dict[str, Any] = {
-            k: np.array(v, dtype=np.float64) if isinstance(v, list) else v for k, v in aid.items()
-        }
-        sheets.append(Datasheet(**fields))
     data = Block(
         meta["begin"],
         meta["end"],
@@ -365,7 +384,7 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     return Recording(
         meta["scenario"],
         meta["seed"],
-        Instruments(sheets, imu_sheet, meta["step"]),
+        _instruments(meta, meta["step"]),
         NavigationStates(*get("initial_truth", _STATE_ARRAYS)),
         InitialState(meta["start_time"], *get("start", ("position", "velocity", "attitude", "covariance"))),
         tuple(
@@ -374,4 +393,6 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         ),
         data,
         meta["note"],
+        meta.get("draws", {}),
+        _instruments(meta["actual"], meta["step"]) if "actual" in meta else None,
     )

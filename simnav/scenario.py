@@ -5,7 +5,7 @@ A scenario says what happens (vessel, manoeuvres, sea, current), with what it is
 table says which files hold what. Everything random is drawn from a run's seed, nothing from here.
 
 `load` finds one by name or path; `simnav.catalogue` knows where the packs are. The schema is
-described in ``docs/scenarios.md``.
+described in ``docs/reference/scenarios.md``.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ import pickle
 import re
 import sys
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, SupportsIndex
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from simnav.catalogue import NAME, Header, gym_id, headers
+from simnav.draws import Distribution, Draws, Template, has_draws, with_values
 from simnav.log.spec import RecordedSpec
 from simnav.plugins import PluginError, is_file_module, load_plugin, source_digest
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
@@ -33,13 +34,20 @@ from simnav.spec import Positive, Spec, SpecError, closest, entries, quantity
 from simnav.types import KINDS, Array, Instruments
 from simnav.world import Current, Manoeuvre, Sea, Start, Vessel
 
-__all__ = ["Header", "InitialError", "Scenario", "headers", "load", "names", "parse"]
+__all__ = ["Dial", "Header", "InitialError", "Scenario", "headers", "load", "names", "parse"]
 
 #: A measurement's labels are 32 bits, one an interval of a fault.
 _MOST_BITS = 32
 
 #: Longest run [s] and fastest instrument [Hz]: more than anyone needs, less than fills the memory by a slip.
 _LONGEST, _FASTEST = 1e7, 1e5
+
+#: What is added to the seed of a run of a training scenario. A campaign's seeds are below it, so that no run of the
+#: board shares a random stream with one that parameters were chosen on.
+TRAINING_ROOT = 1 << 63
+
+#: Files with draws that were tried at the ends of their ranges in this process.
+_CHECKED: set[str] = set()
 
 _INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -73,11 +81,33 @@ class InitialError(Spec):
         return np.diag(np.square([*self.position, *self.velocity, *self.attitude]))
 
 
+class Dial(Spec):
+    """A figure of a scenario that ``simnav sweep`` sets to one value after the other."""
+
+    name: str = Field(description="how it is called on the command line, in kebab-case")
+    key: str = Field(description="key path of what it sets, like `draw.size` or `fault[0].sigma_m`")
+    range: tuple[float, float] = Field(description="lowest and highest value that makes sense, in the unit")
+    unit: str = Field("", description="of the value, for tables and drawings")
+    title: str = Field(description="what it is, in a few words")
+    clean: float | None = Field(None, description="value at which nothing is wrong; default: the lowest")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not NAME.fullmatch(self.name):
+            raise ValueError(f"name = {self.name!r} should be in kebab-case, like 'multipath'")
+        low, high = self.range
+        if not low < high:
+            raise ValueError(f"range = {list(self.range)!r}: the lowest should be less than the highest")
+        if self.clean is not None and not low <= self.clean <= high:
+            raise ValueError(f"clean = {self.clean:g} should lie in the range, {low:g} to {high:g}")
+        return self
+
+
 class Scenario(Spec):
     """A run, described; simulated unless it has a ``[log]``.
 
     The fields carry their own descriptions (``Scenario.model_fields``) and hold SI units and radians;
-    ``docs/scenarios.md`` lists their TOML keys. Build one with `load` or `parse`, or from Python.
+    ``docs/reference/scenarios.md`` lists their TOML keys. Build one with `load` or `parse`, or from Python.
     """
 
     name: str = Field(description="kebab-case; with the version it is the scenario's id")
@@ -86,6 +116,11 @@ class Scenario(Spec):
     description: str = Field("", description="what happens and why, for the reader of the board")
     source: str = Field("", description="paper or data that it follows")
     tags: tuple[str, ...] = Field((), description="free words to select by")
+    track: str = Field("other", description="kebab-case; scenarios of one track are ranked together")
+    group: str = Field("other", description="what scenarios of a track have in common, in a word or two")
+    training: bool = Field(
+        False, description="parameters are chosen on it: its runs share no random stream with the board's"
+    )
     plugins: tuple[str, ...] = Field(
         (), description="Python files that register the instruments and faults of others, from the folder of this file"
     )
@@ -110,6 +145,113 @@ class Scenario(Spec):
     )
     faults: tuple[AnyFault, ...] = entries("fault", (), description="laid over the measurements, in order")
     log: RecordedSpec | None = Field(None, description="files of a recorded run; then there is no simulated world")
+    dials: tuple[Dial, ...] = entries("dial", (), description="what `simnav sweep` may turn")
+
+    _template: Template | None = PrivateAttr(None)
+    _declared: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _draws: Draws = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
+        """As `Spec.from_toml`; where something is to be drawn, the scenario in the middle of its ranges.
+
+        Raises
+        ------
+        SpecError
+            Also where a scenario is not valid for some of its draws; the message names them.
+        """
+        if not isinstance(table, Mapping) or not has_draws(table):
+            return super().from_toml(table, source=source, path=path)
+        template = Template(table, source)
+        scenario = super().from_toml(template.middle(), source=source, path=path)
+        content = f"{source} {json.dumps(template.table, default=str)}"
+        for drawn, draws in () if content in _CHECKED else template.extremes():
+            try:
+                super().from_toml(drawn, source=source, path=path)
+            except SpecError as error:
+                raise SpecError(f"{error} (for some draws: {_listed(draws)})") from None
+        _CHECKED.add(content)
+        scenario._template = template
+        scenario._declared = {name: getattr(scenario, name) for name in cls.model_fields}
+        return scenario
+
+    def to_toml(self) -> dict[str, Any]:
+        """As `Spec.to_toml`; what is to be drawn is written as it was given."""
+        table = super().to_toml()
+        if self._template is None:
+            return table
+        keys = {name: key for key, (name, _) in self.toml_keys().items()}
+        kept = {keys[name] for name in self._declared if name not in self._replaced()} | {"draw"}
+        return {
+            **{k: v for k, v in table.items() if k not in kept},
+            **{k: v for k, v in self._template.table.items() if k in kept},
+        }
+
+    @property
+    def distributions(self) -> Mapping[str, Distribution]:
+        """What is to be drawn, by key path; empty where every run is the same scenario."""
+        return {} if self._template is None else self._template.distributions
+
+    @property
+    def draws(self) -> Mapping[str, Any]:
+        """What was drawn for this run, by key path, in the units of the keys; empty before `drawn`."""
+        return self._draws
+
+    def root(self, seed: int) -> int:
+        """The number that the random streams of a run start from: its seed, or one beyond all seeds for training."""
+        return seed + TRAINING_ROOT if self.training else seed
+
+    def drawn(self, seed: int) -> Self:
+        """The scenario of one run, with nothing left to draw.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the run.
+
+        Returns
+        -------
+        Scenario
+            Itself where there is nothing to draw. A field that was replaced in Python (``model_copy``) stays as it is.
+        """
+        if self._template is None:
+            return self
+        table, draws = self._template.drawn(self.root(seed))
+        scenario = super().from_toml(table, source=self._template.source)
+        replaced = self._replaced()
+        if replaced:
+            scenario = scenario.model_copy(update=replaced)
+        scenario._draws = draws
+        return scenario
+
+    def extremes(self) -> list[Self]:
+        """The scenario in the middle of its ranges, and what it becomes at their ends."""
+        if self._template is None:
+            return [self]
+        replaced = self._replaced()
+        source = self._template.source
+        found = [super(Scenario, self).from_toml(table, source=source) for table, _ in self._template.extremes()]
+        return [self, *(s.model_copy(update=replaced) for s in found)]
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """The scenario with other values at some keys of its TOML, whether they were drawn or not.
+
+        Parameters
+        ----------
+        values : mapping
+            Key path, like ``fault[0].sigma_m`` or ``draw.length``, to a value in the unit of the key.
+
+        Raises
+        ------
+        SpecError
+            If a path leads nowhere, or the scenario is not valid with these values.
+        """
+        source = f"scenario {self.id}"
+        return type(self).from_toml(with_values(self.to_toml(), values, source), source=source)
+
+    def _replaced(self) -> dict[str, Any]:
+        """Fields that are not as the template has them."""
+        return {name: getattr(self, name) for name, value in self._declared.items() if getattr(self, name) != value}
 
     @property
     def id(self) -> str:
@@ -151,12 +293,28 @@ class Scenario(Spec):
             step=self.step,
         )
 
+    def actual(self) -> Self:
+        """The scenario with instruments as they really are, where their datasheets are wrong (``times_datasheet``)."""
+        actual = {name: spec.actual() for name, spec in self.instruments.items()}
+        if all(actual[name] is spec for name, spec in self.instruments.items()):
+            return self
+        return self.model_copy(update={"instruments": actual})
+
+    def actual_sheet(self) -> Instruments | None:
+        """The datasheets that would be true; None where those of `instruments_sheet` are."""
+        actual = self.actual()
+        return None if actual is self else actual.instruments_sheet()
+
     def content_hash(self) -> str:
         """Hexadecimal digest of everything that decides the numbers of a run, defaults included.
 
-        Title, description, source and tags are words and do not count; neither do the files of a log.
+        Title, description, source, tags, track, group and dials are words and do not count; neither do the files of a
+        log. What is to be drawn counts as it is written.
         """
-        content = self.model_dump(mode="python", exclude={"title", "description", "source", "tags", "plugins"})
+        words = {"title", "description", "source", "tags", "track", "group", "plugins", "dials"}
+        content = self.model_dump(mode="python", exclude=words)
+        if self._template is not None:
+            content["distributions"] = _canonical(self._template.table, words)
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.
         digest = hashlib.blake2b(json.dumps(content, default=str).encode(), digest_size=16)
         for module in sorted({type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)}):
@@ -184,6 +342,21 @@ class Scenario(Spec):
         return self
 
 
+def _listed(draws: Draws) -> str:
+    """A few draws, for a message."""
+    shown = [
+        f"{key} = {value:.6g}" if isinstance(value, float) else f"{key} = {value!r}" for key, value in draws.items()
+    ]
+    return ", ".join(shown[:8]) + (", ..." if len(shown) > 8 else "")
+
+
+def _canonical(table: Mapping[str, Any], words: set[str]) -> dict[str, Any]:
+    """What is to be drawn: the tables of a scenario file in which there is a distribution, a reference or a name."""
+    return {
+        key: value for key, value in table.items() if key not in words and (key == "draw" or has_draws({key: value}))
+    }
+
+
 def _restore(plugins: tuple[str, ...], reduced: bytes) -> Any:
     """A pickled scenario with plug-in files."""
     for path in plugins:
@@ -197,6 +370,10 @@ def _restore(plugins: tuple[str, ...], reduced: bytes) -> Any:
 def _check_head(s: Scenario) -> None:
     if not NAME.fullmatch(s.name) or re.search(r"-v\d+$", s.name):
         raise ValueError(f"name = {s.name!r} should be in kebab-case and without a version, like 'coastal-voyage'")
+    if not NAME.fullmatch(s.track):
+        raise ValueError(f"track = {s.track!r} should be in kebab-case, like 'aided-ins'")
+    if not s.group.strip():
+        raise ValueError(f"group = {s.group!r} should be a word or two, like 'degraded GNSS'")
     if s.step > s.duration or abs(s.epochs * s.step - s.duration) > 1e-6:
         raise ValueError(
             f"duration_s = {s.duration:g} should be a multiple of step_s = {s.step:g}, "

@@ -16,9 +16,9 @@ from simnav.recording import Block, ImuLabels, Recording
 from simnav.scenario import Scenario
 from simnav.sensors.faults import build_layers, labels
 from simnav.spec import SpecError
-from simnav.start import draw_start
 from simnav.types import Array, InitialState, NavigationStates
 from simnav.world import Vessel, World, WorldBlock
+from simnav.world.initial_state import draw_start
 
 __all__ = ["TIME_TOLERANCE", "Simulator", "ideal", "sample_times", "simulate", "simulate_many"]
 
@@ -70,7 +70,7 @@ def _world(scenario: Scenario, seed: int) -> World:
         scenario.sea,
         scenario.current,
         rate=rate,
-        seed=seed if scenario.world_seed is None else scenario.world_seed,
+        seed=scenario.root(seed) if scenario.world_seed is None else scenario.world_seed,
     )
 
 
@@ -96,6 +96,10 @@ class Simulator:
         What an estimator is told of the state at time 0.
     faults : tuple of FaultLabel
         The faults of the run.
+    scenario : Scenario
+        That of this run, with nothing left to draw.
+    draws : mapping
+        What was drawn for it (`simnav.scenario.Scenario.draws`).
     duration, step, time : float
         Length of the run, length of one step, and time that was reached [s].
     note : str
@@ -110,20 +114,24 @@ class Simulator:
     def __init__(self, scenario: Scenario, seed: int, *, truth: tuple[NavigationStates, WorldBlock] | None = None):
         if scenario.recorded:
             raise SpecError(f"{scenario.id} is a recorded run; open it with simnav.source.open_source")
+        scenario = scenario.drawn(seed)
         self.scenario, self.seed, self.note = scenario, seed, ""
+        self.draws = scenario.draws
         self.duration, self.step, self.time = scenario.duration, scenario.step, 0.0
         self.instruments = scenario.instruments_sheet()
         self._truth = None if truth is None else truth[1]
         self._world = _world(scenario, seed) if truth is None else None
         self.initial_truth = self._world.state() if truth is None else truth[0]  # type: ignore[union-attr]
-        self.start = draw_start(self.initial_truth, scenario.initial_error.covariance(), seed)
-        self._imu = None if scenario.imu is None else scenario.imu.build(seed)
+        root = scenario.root(seed)
+        self.start = draw_start(self.initial_truth, scenario.initial_error.covariance(), root)
+        actual = scenario.actual()
+        self._imu = None if actual.imu is None else actual.imu.build(root)
         self._aids = {
-            name: spec.build(name, seed, water_depth=scenario.water_depth) for name, spec in scenario.aids.items()
+            name: spec.build(name, root, water_depth=scenario.water_depth) for name, spec in actual.aids.items()
         }
         kinds = {name: spec.kind for name, spec in scenario.aids.items()}
         self.faults = labels(scenario.faults, scenario.duration, kinds)
-        self._layers = build_layers(scenario.faults, seed)
+        self._layers = build_layers(scenario.faults, root)
         self._label_imu = any("imu" in f.instruments for f in scenario.faults)
 
     def steer_by(self, north: float, east: float) -> None:
@@ -186,6 +194,8 @@ def _recording(simulator: Simulator) -> Recording:
         simulator.start,
         simulator.faults,
         simulator.advance(simulator.duration),
+        draws=simulator.draws,
+        actual=simulator.scenario.actual_sheet(),
     )
 
 
@@ -207,7 +217,7 @@ def simulate(scenario: Scenario, seed: int) -> Recording:
 
 
 def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recording]:
-    """Simulate runs one after the other; with ``world_seed`` they share one truth, which is made once.
+    """Simulate runs one after the other; with ``world_seed``, and nothing to draw, they share one truth, made once.
 
     Yields
     ------
@@ -216,7 +226,7 @@ def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recordin
     """
     truth = None
     for seed in seeds:
-        if truth is None and scenario.world_seed is not None:
+        if truth is None and scenario.world_seed is not None and not scenario.distributions:
             first = Simulator(scenario, seed)
             assert first._world is not None
             truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))
@@ -240,6 +250,7 @@ def ideal(scenario: Scenario, seed: int) -> Recording:
         and ``faults``; every value is without error, ``fault_error`` is zero, and the start is the truth, with the
         covariance of the scenario.
     """
+    scenario = scenario.drawn(seed)
     first = Simulator(scenario, seed)
     assert first._world is not None
     truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))

@@ -30,6 +30,8 @@ class Source(Protocol):
         Length of the run, and of one step [s].
     note : str
         What is to be known of the run; empty for a simulated one.
+    scenario : Scenario
+        That of this run, with nothing left to draw.
     """
 
     instruments: Instruments
@@ -39,6 +41,7 @@ class Source(Protocol):
     duration: float
     step: float
     note: str
+    scenario: Scenario
 
     def advance(self, until: float) -> Block:
         """The next stretch of the run, up to a time [s]."""
@@ -94,4 +97,6 @@ def record(scenario: Scenario, seed: int) -> Recording:
         source.faults,
         source.advance(source.duration),
         source.note,
+        source.scenario.draws,
+        source.scenario.actual_sheet(),
     )

@@ -246,7 +246,8 @@ def _convert(raw: Any, factor: float, infinite: bool, source: str, where: str) -
     if isinstance(raw, (list, tuple)):
         return tuple(_convert(r, factor, infinite, source, where) for r in raw)
     if isinstance(raw, bool) or not isinstance(raw, (int, float)):
-        raise SpecError(f"{source}: {where} = {raw!r} should be a number")
+        other = ", or a distribution like { uniform = [1, 2] }" if isinstance(raw, Mapping) else ""
+        raise SpecError(f"{source}: {where} = {raw!r} should be a number{other}")
     if math.isnan(raw) or (math.isinf(raw) and not infinite):
         raise SpecError(f"{source}: {where} = {raw!r} should be a finite number")
     if _BEYOND <= abs(raw) < math.inf:

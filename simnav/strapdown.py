@@ -30,8 +30,8 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
-from simnav.rotation import cross, dcm_from_rpy, rotation_coefficients, rpy_from_dcm
+from simnav.geometry.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
+from simnav.geometry.rotation import cross, dcm_from_rpy, rotation_coefficients, rpy_from_dcm
 from simnav.types import Array, ImuSamples, NavigationStates
 
 #: Divisions by constants are products here: the compiler may not turn one into the other by itself.

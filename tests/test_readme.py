@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from simnav.contract_check import check
 from simnav.estimator import make
 from simnav.scenario import load
+from simnav.testing.contract_check import check
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -73,6 +73,6 @@ def test_calls_from_python(tmp_path, monkeypatch, capsys):
 
 
 def test_links_lead_somewhere():
-    for document in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+    for document in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
         for target in re.findall(r"\]\((?!http)([^)#]+)", document.read_text()):
             assert (document.parent / target).exists(), f"{document.name}: {target}"

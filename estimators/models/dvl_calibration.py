@@ -36,11 +36,11 @@ from typing import Literal
 
 import numpy as np
 
-from simnav.earth import ROTATION_RATE, gravity
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import DVL, observe
+from simnav.geometry.earth import ROTATION_RATE, gravity
 from simnav.kinds import BODY_VELOCITY, POSITION, VELOCITY
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
 

@@ -37,8 +37,8 @@ from simnav.estimators.models.inertial_update import absorb_inertial, assimilate
 from simnav.estimators.models.measurements import CODES, HEADING, OWN, observe, uncalibrated_noise, white_noise
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
+from simnav.geometry.rotation import dcm_from_rpy
 from simnav.kinds import BODY_VELOCITY, WATER_SPEED
-from simnav.rotation import dcm_from_rpy
 from simnav.types import (
     KINDS,
     Array,

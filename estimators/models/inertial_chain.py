@@ -26,7 +26,7 @@ from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import OWN, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
-from simnav.rotation import cross, rotation_coefficients
+from simnav.geometry.rotation import cross, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["InertialChain"]
@@ -361,7 +361,7 @@ class InertialChain(Chain):
         return along
 
     def turned(self, covariance: Array, shift: Array) -> Array:
-        """``J P J'`` with the left Jacobian of the rotation (`simnav.rotation.left_jacobian`)."""
+        """``J P J'`` with the left Jacobian of the rotation (`simnav.geometry.rotation.left_jacobian`)."""
         turned = np.empty_like(covariance)
         _turn_covariance(covariance, shift, turned)
         return turned

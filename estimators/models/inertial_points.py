@@ -23,11 +23,11 @@ from math import atan2, ceil, cos, sin, sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.earth import radii_scalar
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import HEADING, observe_inertial
 from simnav.estimators.models.points import PointModel
-from simnav.rotation import cross, rotation_coefficients
+from simnav.geometry.earth import radii_scalar
+from simnav.geometry.rotation import cross, rotation_coefficients
 from simnav.strapdown import mechanize_step, sample_from_motion
 from simnav.types import Array, Measurement
 

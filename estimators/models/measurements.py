@@ -26,8 +26,8 @@ import numpy as np
 
 from simnav import kinds
 from simnav.compiled import kernel
-from simnav.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, radii_scalar
-from simnav.rotation import cross
+from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, radii_scalar
+from simnav.geometry.rotation import cross
 from simnav.types import Array, Datasheet
 
 __all__ = ["CODES", "OWN", "observe", "observe_inertial", "radii", "uncalibrated_noise", "white_noise", "wrap"]

@@ -1,17 +1,17 @@
 """Readings of instruments whose kind has a measurement equation of its own, in plain NumPy.
 
 A kind may name one of the compiled equations (`simnav.kinds.EQUATIONS`), or be declared with a function that predicts a
-reading and gives its Jacobian (`simnav.kinds.Observation`; see ``docs/instruments.md``). The latter are used here, for
-every model over the inertial state, filter and graph alike.
+reading and gives its Jacobian (`simnav.kinds.Observation`; see ``docs/how-to/add-an-instrument.md``). Such functions
+are used here, for every model over the inertial state, in filters and graphs.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from simnav.earth import earth_rate, principal_radii
+from simnav.geometry.earth import earth_rate, principal_radii
+from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import NavigationPoint
-from simnav.rotation import dcm_from_rotation_vector
 from simnav.types import KINDS, Array, Datasheet
 
 __all__ = ["OwnObservation"]

@@ -13,8 +13,8 @@ from math import cos, exp, sin
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
-from simnav.rotation import cross, rotation_coefficients
+from simnav.geometry.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
+from simnav.geometry.rotation import cross, rotation_coefficients
 from simnav.strapdown import mechanize_step
 from simnav.types import Array
 

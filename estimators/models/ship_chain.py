@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.earth import radii_scalar
 from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_kernels import (
@@ -31,6 +30,7 @@ from simnav.estimators.models.ship_kernels import (
     shift_ship,
     steps_of,
 )
+from simnav.geometry.earth import radii_scalar
 from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["ShipChain"]

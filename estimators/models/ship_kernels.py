@@ -17,7 +17,7 @@ from math import atan2, ceil, cos, exp, sin
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.earth import radii_scalar
+from simnav.geometry.earth import radii_scalar
 
 __all__ = [
     "BODY_VELOCITY",

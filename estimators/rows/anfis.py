@@ -13,8 +13,9 @@ __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 class AnfisFgo(ShipFgo, adaptation=Anfis):
     """ANFIS-FGO, a reconstruction: ``ship-fgo``, the noise of each fix chosen by a neuro-fuzzy network.
 
-    The section on the network is missing from the text at hand; see docs/anfis.md. Source: *GNSS/DR integrated
-    navigation for ships*, the paper that proposes ANFIS-FGO.
+    The section on the network is missing from the text at hand; see ``docs/explanation/anfis.md``. Source: Jiang et
+    al., *An improved factor graph optimization algorithm enhanced with ANFIS for ship GNSS/DR integrated navigation*,
+    J. Mar. Sci. Eng. 14(5), 472, 2026, doi:10.3390/jmse14050472.
     """
 
 

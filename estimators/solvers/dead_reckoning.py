@@ -23,13 +23,13 @@ from math import hypot
 
 import numpy as np
 
-from simnav.earth import gravity
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import triad_bias
 from simnav.estimators.models.measurements import radii, wrap
+from simnav.geometry.earth import gravity
+from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED
-from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.strapdown import mechanize
 from simnav.types import KINDS, Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurements
 

@@ -15,9 +15,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from simnav.earth import displace, relative_position
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.estimators.solvers.admission import Admission
+from simnav.geometry.earth import displace, relative_position
 from simnav.types import (
     COMPONENTS,
     KINDS,

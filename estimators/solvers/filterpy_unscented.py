@@ -20,13 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from simnav.earth import displace
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.estimators.models.ship import OBSERVED, E, N
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.solvers.filterpy_adapter import FilterpyEstimator
 from simnav.estimators.solvers.sigma_point import draw_points
+from simnav.geometry.earth import displace
 from simnav.kinds import HEADING
 from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 

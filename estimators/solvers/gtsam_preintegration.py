@@ -29,7 +29,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.models.propagation import HELD_ATTITUDE, HELD_VELOCITY, TURN_TIME, next_stretch
 from simnav.estimators.solvers.tangent_frame import TangentFrame
-from simnav.rotation import cross
+from simnav.geometry.rotation import cross
 from simnav.types import Array, ImuSamples
 
 __all__ = ["Preintegration", "imu_pieces"]

@@ -46,7 +46,7 @@ from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.rotation import left_jacobian, skew
+from simnav.geometry.rotation import left_jacobian, skew
 from simnav.types import Array
 
 __all__ = ["InvariantKalmanEstimator"]

@@ -24,7 +24,7 @@ import numpy as np
 
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Observation
-from simnav.rotation import left_jacobian
+from simnav.geometry.rotation import left_jacobian
 from simnav.types import Array, Measurement
 
 __all__ = ["Iteration", "absorb_iterated", "poor_heading"]

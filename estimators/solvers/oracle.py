@@ -57,7 +57,7 @@ class OracleEstimator(KalmanEstimator):
         self._recording: Recording | None = None
 
     def reveal(self, recording: Recording) -> None:
-        """Take the labels."""
+        """Take the labels, and the true datasheets where those that are given are wrong."""
         self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
         self._motion = true_motion(recording) if recording.instruments.imu is None else None
@@ -69,6 +69,8 @@ class OracleEstimator(KalmanEstimator):
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
+        if self._recording.actual is not None:
+            instruments = self._recording.actual
         if self._motion is not None:
             start, instruments = levelled(start, self._recording), with_imu(instruments)
         super().reset(start, instruments)

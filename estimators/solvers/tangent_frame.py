@@ -24,7 +24,7 @@ from math import atan2, cos, sin, sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.earth import (
+from simnav.geometry.earth import (
     ECCENTRICITY_SQUARED,
     FLATTENING,
     ROTATION_RATE,

@@ -27,7 +27,7 @@ from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.weightings.base import Factors, Weighting
-from simnav.rotation import left_jacobian
+from simnav.geometry.rotation import left_jacobian
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["WeightedKalmanEstimator"]

@@ -20,6 +20,7 @@ from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.request import enlist
 from simnav.leaderboard.campaign.session_class import receive
 from simnav.leaderboard.results import store, trials
+from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 
 if TYPE_CHECKING:
@@ -134,6 +135,9 @@ class Unit:
             time_limit=self.timeout,
             memory_limit=self.memory,
             scoring="{}",  # nothing is scored yet
+            scenario_digest=self.scenario.content_hash(),
+            estimator_digest=entrant.source,
+            provenance=here(),
         )
 
 
@@ -194,6 +198,7 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
     blank = replace(
         unit.result(entrant, key, outcome.status, outcome.reason),
         note=recording.note,
+        draws=recording.draws,
         seconds=outcome.seconds,
         peak_memory=outcome.peak_memory,
     )

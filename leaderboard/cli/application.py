@@ -18,6 +18,7 @@ from simnav.leaderboard.cli import (
     bound,
     campaign,
     check,
+    cite,
     evaluate,
     leaderboard,
     list_,
@@ -86,6 +87,7 @@ for _module in (
     bound,
     reproduce,
     rescore,
+    cite,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)

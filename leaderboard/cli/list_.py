@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +16,7 @@ from simnav.leaderboard.ranking import tables
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from simnav.catalogue import Header
     from simnav.spec import Spec
 
 __all__ = ["command", "estimators", "faults", "instruments", "scenarios"]
@@ -59,6 +60,8 @@ class ScenarioItem:
     title: str
     duration: float
     tags: tuple[str, ...]
+    track: str
+    group: str
     gymnasium: str
     file: str
 
@@ -94,11 +97,12 @@ class KindItem:
 
 
 def scenarios() -> list[ScenarioItem]:
-    """Every scenario of every pack."""
+    """Every scenario of every pack, by track and group."""
     from simnav.catalogue import headers
 
     return [
-        ScenarioItem(h.name, h.id, h.title, h.duration, h.tags, f"simnav:{h.gym_id}", str(h.path)) for h in headers()
+        ScenarioItem(h.name, h.id, h.title, h.duration, h.tags, h.track, h.group, f"simnav:{h.gym_id}", str(h.path))
+        for h in sorted(headers(), key=_place)
     ]
 
 
@@ -142,10 +146,32 @@ def _kind(spec: type[Spec], fallback: str) -> KindItem:
     return KindItem(_name(spec), (spec.__doc__ or fallback).strip().splitlines()[0], keys)
 
 
+#: Tracks and groups as they are listed; those of others follow, by name.
+_TRACKS = ("aided-ins", "no-imu", "underwater", "generalisation", "recorded", "papers")
+_GROUPS = ("clean", "degraded GNSS", "outages", "gross errors", "wrong datasheet", "wrong start", "extremes")
+
+
+def _place(header: Header) -> tuple[int, str, int, str, str, int]:
+    """Where a scenario stands in the list."""
+
+    def rank(word: str, words: Sequence[str]) -> int:
+        return words.index(word) if word in words else len(words)
+
+    track, group = header.track, header.group
+    return rank(track, _TRACKS), track, rank(group, _GROUPS), group, header.name, header.version
+
+
 def _scenario_table(found: list[ScenarioItem]) -> Table:
-    rows = [[e.name, f"v{e.id.rpartition('-v')[2]}", tables.duration(e.duration), e.title, ", ".join(e.tags)]
-            for e in found]  # fmt: skip
-    return tables.table("Scenarios", ["name", "version", "duration", "title", "tags"], rows, numeric=["duration"])
+    """A row a scenario; a track and a group are named where they begin."""
+    rows, before = [], ("", "")
+    for e in found:
+        track = e.track if e.track != before[0] else ""
+        group = e.group if track or e.group != before[1] else ""
+        version = f"v{e.id.rpartition('-v')[2]}"
+        rows.append([track, group, e.name, version, tables.duration(e.duration), e.title, ", ".join(e.tags)])
+        before = e.track, e.group
+    columns = ["track", "group", "name", "version", "duration", "title", "tags"]
+    return tables.table("Scenarios", columns, rows, numeric=["duration"])
 
 
 def _estimator_table(found: list[EstimatorItem]) -> Table:

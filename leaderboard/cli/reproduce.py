@@ -1,4 +1,4 @@
-"""``simnav reproduce``: a paper's comparison, run again."""
+"""``simnav reproduce``: the comparison of a paper, repeated."""
 
 from __future__ import annotations
 
@@ -18,13 +18,25 @@ __all__ = ["command"]
 
 
 def command(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help=f"{', '.join(PAPERS)}: see docs/papers.md.")],
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help=f"{', '.join(PAPERS)}.")],
     runs: Annotated[
-        int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [few: ends within minutes]")
+        int | None, typer.Option("--runs", "-n", min=1, help="Runs of each scenario. [a few: takes minutes]")
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option("--method", "-m", help="Only what is about these methods. [all]")
+        list[str] | None, typer.Option("--method", "-m", help="Only the rows about these methods. [all]")
     ] = None,
+    until_decided: Annotated[
+        bool, typer.Option("--until-decided", help="More runs for undecided rows, until all are decided.")
+    ] = False,
+    limit: Annotated[
+        int, typer.Option(min=1, help="With --until-decided: largest number of runs of a scenario.")
+    ] = 200,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.0, help="With --until-decided: start no run after this time. [no limit]")
+    ] = None,
+    stored: Annotated[
+        bool, typer.Option("--stored", help="Show the results that come with simnav; nothing is run.")
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of results, tables, figures, page. [reproduced/PAPER]")
     ] = None,
@@ -32,13 +44,15 @@ def command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Run a paper's comparison again: ours beside theirs, row by row; started again, it goes on where it was."""
+    """Repeat the comparison of a paper: our figures beside the paper's, with a verdict on each row.
+
+    Results are kept: started again, the command continues.
+    """
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.papers import figures, page, report
         from simnav.leaderboard.papers.comparison import RULES
 
-        folder = absolute(output or Path("reproduced") / paper)
         with out.progress("starting") as bar:
 
             def show(scenario: str, p: Progress) -> None:
@@ -46,19 +60,26 @@ def command(
                 bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
 
             found = interface.reproduce(
-                paper, runs=runs, methods=method or (), output=folder, workers=workers, progress=show
-            )
+                paper, runs=runs, methods=method or (), until_decided=until_decided, limit=limit, minutes=minutes,
+                stored=stored, output=output, workers=workers, progress=show,
+            )  # fmt: skip
+        about = found.paper
+        folder = absolute(output or Path("reproduced") / about.key)
         folder.mkdir(parents=True, exist_ok=True)
-        table = report.write_csv(found, folder / f"paper-{paper}.csv")
+        table = report.write_csv(found, folder / f"paper-{about.key}.csv")
         with out.progress("drawing") as bar:
-            drawn = figures.write_figures(found, folder, lambda done, total, note: bar(done, total, note=note))
+            drawn = figures.write_figures(
+                found, folder, lambda done, total, note: bar(done, total, note=note), scores_only=stored
+            )
         written = page.write(found, drawn, folder)
         paths = [d.path for d in drawn if d.path is not None]
         out.document({**found.to_dict(), "contents": report.whereabouts(found, drawn), "csv": str(table),
                       "page": str(written), "figures": [str(p) for p in paths]})  # fmt: skip
-        out.print(f"Paper {paper}: {found.paper.title}", f"{found.paper.citation}\n")
+        out.print(f"{about.short}: {about.about}", f"{about.citation}\n")
         out.print(*report.paper_tables(found), report.contents_table(found, drawn))
-        for note in found.paper.notes:
+        for note in about.notes:
             out.print(f"note: {note}")
-        out.print(f"rule: {RULES}", f"{report.summary(found)}; the paper's number: --runs {found.paper.full}")
+        out.print(f"rule: {RULES}", report.summary(found))
+        if found.count("undecided") and not stored:
+            out.print(f"more runs for undecided rows: simnav reproduce {about.key} --until-decided")
         out.print(f"table:   {table}", f"figures: {len(paths)} as PNG in {folder}", f"page:    {written}")

@@ -48,7 +48,7 @@ def _root() -> None:
 
 
 def _command(
-    features: Annotated[_Features, typer.Option(help="Inputs of the network; see docs/anfis.md.")] = (
+    features: Annotated[_Features, typer.Option(help="Inputs of the network; see docs/explanation/anfis.md.")] = (
         _Features.INNOVATION
     ),
     seeds: Annotated[

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.earth import relative_position
+from simnav.geometry.earth import relative_position
 from simnav.leaderboard.figures.plots import Curve, Style, Track, run_chart
 from simnav.scoring import errors
 from simnav.sensors.faults import effect_of

@@ -1,4 +1,4 @@
-"""What a paper holds, table by table and figure by figure: where ours is, or why a simulation cannot show it."""
+"""The tables and figures of a paper: where ours are, or why a simulation cannot show them."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ class Item:
     Attributes
     ----------
     number : str
-        ``Table 3``, ``Figure 9``.
+        Number in the paper, such as ``Table 3``.
     what : str
+        Its subject.
     shown : tuple of str
-        Titles of our tables and names of our figures' files; empty where there are none.
+        Titles of our tables and names of our figures' files; empty if there are none.
     why : str
-        Why not, where there are none.
+        Reason why there are none.
     """
 
     number: str
@@ -35,12 +36,12 @@ class Item:
 
 
 def contents(paper: Paper) -> list[Item]:
-    """All tables and figures of a paper, in its order; what we draw beyond them is not in it.
+    """All tables and figures of a paper, in its order; our additional figures are not among them.
 
     Examples
     --------
     >>> from simnav.leaderboard.papers.paper import load
-    >>> [i.number for i in contents(load("001"))][:3]
+    >>> [i.number for i in contents(load("mao-2025"))][:3]
     ['Table 1', 'Table 2', 'Table 3']
     """
     items: dict[str, Item] = {}

@@ -1,6 +1,6 @@
-"""The papers' figures from our runs: each one of a paper (`simnav.leaderboard.papers.paper.Figure`) becomes a PNG.
+"""The papers' figures, drawn from our runs as PNG (`simnav.leaderboard.papers.paper.Figure`).
 
-Figures of one run show the first seed, which is run again for them: results do not hold what they need.
+Figures of one run show the first seed. It is run again for them, because results do not hold whole trajectories.
 """
 
 from __future__ import annotations
@@ -59,18 +59,20 @@ _SPREAD_FACTORS = {"heading": _DEGREES}
 
 @dataclass(frozen=True)
 class Drawn:
-    """What became of a figure.
+    """The outcome of drawing a figure.
 
     Attributes
     ----------
     figure : Figure
+        The paper's figure.
     path : Path or None
-        None where there was nothing to draw.
+        The file; None if nothing could be drawn.
     caption : str
+        Caption.
     width, height : int
-        In CSS pixels.
+        Size in CSS pixels.
     missing : tuple of str
-        Methods that are not in it: not registered, or failed from the start.
+        Methods that are not in the figure, because they are not registered or have no successful run.
     """
 
     figure: Figure
@@ -92,24 +94,31 @@ class Drawn:
 
 
 def write_figures(
-    found: Reproduction, folder: Path, progress: Callable[[int, int, str], None] | None = None
+    found: Reproduction,
+    folder: Path,
+    progress: Callable[[int, int, str], None] | None = None,
+    *,
+    scores_only: bool = False,
 ) -> list[Drawn]:
-    """Draw what there is to draw.
+    """Draw all figures that can be drawn.
 
     Parameters
     ----------
     found : Reproduction
+        The comparison.
     folder : Path
-        That exists.
+        An existing folder.
     progress : callable, optional
-        Called with (done, total, what comes next).
+        Called with the number of finished figures, the number of all figures, and the next figure.
+    scores_only : bool
+        Draw only those figures that need scores alone, so that nothing is run.
 
     Returns
     -------
     list of Drawn
-        One for each of the paper's figures, in their order.
+        One for each figure that was to be drawn, in their order.
     """
-    figures = found.paper.figures
+    figures = [f for f in found.paper.figures if f.draw in ("bars", "gains") or not scores_only]
     sketch = _Sketch(found)
     drawn = []
     for k, entry in enumerate(figures):
@@ -122,7 +131,7 @@ def write_figures(
 
 
 def draw(found: Reproduction, entry: Figure) -> matplotlib.figure.Figure | None:
-    """One of the paper's figures; None where there is nothing to draw."""
+    """Draw one of the paper's figures; None if nothing can be drawn."""
     return _Sketch(found).draw(entry)[0]
 
 
@@ -166,12 +175,12 @@ class _Sketch:
             return Drawn(entry, None, missing=missing)
         save(fig, path, formats=("png",))
         width, height = fig.get_size_inches() * _PIXELS
-        note = f" Not there: {', '.join(missing)}." if missing else ""
+        note = f" Missing: {', '.join(missing)}." if missing else ""
         return Drawn(entry, path, caption + note, round(width), round(height), missing)
 
     def _heading(self, entry: Figure, runs: str) -> str:
         number = f", {_number(entry)}" if entry.number else ""
-        return f"Paper {self.paper.key}{number}: {_title(entry)} ({runs})"
+        return f"{self.paper.short}{number}: {_title(entry)} ({runs})"
 
     # -- one run ---------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""What is compared: the named scores in the units of the papers, and what a run cost."""
+"""The quantities that are compared: named scores in the units of the papers, and computing cost."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from simnav.scoring import SCORES
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["Measure", "measure", "value_of"]
+__all__ = ["Measure", "measure", "scores_of", "value_of"]
 
 _UNITS = {"rad": ("deg", 180.0 / math.pi), "s": ("s", 1.0)}
 
@@ -31,12 +31,12 @@ _OWN = {
 
 
 def measure(name: str) -> Measure:
-    """What a measure is.
+    """The measure of a name.
 
     Raises
     ------
     KeyError
-        If there is none of that name.
+        If there is no such measure.
     """
     if name in _OWN:
         return _OWN[name]
@@ -45,8 +45,17 @@ def measure(name: str) -> Measure:
     return Measure(info.title, unit, factor)
 
 
+def scores_of(name: str) -> tuple[str, ...]:
+    """The scores of a result that a measure is made of (`simnav.scoring.SCORES`).
+
+    >>> scores_of("position_rmse"), scores_of("peak_memory")
+    (('horizontal_rmse', 'vertical_rmse'), ())
+    """
+    return {"position_rmse": ("horizontal_rmse", "vertical_rmse"), "peak_memory": ()}.get(name, (name,))
+
+
 def value_of(result: Result, name: str) -> float:
-    """A measure of a result, in its unit; NaN where it does not apply."""
+    """A measure of a result, in its unit; NaN if it does not apply."""
     s = result.scores
     if name == "position_rmse":
         value = math.hypot(s.get("horizontal_rmse", math.nan), s.get("vertical_rmse", math.nan))

@@ -1,4 +1,4 @@
-"""A reproduction as a page: beside its figures, and in the site of the leaderboard."""
+"""A repeated comparison as an HTML page: beside its figures, and in the site of the leaderboard."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PaperPage", "find", "write"]
 
-_FORMAT = 1  # of the document
+_FORMAT = 2  # of the document
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,11 @@ class _Document:
 
     format: int
     paper: str
+    short: str
     title: str
+    about: str
     citation: str
+    doi: str
     version: str
     generated: str
     runs: int
@@ -66,14 +69,14 @@ def _json() -> TypeAdapter[_Document]:
 
 @dataclass(frozen=True)
 class PaperPage:
-    """A reproduction that was written to a folder, as a page of a site.
+    """A repeated comparison as a page of a site.
 
     Attributes
     ----------
     document : object
-        What is shown.
+        The contents of the page.
     folder : Path
-        Where its figures are.
+        Folder of its figures.
     """
 
     document: _Document
@@ -81,13 +84,13 @@ class PaperPage:
 
     @property
     def paper(self) -> str:
-        """Key of the paper."""
-        return self.document.paper
+        """Authors and year, for the menu."""
+        return self.document.short
 
     @property
     def page(self) -> str:
         """Name of the file."""
-        return f"paper-{self.paper}.html"
+        return f"paper-{self.document.paper}.html"
 
     @property
     def title(self) -> str:
@@ -96,12 +99,12 @@ class PaperPage:
 
     @property
     def summary(self) -> str:
-        """How many rows agree."""
+        """How many rows agree, for each kind of rows."""
         return self.document.summary
 
     def install(self, folder: Path, site: SiteFacts) -> None:
         """Write the page into the folder of a site, and copy its figures."""
-        place = f"figures/paper-{self.paper}/"
+        place = f"figures/paper-{self.document.paper}/"
         (folder / place).mkdir(parents=True, exist_ok=True)
         for figure in self.document.figures:
             shutil.copyfile(self.folder / figure.file, folder / place / figure.file)
@@ -114,7 +117,7 @@ def write(found: Reproduction, drawn: Sequence[Drawn], folder: Path) -> Path:
     Returns
     -------
     Path
-        Of the page.
+        Path of the page.
     """
     document = _document(found, drawn)
     write_whole(folder / f"paper-{document.paper}.json", _json().dump_json(document, indent=1) + b"\n")
@@ -126,21 +129,38 @@ def write(found: Reproduction, drawn: Sequence[Drawn], folder: Path) -> Path:
 
 
 def find(folder: Path) -> list[PaperPage]:
-    """The reproductions below a folder, in order of their keys.
+    """The pages of the repeated comparisons, in the order of the papers.
 
-    One that cannot be read, is of another version, or whose figures are gone, is left out.
+    A comparison below the folder comes first. If there is none, or it is damaged or of another version, the page is
+    made from the results that come with simnav, without figures. If there are none either, the paper has no page.
     """
     pages = []
     for key in PAPERS:
-        place = folder / key
-        try:
-            document = _json().validate_json((place / f"paper-{key}.json").read_bytes())
-        except (OSError, ValueError):
-            continue
-        known = (document.format, document.paper) == (_FORMAT, key)
-        if known and all(Path(f.file).name == f.file and (place / f.file).is_file() for f in document.figures):
-            pages.append(PaperPage(document, place))
+        page = _written(folder / key, key) or _stored(folder, key)
+        if page is not None:
+            pages.append(page)
     return pages
+
+
+def _written(place: Path, key: str) -> PaperPage | None:
+    """The page that a folder holds; None if it cannot be used."""
+    try:
+        document = _json().validate_json((place / f"paper-{key}.json").read_bytes())
+    except (OSError, ValueError):
+        return None
+    known = (document.format, document.paper) == (_FORMAT, key)
+    complete = all(Path(f.file).name == f.file and (place / f.file).is_file() for f in document.figures)
+    return PaperPage(document, place) if known and complete else None
+
+
+def _stored(folder: Path, key: str) -> PaperPage | None:
+    """The page from the stored results; None if there are none."""
+    from simnav.leaderboard.papers import paper, stored
+
+    try:
+        return PaperPage(_document(stored.load(paper.load(key)), []), folder)
+    except ValueError:
+        return None
 
 
 def _render(document: _Document, place: str, site: SiteFacts) -> str:
@@ -156,15 +176,18 @@ def _document(found: Reproduction, drawn: Sequence[Drawn]) -> _Document:
     return _Document(
         format=_FORMAT,
         paper=paper.key,
+        short=paper.short,
         title=paper.title,
+        about=paper.about,
         citation=paper.citation,
+        doi=paper.doi,
         version=version("simnav"),
         generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         runs=len(found.seeds),
         summary=summary(found),
         rules=RULES,
-        command=f"simnav reproduce {paper.key} --runs {len(found.seeds)}",
-        full=f"simnav reproduce {paper.key} --runs {paper.full}",
+        command=f"simnav reproduce {paper.key}",
+        full=f"simnav reproduce {paper.key} --until-decided",
         notes=list(paper.notes),
         tables=list(sheets(found)),
         figures=[

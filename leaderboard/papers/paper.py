@@ -1,4 +1,4 @@
-"""What is known of a paper: the methods that it compares, their figures, what follows from them, and what it draws."""
+"""Description of a paper: its citation, the methods that it compares, their figures and claims, and its drawings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Literal
 
-from simnav.leaderboard.papers import PAPERS
+from simnav.leaderboard.papers import key_of
 from simnav.scenario import Scenario
 from simnav.scenario import load as load_scenario
 
@@ -16,6 +16,7 @@ __all__ = [
     "ATTITUDE",
     "HORIZONTAL",
     "HORIZONTAL_VELOCITY",
+    "KINDS_OF_ROWS",
     "POSITION",
     "VELOCITY",
     "Draw",
@@ -29,18 +30,19 @@ __all__ = [
     "Rule",
     "Table",
     "Value",
+    "kind_of",
     "load",
 ]
 
-#: A figure, or the two ends of what a paper gives as a range.
+#: A figure, or the lower and upper end of a range that a paper gives.
 Range = float | tuple[float, float]
 
-#: ``equal``: ours should be the paper's; ``at-most``, ``at-least``: the paper's is a bound; ``beside``: the two are not
-#: of the same thing, and are shown without a verdict.
+#: ``equal``: our figure should equal the paper's. ``at-most``, ``at-least``: the paper's figure is a bound. ``beside``:
+#: the two figures are of different data and are shown without a verdict.
 Rule = Literal["equal", "at-most", "at-least", "beside"]
 
-#: Of one run: ``track``, ``run`` (series over time). Of all runs: ``spread`` (series again), ``bars``, ``gains``,
-#: ``distribution``.
+#: ``track`` and ``run`` (errors over time) show one run. ``spread`` (errors over time), ``bars``, ``gains`` and
+#: ``distribution`` show all runs.
 Draw = Literal["track", "run", "spread", "bars", "gains", "distribution"]
 
 
@@ -67,10 +69,10 @@ class Method:
     name : str
         As the paper calls it.
     rows : tuple of str
-        Estimators as typed on the command line (``adkf:factor=two-segment``), the best first: the first that is
-        registered is taken.
+        Estimators as typed on the command line (``adkf:factor=two-segment``), the most suitable first. The first one
+        that is registered is used.
     smoothed : bool
-        Its output is the smoothed trajectory: that is what figures of one run show.
+        Whether its output is the smoothed trajectory. Figures of one run then show the smoothed trajectory.
     """
 
     name: str
@@ -89,12 +91,13 @@ class Value:
     score : str
         Name of a measure (`simnav.leaderboard.papers.measures`).
     paper : float, pair of float or None
-        In the measure's unit; None where the paper has no figure: ours is shown all the same.
+        The paper's figure or range, in the measure's unit. None if the paper has none: our figure is shown alone.
     rule : str
+        How the two figures are compared (see `Rule`).
     derived : bool
-        The paper does not print the figure, but it follows from others that it prints, or is read from its prose.
+        Whether the figure follows from other printed figures or from the paper's text, and is not printed itself.
     lower, higher : str
-        Why ours is lower, or higher, than the paper's: a sentence, shown only where it is so.
+        Reason why our figure is lower, or higher, than the paper's. It is shown only if that is the case.
     """
 
     scenario: str
@@ -116,19 +119,21 @@ class Gain:
     scenario, method, than, score
         As for `Value`.
     paper : float
-        By what fraction the score of ``method`` is below that of ``than``; negative where it is above.
+        Fraction by which the score of ``method`` is below that of ``than``; negative if it is above. None if the paper
+        has no such claim: our gain is shown without a verdict.
     than_score : str
-        Where the other is scored by another measure (filtered against smoothed).
+        Measure of the other method, if it differs (a filtered error against a smoothed one).
     derived : bool
+        As for `Value`.
     lower, higher : str
-        Why our gain is smaller, or larger.
+        Reason why our gain is smaller, or larger, than the paper's.
     """
 
     scenario: str
     method: str
     than: str
     score: str
-    paper: float
+    paper: float | None = None
     than_score: str = ""
     derived: bool = False
     lower: str = ""
@@ -136,6 +141,25 @@ class Gain:
 
 
 Row = Value | Gain
+
+#: Kinds of rows that have a verdict (see `kind_of`), with their plural.
+KINDS_OF_ROWS: Mapping[str, str] = {
+    "figure": "figures",
+    "bound": "one-sided bounds",
+    "cost bound": "one-sided bounds on time and memory",
+}
+_COST = ("update_mean", "peak_memory")
+
+
+def kind_of(row: Row) -> str:
+    """Kind of a row, for counting verdicts: ``figure``, ``bound`` or ``cost bound``.
+
+    A bound is easier to keep than a figure is to match, and a bound on time or memory also compares two computers. So
+    the three are counted separately.
+    """
+    if isinstance(row, Gain) or row.rule not in ("at-most", "at-least"):
+        return "figure"
+    return "cost bound" if row.score in _COST else "bound"
 
 
 @dataclass(frozen=True)
@@ -145,9 +169,11 @@ class Table:
     Attributes
     ----------
     title : str
+        Our title.
     rows : tuple of Row
+        The rows, in the order of the table.
     number : str
-        Of the paper's table or figure that they answer (``Table 3``); empty where they answer its prose.
+        The paper's table or figure with these figures (``Table 3``); empty if they are in its text.
     """
 
     title: str
@@ -212,12 +238,23 @@ class Paper:
     Attributes
     ----------
     key : str
-        ``000`` to ``004``.
-    title, citation : str
+        Name on the command line, such as ``guo-2026`` (`simnav.leaderboard.papers.PAPERS`).
+    authors : str
+        All authors, as a list of references prints them.
+    short : str
+        Citation in a sentence, such as ``Guo et al. (2026)``.
+    title : str
+        Title of the paper.
+    published : str
+        Journal or preprint server, volume, pages and year.
+    doi : str
+        Digital object identifier; empty if none is known.
+    about : str
+        Subject of the comparison in a few words.
     runs : int
-        Seeds a scenario, so that it ends within a few minutes.
+        Default number of runs of each scenario; the comparison then takes a few minutes.
     full : int
-        As many as the paper has, or as settle the rows.
+        Number of runs in the paper, or the number that decides most rows.
     methods : tuple of Method
     tables : tuple of Table
     figures : tuple of Figure
@@ -230,8 +267,12 @@ class Paper:
     """
 
     key: str
+    authors: str
+    short: str
     title: str
-    citation: str
+    published: str
+    doi: str
+    about: str
     runs: int
     full: int
     methods: tuple[Method, ...]
@@ -240,6 +281,12 @@ class Paper:
     not_shown: tuple[NotShown, ...] = ()
     notes: tuple[str, ...] = ()
     variants: Mapping[str, tuple[str, Callable[[Scenario], Scenario]]] = field(default_factory=dict)
+
+    @property
+    def citation(self) -> str:
+        """Authors, title, place of publication and DOI."""
+        doi = f" doi:{self.doi}" if self.doi else " No DOI is known."
+        return f"{self.authors}: {self.title}. {self.published}.{doi}"
 
     def rows(self) -> Iterator[Row]:
         """All rows of all tables."""
@@ -261,14 +308,14 @@ class Paper:
         known = [m.name for m in self.methods]
         for name in names:
             if name not in known:
-                raise ValueError(f"paper {self.key} has no method {name!r}; it has {', '.join(known)}")
+                raise ValueError(f"{self.short} has no method {name!r}; it has {', '.join(known)}")
 
         def about(row: Row) -> bool:
             return row.method in names and (not isinstance(row, Gain) or row.than in names)
 
         tables = tuple(replace(t, rows=rows) for t in self.tables if (rows := tuple(filter(about, t.rows))))
         if not tables:
-            raise ValueError(f"paper {self.key} has no row that is about {' and '.join(names)} alone")
+            raise ValueError(f"{self.short} has no row that is about {' and '.join(names)} alone")
         figures = tuple(f for f in self.figures if set(f.methods) <= set(names))
         methods = tuple(m for m in self.methods if m.name in names)
         return replace(self, methods=methods, tables=tables, figures=figures)
@@ -294,15 +341,14 @@ class Paper:
 
 
 def load(key: str) -> Paper:
-    """The paper of that key.
+    """The paper of a key or of one of its aliases.
 
     Raises
     ------
     ValueError
         If there is none; one sentence.
     """
-    if key not in PAPERS:
-        raise ValueError(f"there is no paper {key!r}; there are {', '.join(PAPERS)}")
-    paper = import_module(f"simnav.leaderboard.papers.paper_{key}").PAPER
+    name = key_of(key)
+    paper = import_module(f"simnav.leaderboard.papers.{name.replace('-', '_')}").PAPER
     assert isinstance(paper, Paper)
     return paper

@@ -1,4 +1,4 @@
-"""A reproduction as tables for people and as CSV."""
+"""A repeated comparison as tables and as CSV."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.measures import measure
-from simnav.leaderboard.papers.paper import Gain, Range
+from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Gain, Range
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.files import write_whole
 
@@ -28,25 +28,41 @@ __all__ = [
     "paper_tables",
     "sheets",
     "summary",
+    "verdicts",
     "whereabouts",
     "write_csv",
 ]
 
-_COLUMNS = ("method", "ours by", "measure", "paper", "ours [95 %]", "runs", "verdict")
+_COLUMNS = ("method", "estimator", "measure", "paper", "ours [95 %]", "runs", "verdict")
 _NUMERIC = ("paper", "ours [95 %]", "runs")
 
 
 def summary(found: Reproduction) -> str:
-    """One line: how many rows agree."""
-    words = ("agrees", "differs", "undecided", "absent", "failed", "unsuitable")
-    texts = {"agrees": "agree", "differs": "differ", "absent": "not there yet"}
-    counts = [f"{n} {texts.get(w, w)}" for w in words if (n := found.count(w))]
-    return f"paper {found.paper.key}, {len(found.seeds)} runs a scenario: {', '.join(counts)}"
+    """One line: how many rows agree, differ and are undecided, for each kind of rows."""
+    counts = [f"{plural}: {text}" for kind, plural in KINDS_OF_ROWS.items() if (text := verdicts(found, kind))]
+    others = {"absent": "without a registered estimator", "failed": "failed", "unsuitable": "not applicable"}
+    counts += [f"{n} rows {words}" for verdict, words in others.items() if (n := found.count(verdict))]
+    return f"{found.paper.short}, up to {len(found.seeds)} runs of each scenario; {'; '.join(counts)}"
+
+
+def verdicts(found: Reproduction, kind: str) -> str:
+    """The verdicts on one kind of rows, such as ``3 agree, 1 differs``; empty if there are none.
+
+    Parameters
+    ----------
+    found : Reproduction
+        The comparison.
+    kind : str
+        A key of `simnav.leaderboard.papers.paper.KINDS_OF_ROWS`.
+    """
+    forms = {"agrees": ("agrees", "agree"), "differs": ("differs", "differ"), "undecided": ("undecided", "undecided")}
+    counts = {verdict: found.count(verdict, kind) for verdict in forms}
+    return ", ".join(f"{n} {forms[verdict][n != 1]}" for verdict, n in counts.items() if n)
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a sheet; a numeric one is right-aligned."""
+    """A column of a sheet; numeric columns are right-aligned."""
 
     title: str
     numeric: bool
@@ -54,7 +70,7 @@ class Column:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A row of a sheet: its cells as plain text, and the verdict of its finding."""
+    """A row of a sheet: its cells as plain text, and its verdict."""
 
     cells: list[str]
     verdict: str
@@ -66,12 +82,16 @@ class Sheet:
 
     Attributes
     ----------
-    title, number : str
-        Ours, and the paper's.
+    title : str
+        Our title.
+    number : str
+        Number of the paper's table or figure; may be empty.
     columns : list of Column
+        Titles of the columns.
     rows : list of SheetRow
+        The rows.
     notes : list of str
-        Why rows differ, with the letter that the rows refer to; what the marks mean.
+        Reasons why rows differ, with the letters that the rows refer to, and the meaning of the marks.
     """
 
     title: str
@@ -82,9 +102,9 @@ class Sheet:
 
 
 def sheets(found: Reproduction) -> Iterator[Sheet]:
-    """One for each of the paper's tables; methods without either figure are left out.
+    """One sheet for each table of the paper.
 
-    Why a row differs is a note below its table.
+    Rows are left out if neither the paper nor we have a figure. The reason why a row differs is a note of its sheet.
     """
     for of in found.paper.tables:
         rows = [f for f in found.findings if f.table == of.title and (f.verdict != "absent" or f.row.paper is not None)]
@@ -100,9 +120,9 @@ def sheets(found: Reproduction) -> Iterator[Sheet]:
             before = name
         notes = [f"({chr(ord('a') + i)}) {why}" for i, why in enumerate(whys)]
         if any(not isinstance(f.row, Gain) and f.row.rule == "beside" for f in rows):
-            notes.insert(0, "° of other data than ours: beside it, without a verdict")
+            notes.insert(0, "° of other data than ours, and so without a verdict")
         if any(f.row.derived and f.row.paper is not None for f in rows):
-            notes.insert(0, "~ follows from other figures of the paper, or from its prose")
+            notes.insert(0, "~ follows from other figures of the paper or from its text")
         yield Sheet(of.title, of.number, [Column(c, c in _NUMERIC) for c in _COLUMNS], cells, notes)
 
 
@@ -118,7 +138,7 @@ def paper_tables(found: Reproduction) -> Iterator[Table]:
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """A table or figure of the paper, what it is, and where ours is, or why there is none."""
+    """A table or figure of the paper, its subject, and where ours is, or why there is none."""
 
     number: str
     what: str
@@ -126,21 +146,25 @@ class Whereabouts:
 
 
 def contents_table(found: Reproduction, drawn: Sequence[Drawn]) -> Table:
-    """What the paper has, and where ours is, or why not."""
+    """The tables and figures of the paper, and where ours are, or why there are none."""
     rows = [[row.number, row.what, row.where] for row in whereabouts(found, drawn)]
     dim = [i for i, item in enumerate(contents(found.paper)) if not item.shown]
-    return tables.table("What the paper has, and where ours is", ["paper", "what", "ours, or why not"], rows, dim=dim)
+    return tables.table("Tables and figures of the paper", ["paper", "subject", "ours"], rows, dim=dim)
 
 
 def whereabouts(found: Reproduction, drawn: Sequence[Drawn]) -> list[Whereabouts]:
-    """All that the paper has, in its order."""
-    missing = {f"{d.figure.name}.png": d.missing for d in drawn if d.path is None}
+    """All tables and figures of the paper, in its order."""
+    outcome = {f"{d.figure.name}.png": d for d in drawn}
     rows = []
     for item in contents(found.paper):
         places = []
         for place in item.shown:
-            why = f" (not there yet: {', '.join(missing[place])})" if missing.get(place) else ""
-            places.append(f"{place}{why}")
+            of = outcome.get(place)
+            if place.endswith(".png") and of is None:
+                place = f"{place} of 'simnav reproduce {found.paper.key}'"
+            elif of is not None and of.path is None:
+                place = f"{place} (no results of {', '.join(of.missing)})"
+            places.append(place)
         rows.append(Whereabouts(item.number, item.what, "; ".join(places) or f"not shown: {item.why}"))
     return rows
 
@@ -155,7 +179,7 @@ def _by(f: Finding) -> str:
 
 def _title(f: Finding, with_scenario: bool) -> str:
     m = measure(f.row.score)
-    text = f"{m.title}, better by" if isinstance(f.row, Gain) else f"{m.title} [{m.unit}]"
+    text = f"gain in {m.title[0].lower()}{m.title[1:]}" if isinstance(f.row, Gain) else f"{m.title} [{m.unit}]"
     return f"{text} ({f.row.scenario})" if with_scenario else text
 
 
@@ -178,7 +202,7 @@ def _ours(f: Finding) -> str:
         return tables.MISSING
     if not isinstance(f.row, Gain):
         return tables.interval(f.ours.value, f.ours.low, f.ours.high)
-    if f.ours.value > 2.0:  # no gain of a few per cent any more
+    if f.ours.value > 2.0:  # too large for a gain in percent
         return f"worse by a factor of {tables.interval(f.ours.value, f.ours.low, f.ours.high)}"
     # Rounded here, and added to zero, so that there is no -0.0.
     value, low, high = (round(1.0 - x, 3) + 0.0 for x in (f.ours.value, f.ours.high, f.ours.low))
@@ -201,7 +225,7 @@ def _verdict(f: Finding, whys: list[str]) -> str:
 
 
 def write_csv(found: Reproduction, path: Path) -> Path:
-    """All rows, one a line; written at once or not at all."""
+    """Write all rows as CSV, one on a line; the file is written completely or not at all."""
     rows = found.to_dict()["rows"]
     text = io.StringIO()
     writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")

@@ -1,4 +1,4 @@
-"""From a paper to filled rows: its methods found, run on the same seeds, and judged."""
+"""From a paper to filled rows: find its methods, run them on the same seeds, and give each row its verdict."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.papers.comparison import Verdict, judge, judge_gain
 from simnav.leaderboard.papers.measures import measure, value_of
-from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row
+from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row, kind_of
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["Finding", "Reproduction", "find", "find_method", "reproduce"]
+__all__ = ["Finding", "Reproduction", "fill", "find", "find_method", "load_results", "reproduce"]
 
-_UNEXPLAINED = "not explained"
+_UNEXPLAINED = "the reason is not known"
 
 
 @dataclass(frozen=True)
@@ -34,18 +34,20 @@ class Finding:
     Attributes
     ----------
     table : str
+        Title of its table.
     row : Value or Gain
+        The paper's row.
     ours : Interval or None
-        In the unit of the measure; for a `Gain` the ratio. None where there is nothing.
+        Our figure in the unit of the measure; for a `Gain` the ratio. None if there is no figure.
     verdict : str
-        ``agrees``, ``differs``, ``undecided``; ``ours`` where the paper has no figure, or none to judge by; ``absent``
-        where a method is not registered; ``failed`` or ``unsuitable``.
+        ``agrees``, ``differs`` or ``undecided``; ``ours`` if the paper has no comparable figure; ``absent`` if a method
+        is not registered; ``failed`` or ``unsuitable`` if it has no successful run.
     why : str
-        A sentence, or empty where the row agrees.
+        Reason in one sentence; empty if the row agrees.
     estimators : tuple of str
-        Labels of those that stand for the row's methods.
+        Labels of the estimators that stand for the row's methods.
     failed : int
-        Runs that failed.
+        Number of runs that failed.
     """
 
     table: str
@@ -59,16 +61,20 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """A paper's comparison, run again.
+    """A paper's comparison, repeated with our estimators and scenarios.
 
     Attributes
     ----------
     paper : Paper
+        The paper.
     seeds : sequence of int
+        Seeds of the runs. Rows may have fewer runs (`Finding.ours`).
     findings : list of Finding
+        All rows of all tables, in order.
     stands_for : dict of str to EstimatorRequest or None
-        Method -> who stands for it.
+        Method of the paper -> the estimator that stands for it.
     results : list of Result
+        Results of all runs.
     """
 
     paper: Paper
@@ -77,9 +83,9 @@ class Reproduction:
     stands_for: dict[str, EstimatorRequest | None]
     results: list[Result]
 
-    def count(self, verdict: str) -> int:
-        """Rows with a verdict."""
-        return sum(f.verdict == verdict for f in self.findings)
+    def count(self, verdict: str, kind: str = "") -> int:
+        """Number of rows with a verdict; of one kind (`simnav.leaderboard.papers.paper.kind_of`), or of all."""
+        return sum(f.verdict == verdict and kind in ("", kind_of(f.row)) for f in self.findings)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -87,6 +93,7 @@ class Reproduction:
             "paper": self.paper.key,
             "title": self.paper.title,
             "citation": self.paper.citation,
+            "doi": self.paper.doi,
             "notes": list(self.paper.notes),
             "runs": len(self.seeds),
             "seeds": list(self.seeds),
@@ -95,7 +102,7 @@ class Reproduction:
         }
 
     def to_frame(self) -> Any:
-        """A row of the paper's tables a row; see `simnav.leaderboard.results.frame.frame`."""
+        """One line for each row of the paper's tables; see `simnav.leaderboard.results.frame.frame`."""
         rows = [_row_dict(f) for f in self.findings]
         texts = [{k: " / ".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()} for row in rows]
         return frame([{**row, "paper": None if row["paper"] is None else str(row["paper"])} for row in texts])
@@ -106,12 +113,12 @@ class Reproduction:
         Parameters
         ----------
         number : str
-            ``Figure 4``; default: the first that there is something to draw of.
+            Number of the figure, such as ``Figure 4``; default: the first figure that can be drawn.
 
         Raises
         ------
         RequestError
-            If there is none; one sentence.
+            If it cannot be drawn; one sentence.
         """
         from simnav.leaderboard.papers.figures import draw
 
@@ -140,6 +147,7 @@ def _row_dict(f: Finding) -> dict[str, Any]:
         "unit": "gain" if gain else m.unit,
         "paper": list(paper) if isinstance(paper, tuple) else paper,
         "rule": "gain" if isinstance(f.row, Gain) else f.row.rule,
+        "kind": kind_of(f.row),
         "derived": f.row.derived,
         "ours": None if ours is None else ours[0],
         "low": None if ours is None else ours[1],
@@ -152,7 +160,7 @@ def _row_dict(f: Finding) -> dict[str, Any]:
 
 
 def find_method(method: Method) -> EstimatorRequest | None:
-    """The registered estimator that stands for a method; None where there is none yet."""
+    """The registered estimator that stands for a method; None if there is none."""
     from simnav.estimator import EstimatorError, make, names
     from simnav.leaderboard.campaign.request import EstimatorRequest, split_estimators
 
@@ -177,16 +185,18 @@ def reproduce(
     workers: int = 2,
     progress: Callable[[str, Progress], None] | None = None,
 ) -> Reproduction:
-    """Run a paper's comparison.
+    """Run a paper's comparison with the same number of runs for all methods.
 
     Parameters
     ----------
     paper : Paper
+        The paper.
     runs : int
-        Seeds a scenario, from 0 on.
+        Number of runs of each scenario, with seeds from 0 on.
     folder : Path
-        Of the results: what is there already is not run again.
+        Folder of the results. Runs whose results are there already are not repeated.
     workers : int
+        Number of processes.
     progress : callable, optional
         Called with the name of the scenario and the campaign's progress.
 
@@ -199,30 +209,60 @@ def reproduce(
     simnav.leaderboard.campaign.campaign.CampaignError, simnav.leaderboard.results.store.StoreError
         As `simnav.leaderboard.campaign.campaign.run_campaign`.
     """
+    stands_for = {m.name: find_method(m) for m in paper.methods}
+    for name, methods in paper.participants().items():
+        run(paper, name, methods, stands_for, range(runs), folder, workers=workers, progress=progress)
+    return fill(paper, stands_for, load_results(paper, stands_for, folder, range(runs)), range(runs))
+
+
+def run(
+    paper: Paper,
+    scenario: str,
+    methods: Sequence[str],
+    stands_for: Mapping[str, EstimatorRequest | None],
+    seeds: range,
+    folder: Path,
+    *,
+    workers: int,
+    progress: Callable[[str, Progress], None] | None,
+) -> None:
+    """Run some methods of a paper on one of its scenarios; results that are in the folder are kept."""
     from simnav.leaderboard.campaign.campaign import run_campaign
+
+    requests = {r.label: r for m in methods if (r := stands_for[m]) is not None}
+    if requests:
+        named = None if progress is None else lambda p: progress(scenario, p)
+        run_campaign([paper.scenario(scenario)], list(requests.values()), seeds, folder, workers=workers,
+                     progress=named)  # fmt: skip
+
+
+def load_results(
+    paper: Paper, stands_for: Mapping[str, EstimatorRequest | None], folder: Path, seeds: range
+) -> list[Result]:
+    """The results of a folder that belong to a paper's comparison, for these seeds."""
     from simnav.leaderboard.results.store import load
 
-    stands_for = {m.name: find_method(m) for m in paper.methods}
-    seeds, ids, results = range(runs), {}, []
-    for name, methods in paper.participants().items():
-        scenario = paper.scenario(name)
-        ids[name] = scenario.id
-        found = {r.label: r for m in methods if (r := stands_for[m]) is not None}
-        if found:
-            named = None if progress is None else _named(progress, name)
-            run_campaign([scenario], list(found.values()), seeds, folder, workers=workers, progress=named)
-            loaded = load(folder, series=bool(paper.figures))
-            results += [r for r in loaded if r.scenario == scenario.id and r.estimator in found and r.seed in seeds]
+    wanted = {
+        (paper.scenario(scenario).id, request.label)
+        for scenario, methods in paper.participants().items()
+        for m in methods
+        if (request := stands_for[m]) is not None
+    }
+    found = load(folder, series=bool(paper.figures)) if wanted else []
+    return [r for r in found if (r.scenario, r.estimator) in wanted and r.seed in seeds]
+
+
+def fill(
+    paper: Paper, stands_for: dict[str, EstimatorRequest | None], results: list[Result], seeds: Sequence[int]
+) -> Reproduction:
+    """Fill all rows of a paper from results."""
     by: dict[tuple[str, str], list[Result]] = {}
     for result in results:
         by.setdefault((result.scenario, result.estimator), []).append(result)
     labels = {name: r.label for name, r in stands_for.items() if r is not None}
+    ids = {name: paper.scenario(name).id for name in {row.scenario for row in paper.rows()}}
     findings = [find(table.title, row, ids[row.scenario], labels, by) for table in paper.tables for row in table.rows]
     return Reproduction(paper, seeds, findings, stands_for, results)
-
-
-def _named(progress: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:
-    return lambda p: progress(name, p)
 
 
 def find(
@@ -237,17 +277,20 @@ def find(
     Parameters
     ----------
     table : str
+        Title of the row's table.
     row : Row
+        The paper's row.
     scenario : str
-        Versioned id.
+        Versioned id of the row's scenario.
     labels : mapping of str to str
-        Method -> estimator, of those that are there.
+        Method -> label of the estimator that stands for it; methods without one are left out.
     results : mapping of (scenario, estimator) to results
+        All results of the comparison.
     """
     methods = [row.method, *([row.than] if isinstance(row, Gain) else [])]
     missing = [m for m in methods if m not in labels]
     if missing:
-        return Finding(table, row, None, "absent", f"not there yet: {', '.join(missing)}")
+        return Finding(table, row, None, "absent", f"not registered: {', '.join(missing)}")
     names = tuple(labels[m] for m in methods)
     all_runs = [results.get((scenario, name), ()) for name in names]
     for name, runs in zip(names, all_runs, strict=True):
@@ -264,8 +307,10 @@ def find(
     ]
     if isinstance(row, Gain):
         ours = mean_ratio(values[0], values[1])
+        if row.paper is None:
+            return Finding(table, row, ours, "ours", "", names, failed)
         verdict = judge_gain(ours, 1.0 - row.paper)
-        # The side is the ratio's: a higher ratio is a smaller gain.
+        # The side is that of the ratio: a higher ratio is a smaller gain.
         why = {-1: row.higher, 1: row.lower}
     else:
         ours = mean(values[0].values())

@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.results.provenance import Provenance
+
 if TYPE_CHECKING:
     import pyarrow as pa
 
 __all__ = ["BATCH", "FORMAT", "NO_TRIAL", "READABLE", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
 
 #: Version of the format of results, and those that can be read.
-FORMAT = 2
-READABLE = (1, FORMAT)
+FORMAT = 4
+READABLE = (1, 2, 3, FORMAT)
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
@@ -26,8 +28,16 @@ BATCH = 256
 #: Statuses that say nothing about the estimator.
 NO_TRIAL = ("unsuitable", "no-recording")
 
-#: Columns that format 1 does not have, and what stands there: not known.
-_SINCE_2 = {"time_limit": 0.0, "memory_limit": 0, "scoring": ""}
+#: Columns that older formats do not have: the format that brought them, and what stands there (not known).
+_SINCE: dict[str, tuple[int, Any]] = {
+    "time_limit": (2, 0.0),
+    "memory_limit": (2, 0),
+    "scoring": (2, ""),
+    "scenario_digest": (3, ""),
+    "estimator_digest": (3, ""),
+    "provenance": (3, ""),
+    "draws": (4, "{}"),
+}
 
 Series = NDArray[np.float32]
 
@@ -71,6 +81,12 @@ class Result:
         That it ran under [bytes]; 0 where it is not known.
     scoring : str
         With which code it was scored: JSON, digests by module. Empty where it is not known.
+    scenario_digest, estimator_digest : str
+        Of the scenario's content, and of the estimator's code. Empty where they are not known.
+    provenance : Provenance
+        Versions, machine and day; a file names its id only.
+    draws : mapping of str to object
+        What was drawn for the run, by key path, in the units of the scenario's file.
     """
 
     scenario: str
@@ -91,6 +107,10 @@ class Result:
     time_limit: float = 0.0
     memory_limit: int = 0
     scoring: str = ""
+    scenario_digest: str = ""
+    estimator_digest: str = ""
+    provenance: Provenance = field(default_factory=Provenance)
+    draws: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def variant(self) -> str:
@@ -128,6 +148,10 @@ def schema() -> pa.Schema:
             ("time_limit", pa.float64()),
             ("memory_limit", pa.int64()),
             ("scoring", pa.string()),
+            ("scenario_digest", pa.string()),
+            ("estimator_digest", pa.string()),
+            ("provenance", pa.string()),
+            ("draws", pa.string()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )
@@ -139,7 +163,9 @@ def to_table(result: Result) -> pa.Table:
 
     arrays = {name: np.asarray(a, dtype=np.float32) for name, a in result.series.items()}
     row = {name: getattr(result, name) for name in schema().names}
+    row["provenance"] = result.provenance.id
     row["parameters"] = json.dumps(dict(result.parameters), sort_keys=True, default=str)
+    row["draws"] = json.dumps(dict(result.draws), default=str)
     row["scores"] = [(str(name), float(value)) for name, value in result.scores.items()]
     row["series"] = [{"name": n, "shape": list(a.shape), "values": a.ravel()} for n, a in arrays.items()]
     return pa.Table.from_pylist([row], schema=schema())
@@ -160,7 +186,7 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         file = pq.ParquetFile(source, page_checksum_verification=True)
         found = file.schema_arrow
         names = schema().names
-        known = {str(version).encode(): [n for n in names if version > 1 or n not in _SINCE_2] for version in READABLE}
+        known = {str(version).encode(): [n for n in names if version >= _SINCE.get(n, (1,))[0]] for version in READABLE}
         if found.names != known.get((found.metadata or {}).get(b"simnav_results", b"")):
             raise ValueError("it was not written by this version of simnav")
         wanted = names if columns is None else columns
@@ -168,7 +194,7 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         for batch in file.iter_batches(batch_size=BATCH, columns=there, use_threads=False):
             table = pa.Table.from_batches([batch])
             for name in (n for n in names if n in wanted and n not in there):
-                unknown = pa.array([_SINCE_2[name]] * len(table), schema().field(name).type)
+                unknown = pa.array([_SINCE[name][1]] * len(table), schema().field(name).type)
                 table = table.append_column(schema().field(name), unknown)
             yield table.replace_schema_metadata(schema().metadata)
 
@@ -182,8 +208,15 @@ def write_tables(file: BinaryIO, tables: Iterator[pa.Table]) -> None:
             writer.write_table(table)
 
 
-def rows(table: pa.Table) -> Iterator[Result]:
-    """Results of a table; the column of series may be missing."""
+def rows(table: pa.Table, provenances: Mapping[str, Provenance]) -> Iterator[Result]:
+    """Results of a table; the column of series may be missing.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+    provenances : mapping of str to Provenance
+        By id. A result whose provenance is not among them keeps the id alone.
+    """
     series: list[dict[str, Series]] = [{} for _ in range(len(table))]
     if "series" in table.column_names:
         lists = table.column("series").combine_chunks()
@@ -199,5 +232,7 @@ def rows(table: pa.Table) -> Iterator[Result]:
         table = table.drop_columns(["series"])
     for row, arrays in zip(table.to_pylist(), series, strict=True):
         row["parameters"] = json.loads(row["parameters"])
+        row["draws"] = json.loads(row["draws"])
         row["scores"] = dict(row["scores"])
+        row["provenance"] = provenances.get(row["provenance"]) or Provenance(identity=row["provenance"])
         yield Result(**row, series=arrays)

@@ -2,9 +2,10 @@
 
 A results folder holds::
 
-    simnav-results.json      format of the folder, and which results are current
+    simnav-results.json      format of the folder, version of the benchmark, and which results are current
     results/KEY.parquet      one result, fresh from a worker
     compacted/part-*.parquet many results
+    provenance/ID.json       versions, machine and day of results that name the id
     trials/KEY.parquet       what the estimator gave, where trials are kept (`simnav.leaderboard.results.trials`)
 
 A result's key names everything that decides it (`simnav.leaderboard.campaign.fingerprint`), so a campaign that was
@@ -30,6 +31,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeVar
 
+from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
 from simnav.leaderboard.results.result import (
     BATCH,
     FORMAT,
@@ -57,13 +59,14 @@ __all__ = [
     "drop",
     "keys",
     "load",
+    "provenances",
     "rescore",
     "select",
     "write",
 ]
 
 _MARKER = "simnav-results.json"
-_LOOSE, _COMPACTED, _TRIALS = "results", "compacted", "trials"
+_LOOSE, _COMPACTED, _TRIALS, _PROVENANCE = "results", "compacted", "trials", "provenance"
 _MOST_PARTS = 16  # more are merged into one
 _STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
 
@@ -108,10 +111,17 @@ def create(folder: str | os.PathLike[str]) -> Path:
     Raises
     ------
     StoreError
-        If the folder holds something else, or results of another format. It is left as it is.
+        If the folder holds something else, or results of another format or version of the benchmark. It is left as it
+        is.
     """
     path = Path(folder)
     if _check(path):
+        before = _read_marker(path)
+        if before["current"] and before.get("benchmark") != BENCHMARK:
+            raise StoreError(
+                f"the results in {path} belong to {before.get('benchmark', 'a benchmark without a version')}, this "
+                f"version of simnav runs {BENCHMARK}, and the two must not be mixed: name another folder"
+            )
         return path
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -173,7 +183,7 @@ def _read_marker(path: Path) -> dict[str, Any]:
 def _write_marker(path: Path, current: Mapping[str, Any]) -> None:
     from importlib.metadata import version
 
-    content = {"format": FORMAT, "simnav": version("simnav"), "current": current}
+    content = {"format": FORMAT, "simnav": version("simnav"), "benchmark": BENCHMARK, "current": current}
     with atomic(path / _MARKER) as file:
         file.write(json.dumps(content, indent=1, sort_keys=True).encode())
 
@@ -316,7 +326,7 @@ def _read(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
 
 
 def write(folder: str | os.PathLike[str], result: Result) -> None:
-    """Write one result, atomically.
+    """Write one result, atomically, and its provenance where the folder does not have it.
 
     Raises
     ------
@@ -324,8 +334,36 @@ def write(folder: str | os.PathLike[str], result: Result) -> None:
         If it cannot be written, e.g. because the disk is full; nothing is left behind.
     """
     table = to_table(result)
+    _keep_provenance(Path(folder), result.provenance)
     with atomic(Path(folder) / _LOOSE / f"{result.key}.parquet") as file:
         write_tables(file, iter([table]))
+
+
+def _keep_provenance(path: Path, provenance: Provenance) -> None:
+    target = path / _PROVENANCE / f"{provenance.id}.json"
+    if not provenance.id or provenance.identity or target.exists():
+        return
+    try:
+        target.parent.mkdir(exist_ok=True)
+    except OSError as error:
+        raise _failure(target, error) from None
+    with atomic(target) as file:
+        file.write(json.dumps(provenance.to_dict(), indent=1).encode())
+
+
+def provenances(folder: str | os.PathLike[str]) -> dict[str, Provenance]:
+    """All that the folder knows, by id; a damaged file is set aside."""
+    found = {}
+    for file in sorted((Path(folder) / _PROVENANCE).glob("*.json")):
+        try:
+            one = Provenance.from_dict(json.loads(file.read_bytes()))
+        except (ValueError, TypeError, AttributeError) as error:
+            _set_aside(file, error)
+            continue
+        except OSError as error:
+            raise StoreError(f"{file} cannot be read: {error.strerror}") from None
+        found[file.stem] = one
+    return found
 
 
 def keys(folder: str | os.PathLike[str]) -> dict[str, Ending]:
@@ -390,17 +428,21 @@ def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, fl
         If a file cannot be written; then the results in it have their old scores.
     """
 
+    path = _opened(folder)
+    known = provenances(path)
+
     def changed(table: pa.Table) -> pa.Table:
         import pyarrow as pa
 
         if not len(table):
             return table
         results = [
-            replace(r, scores=dict(scores[r.key]), scoring=scoring) if r.key in scores else r for r in rows(table)
+            replace(r, scores=dict(scores[r.key]), scoring=scoring) if r.key in scores else r
+            for r in rows(table, known)
         ]
         return pa.concat_tables([to_table(r) for r in results]).combine_chunks()
 
-    _rewrite(_opened(folder), scores, changed)
+    _rewrite(path, scores, changed)
 
 
 def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.Table]) -> None:
@@ -431,12 +473,13 @@ def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]
     path = _opened(folder)
     current = _read_marker(path)["current"]
     columns = None if series else [n for n in schema().names if n != "series"]
+    known = provenances(path)
     found: dict[str, Result] = {}
     others: set[tuple[str, str]] = set()
 
     def scan() -> None:
         for tables in _scan(path, columns):
-            for result in (r for table in tables for r in rows(table)):
+            for result in (r for table in tables for r in rows(table, known)):
                 variant = current.get(result.scenario, {}).get("estimators", {}).get(result.estimator)
                 if variant == result.variant:
                     found.setdefault(result.key, result)

@@ -255,7 +255,6 @@ class _Site:
             self.ranking.to_dict(),
             [{key: getattr(s, key) for key in known} for s in self.scenarios],
             self.facts.command,
-            self.facts.versions,
             self.facts.generated,
         )
         for name in formats("results"):

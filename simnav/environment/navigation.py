@@ -28,8 +28,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from simnav.earth import principal_radii
-from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.geometry.earth import principal_radii
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
 
 if TYPE_CHECKING:
@@ -144,9 +144,13 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self.closed_loop = closed_loop
         self.render_mode = render_mode
         self._weights = _weights(reward)
-        self._most = _most_samples(scenario)
-        instruments = scenario.instruments_sheet()
-        self._widths = {name: len(KINDS[sheet.kind].values) for name, sheet in instruments.items()}
+        # The spaces are fixed: they hold what any run of the scenario can bring.
+        possible = scenario.extremes()
+        most = [_most_samples(s) for s in possible]
+        self._most = {name: max(m.get(name, 0) for m in most) for m in most for name in m}
+        self._widths = {
+            name: len(KINDS[sheet.kind].values) for s in possible for name, sheet in s.instruments_sheet().items()
+        }
         self.observation_space = _observation_space(self._most, self._widths)
         self.action_space = spaces.Box(-_ACTION_LIMIT, _ACTION_LIMIT, dtype=np.float64)
         self._source: Any = None
@@ -271,15 +275,19 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         observation: Observation = {"interval": stretch.intervals[i]}
         for name, columns in stretch.columns.items():
             observation[name] = {key: array[i] for key, array in columns.items()}
+        for name in self._most.keys() - stretch.columns.keys():  # instruments that other runs of the scenario have
+            observation[name] = self._nothing(name)
         return observation
 
     def _empty(self, time: float) -> Observation:
-        observation: Observation = {}
-        for name, space in self.observation_space.items():  # type: ignore[attr-defined]
-            if isinstance(space, spaces.Dict):
-                observation[name] = {key: np.zeros(s.shape, s.dtype) for key, s in space.items()}
+        observation: Observation = {name: self._nothing(name) for name in self._most}
         observation["interval"] = np.array([time, time])
         return observation
+
+    def _nothing(self, name: str) -> dict[str, NDArray[Any]]:
+        """The part of an observation in which an instrument delivers nothing."""
+        space = self.observation_space[name]  # type: ignore[index]
+        return {key: np.zeros(s.shape, s.dtype) for key, s in space.items()}
 
     def _reveal(self, info: dict[str, Any]) -> dict[str, Any]:
         if self.reveal_truth and self._stretch is not None:
@@ -459,7 +467,7 @@ def _rows(position: Array) -> list[list[float]]:
 
 
 def _horizontal(estimate: list[float], row: list[float]) -> tuple[float, float]:
-    """North and east error [m] (as `simnav.earth.relative_position`, in plain floats: once a step)."""
+    """North and east error [m] (as `simnav.geometry.earth.relative_position`, in plain floats: once a step)."""
     east = math.remainder(estimate[1] - row[1], math.tau)
     return (estimate[0] - row[0]) * row[3], east * row[4]
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.earth import relative_position
+from simnav.geometry.earth import relative_position
 from simnav.types import Array
 
 __all__ = ["Chart", "Trace"]

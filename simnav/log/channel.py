@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.geometry.rotation import wrap_angle
 from simnav.kinds import Component, Kind, geodetic_components, speed_components
 from simnav.log.nmea import read_nmea, utc_seconds
 from simnav.log.spec import LOG_UNITS, ChannelSpec, FileSpec, LogImuSpec, OriginSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning, Table, check_ascending, read_csv
-from simnav.rotation import wrap_angle
 from simnav.types import KINDS, Array
 
 __all__ = ["ImuSeries", "Series", "geodetic_from_local", "list_recordings", "locate", "read_channel", "read_imu"]
@@ -360,7 +360,7 @@ def geodetic_from_local(value: Array, origin: OriginSpec, frame: str) -> Array:
         Latitude, longitude [rad], height [m]. Through Earth-centred coordinates (Groves eqs. 2.112, 2.113), so without
         a flat-Earth error.
     """
-    from simnav.earth import ECCENTRICITY_SQUARED, principal_radii
+    from simnav.geometry.earth import ECCENTRICITY_SQUARED, principal_radii
 
     north, east, down = (value[:, 1], value[:, 0], -value[:, 2]) if frame == "enu" else value.T
     sl, cl = math.sin(origin.latitude), math.cos(origin.latitude)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.earth import displace, earth_rate, relative_position
+from simnav.geometry.earth import displace, earth_rate, relative_position
+from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
 from simnav.log.channel import ImuSeries, Series
-from simnav.rotation import dcm_from_rpy, wrap_angle
 from simnav.types import Array, NavigationStates, TapStates
 
 if TYPE_CHECKING:

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.earth import gravity
+from simnav.geometry.earth import gravity
 from simnav.log.channel import ImuSeries, Series, list_recordings, read_channel, read_imu
 from simnav.log.reference import Reference
 from simnav.log.table import LogError, LogWarning
 from simnav.recording import AidStream, Block, ImuLabels
 from simnav.sensors import build_layers, labels
-from simnav.start import draw_start
 from simnav.types import Array, ImuSamples, NavigationStates
+from simnav.world.initial_state import draw_start
 
 if TYPE_CHECKING:
     from simnav.log.spec import RecordedSpec
@@ -67,6 +67,9 @@ class LogSource:
     """
 
     def __init__(self, scenario: Scenario, seed: int):
+        scenario = scenario.drawn(seed)
+        self.scenario = scenario
+        root = scenario.root(seed)
         log = scenario.log
         if log is None:
             raise LogError(f"the scenario {scenario.id!r} has no [log]; it is simulated")
@@ -89,18 +92,18 @@ class LogSource:
         told, made = _start(reference, self.initial_truth, imu, begin)
         if made:
             notes.append(f"start {' and '.join(made)} not from the reference")
-        self._aids = self._measure(scenario, log, seed)
+        self._aids = self._measure(scenario, log, root)
         simulated = [n for n, i in log.instruments.items() if i.source == "reference"]
         if simulated:
             notes.append(f"simulated from the reference: {', '.join(simulated)}")
         self.note = "; ".join(notes)
-        self.start = draw_start(told, scenario.initial_error.covariance(), seed)
+        self.start = draw_start(told, scenario.initial_error.covariance(), root)
         self._imu_labels: ImuLabels | None = None
         if self._imu is not None and any("imu" in f.instruments for f in scenario.faults):
             n = len(self._imu)
             self._imu_labels = ImuLabels(np.zeros(n, np.uint32), np.zeros((n, 6)))
         self.faults = labels(scenario.faults, self.duration, {n: s.kind for n, s in scenario.aids.items()})
-        for layer in build_layers(scenario.faults, seed):
+        for layer in build_layers(scenario.faults, root):
             self._aids = {n: layer.apply(s) for n, s in self._aids.items()}
             if self._imu is not None:
                 self._imu, self._imu_labels = layer.apply_imu(self._imu, self._imu_labels)
@@ -135,7 +138,7 @@ class LogSource:
                     tap = replace(self._reference.taps(self._begin + time), time=time)
                 except ValueError as error:
                     raise LogError(f"instruments.{name}: {error}") from None
-                streams[name] = spec.build(name, seed, water_depth=scenario.water_depth).sense(tap)
+                streams[name] = spec.actual().build(name, seed, water_depth=scenario.water_depth).sense(tap)
                 continue
             series = read_channel(log, where.channel(), spec.kind, self.recording)
             time = series.time - self._begin

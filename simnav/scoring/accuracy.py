@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from simnav.earth import relative_position
+from simnav.geometry.earth import relative_position
 from simnav.recording import Recording
 from simnav.scoring.registry import ScoringInput, register_score
 from simnav.types import Array

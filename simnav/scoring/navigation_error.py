@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.earth import relative_position
+from simnav.geometry.earth import relative_position
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.recording import Recording
-from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.trial import Trial
 from simnav.types import Array, NavigationStates
 

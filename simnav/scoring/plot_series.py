@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.earth import relative_position
+from simnav.geometry.earth import relative_position
 from simnav.recording import Recording
 from simnav.scoring.navigation_error import errors, horizontal
 from simnav.trial import Trial

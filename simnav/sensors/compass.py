@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.earth import ROTATION_RATE, principal_radii
+from simnav.geometry.earth import ROTATION_RATE, principal_radii
 from simnav.kinds import HEADING, Component, Kind
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.spec import NonNegative, quantity

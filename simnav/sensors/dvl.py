@@ -8,8 +8,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import BODY_VELOCITY, Kind, speed_components
-from simnav.rotation import dcm_from_rotation_vector
 from simnav.sensors.instrument import (
     ZERO,
     AidSpec,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav import earth
+from simnav.geometry import earth
 from simnav.kinds import POSITION, VELOCITY, Kind, geodetic_components, speed_components
 from simnav.sensors.instrument import (
     ZERO,

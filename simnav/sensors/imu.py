@@ -18,11 +18,12 @@ from math import inf, sqrt
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from simnav.compiled import kernel
+from simnav.sensors.instrument import figures_of, times_datasheet
 from simnav.sensors.processes import HeldGaussMarkov, quantize_scalar, ready
-from simnav.spec import NonNegative, Positive, Spec, Vector, quantity
+from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity
 from simnav.streams import stream
 from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
 
@@ -53,6 +54,17 @@ class TriadSpec(Spec):
     range: float
     fixed_bias: Vector
     fixed_scale: Vector = quantity("ppm", _ZERO)
+    times_datasheet: dict[str, Positive] = Field(
+        {}, description="figures that really are so many times what the datasheet says, like `random_walk = 2.5`"
+    )
+
+    @model_validator(mode="after")
+    def _known_figures(self) -> Self:
+        valid = figures_of(type(self), _ERRORS)
+        for name in self.times_datasheet:
+            if name not in valid:
+                raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
+        return self
 
     @model_validator(mode="after")
     def _correlated(self) -> Self:
@@ -126,6 +138,13 @@ class ImuSpec(Spec):
     def datasheet(self) -> ImuDatasheet:
         """What an estimator is told."""
         return ImuDatasheet(self.rate, self.gyroscope.datasheet(), self.accelerometer.datasheet())
+
+    def actual(self) -> ImuSpec:
+        """The instrument as it really is, where its datasheet is wrong."""
+        triads = {"gyroscope": times_datasheet(self.gyroscope), "accelerometer": times_datasheet(self.accelerometer)}
+        if triads["gyroscope"] is self.gyroscope and triads["accelerometer"] is self.accelerometer:
+            return self
+        return self.model_copy(update=triads)
 
     def ideal(self) -> ImuSpec:
         """The instrument without its errors."""

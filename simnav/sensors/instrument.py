@@ -9,25 +9,25 @@ first-order Gauss-Markov bias and w white noise; the errors of a position are in
 start of a run from the datasheet's one-sigma figures; ``fixed_*`` are realised values that come on top and that no
 estimator is told. Every process has its own random stream and draws at every sample, delivered or not.
 
-`register_instrument` makes a kind of instrument known, ours and others' alike (``docs/instruments.md``).
+`register_instrument` makes a kind of instrument known, ours and others' alike (``docs/how-to/add-an-instrument.md``).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from simnav.kinds import INSTRUMENTS, Kind
 from simnav.plugins import PluginError
 from simnav.recording import AidStream
 from simnav.sensors.processes import GaussMarkov
-from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, Vector, quantity
+from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, Vector, closest, quantity
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
 
@@ -39,10 +39,14 @@ __all__ = [
     "SigmaPair",
     "SigmaTriple",
     "Triple",
+    "figures_of",
     "register_instrument",
+    "times_datasheet",
     "turn_to_body",
     "turn_to_ned",
 ]
+
+T = TypeVar("T", bound=Spec)
 
 #: What the names of an environment's observation, and of the parts of a log's reference, stand for.
 _RESERVED = ("imu", "interval", "position", "velocity", "attitude")
@@ -100,6 +104,24 @@ def turn_to_body(attitude: Array, vector: Array) -> Array:
     return out
 
 
+def figures_of(cls: type[Spec], errors: Sequence[str]) -> list[str]:
+    """The fields of a specification that a datasheet can be wrong about."""
+    stems = tuple(errors)
+    return [n for n in cls.model_fields if n in stems or any(n.startswith(f"{stem}_") for stem in stems)]
+
+
+def times_datasheet(spec: T) -> T:
+    """A specification with its figures multiplied by its ``times_datasheet``; itself where there is none."""
+    factors: Mapping[str, float] = getattr(spec, "times_datasheet", {})
+    if not factors:
+        return spec
+    changes: dict[str, Any] = {"times_datasheet": {}}
+    for name, factor in factors.items():
+        value = getattr(spec, name)
+        changes[name] = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+    return spec.model_copy(update=changes)
+
+
 class AidSpec(Spec):
     """Base of the specifications of aiding instruments.
 
@@ -125,6 +147,9 @@ class AidSpec(Spec):
     rate: Positive = quantity("hz", 1.0)
     phase: NonNegative = quantity("s", 0.0)
     correlation_time: Positive = quantity("s", inf)
+    times_datasheet: dict[str, Positive] = Field(
+        {}, description="figures that really are so many times what the datasheet says, like `sigma = 2.5`"
+    )
 
     @model_validator(mode="after")
     def _correlated(self) -> Self:
@@ -152,6 +177,18 @@ class AidSpec(Spec):
                 value = getattr(self, name)
                 changes[name] = (0.0,) * len(value) if isinstance(value, tuple) else 0.0
         return self.model_copy(update=changes)
+
+    @model_validator(mode="after")
+    def _known_figures(self) -> Self:
+        valid = figures_of(type(self), self.errors)
+        for name in self.times_datasheet:
+            if name not in valid:
+                raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
+        return self
+
+    def actual(self) -> Self:
+        """The instrument as it really is, where its datasheet is wrong."""
+        return times_datasheet(self)
 
     def datasheet(self, name: str) -> Datasheet:
         """What an estimator is told.
@@ -212,7 +249,7 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
 
     Examples
     --------
-    See ``docs/instruments.md``.
+    See ``docs/how-to/add-an-instrument.md``.
     """
 
     def wrap(cls: type[S]) -> type[S]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav import earth
+from simnav.geometry import earth
 from simnav.kinds import HORIZONTAL_POSITION, Kind, geodetic_components
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument, Pair, SigmaPair, register_instrument
 from simnav.spec import Vector, quantity

@@ -19,10 +19,11 @@ from typing import Any, Protocol
 
 import pytest
 
-from simnav import contract_check, scenario, source
+from simnav import scenario, source
 from simnav.estimator import Estimator
 from simnav.recording import Recording
 from simnav.scenario import Scenario
+from simnav.testing import contract_check
 
 __all__ = ["BenchmarkEpochs", "RecordingOf", "benchmark_epochs", "contract_recording", "recording_of"]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from simnav.contract_check import CHECKS, Candidate, Check
+from simnav.testing.contract_check import CHECKS, Candidate, Check
 from simnav.testing.given import EstimatorLike, Factory, given, listed
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class AssertedCheck:
 
     Attributes
     ----------
-    check : simnav.contract_check.Check
+    check : simnav.testing.contract_check.Check
         The check with its name and sentence.
     """
 

@@ -30,7 +30,8 @@ BODY_RATE = 43
 ERROR_NORTH, ERROR_EAST = 46, 47
 ROLL, PITCH = 48, 49
 COS_PSI, SIN_PSI, COS_GAMMA, SIN_GAMMA = range(50, 54)
-STATE = 54
+WATER_NORTH, WATER_EAST = 54, 55
+STATE = 56
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
 # ... and in the parameters.
 DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)
@@ -197,8 +198,8 @@ def _compose(x, p, w0, w1, w2, w3, w4, w5, w6):  # type: ignore[no-untyped-def]
     if x[DEPTH_CALM] > 0.0:
         shade = exp(-p[ATTENUATION] * x[DEPTH_CALM])
         flow = max(0.0, 1.0 - p[SHEAR] * x[DEPTH_CALM])
-    v0 = x[U] * cg * cp + flow * p[CURRENT_N] + shade * w0
-    v1 = x[U] * cg * sp + flow * p[CURRENT_E] + shade * w1
+    v0 = x[U] * cg * cp + flow * x[WATER_NORTH] + shade * w0
+    v1 = x[U] * cg * sp + flow * x[WATER_EAST] + shade * w1
     v2 = -x[U] * sg + shade * w2
     roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * x[U] * x[R] * (1.0 / 9.81)
     pitch = x[GAMMA] + shade * (w5 * cp + w6 * sp)
@@ -216,9 +217,21 @@ def _compose(x, p, w0, w1, w2, w3, w4, w5, w6):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def initialise(x, p, phase, table):  # type: ignore[no-untyped-def]
-    """Complete the state at time 0: velocity and attitude with the waves as they are then."""
+@kernel()
+def _water(x, p, eddies, time):  # type: ignore[no-untyped-def]
+    """Leave the velocity of the surface water at the vessel's place in the state."""
+    north, east = p[CURRENT_N], p[CURRENT_E]
+    for i in range(eddies.shape[0]):
+        c = cos(eddies[i, 0] * x[NORTH] + eddies[i, 1] * x[EAST] - eddies[i, 2] * time + eddies[i, 3])
+        north += eddies[i, 4] * c
+        east += eddies[i, 5] * c
+    x[WATER_NORTH], x[WATER_EAST] = north, east
+
+
+@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def initialise(x, p, phase, table, eddies):  # type: ignore[no-untyped-def]
+    """Complete the state at time 0: velocity and attitude with the waves and the current as they are then."""
+    _water(x, p, eddies, 0.0)
     x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
     ahead = x[U] * x[COS_GAMMA]
     w = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], 0.0)
@@ -230,15 +243,15 @@ def initialise(x, p, phase, table):  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    "void(f8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "void(f8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
     "f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
 )
-def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force):  # type: ignore[no-untyped-def]
+def advance(x, index, p, rows, points, phase, table, eddies, tap_time, taps, rate, force):  # type: ignore[no-untyped-def]
     """Advance the world by n samples.
 
     Parameters
     ----------
-    x : (54,) array
+    x : (56,) array
         State; updated.
     index : (4,) int array
         Sample, segment, waypoint, whether the segment has begun; updated.
@@ -248,6 +261,8 @@ def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force
         The manoeuvre table.
     phase, table : arrays
         The wave components (`simnav.world.sea.components`); the phases are updated.
+    eddies : array
+        The part of the current that changes (`simnav.world.current.eddies`).
     tap_time : (m,) array
         Ascending times within the block at which the state is wanted [s].
     taps : (m, 14) array
@@ -282,6 +297,7 @@ def advance(x, index, p, rows, points, phase, table, tap_time, taps, rate, force
         x[COS_PSI], x[SIN_PSI] = cos(x[PSI]), sin(x[PSI])
         ahead = x[U] * x[COS_GAMMA]
         w0, w1, w2, w3, w4, w5, w6 = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], dt)
+        _water(x, p, eddies, t1)
         v, c, roll, pitch = _compose(x, p, w0, w1, w2, w3, w4, w5, w6)
         # Ideal instruments
         u = (x[V], x[V + 1], x[V + 2])
@@ -326,5 +342,5 @@ def _tap(out, a, x, p, v, roll, pitch, sample, c):  # type: ignore[no-untyped-de
         now = sample[i] - c[i] * sample[9] - c[6 + i] * sample[10]
         out[9 + i] = now + (a - 0.5) * (now - x[BODY_RATE + i])
     flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
-    out[12] = flow * p[CURRENT_N]
-    out[13] = flow * p[CURRENT_E]
+    out[12] = flow * x[WATER_NORTH]
+    out[13] = flow * x[WATER_EAST]

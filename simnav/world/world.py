@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.rotation import wrap_angle
+from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world import motion
-from simnav.world.current import Current
+from simnav.world.current import Current, eddies
 from simnav.world.manoeuvres import Manoeuvre, table
 from simnav.world.sea import Sea, components
 from simnav.world.vessel import Start, Vessel
@@ -52,7 +52,7 @@ class World:
     rate : float
         Samples of the ideal IMU per second [Hz].
     seed : int
-        Seed of the wave components.
+        Seed of the wave components and of what changes in the current.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class World:
         if current is not None and current.speed > 0.0:
             p[motion.CURRENT_N] = current.speed * np.cos(current.direction)
             p[motion.CURRENT_E] = current.speed * np.sin(current.direction)
-            p[motion.SHEAR] = current.shear / current.speed
+            p[motion.SHEAR] = current.shear / current.speed  # what changes falls with depth as the mean does
         if sea is not None and vessel.kind == "uuv":
             # Waves die off as exp(-k z); the wave number at the peak stands for all, to keep the motion smooth.
             p[motion.ATTENUATION] = (2.0 * np.pi / sea.peak_period) ** 2 / 9.81
@@ -93,7 +93,8 @@ class World:
         self._index = np.zeros(4, dtype=np.int64)
         self._rows, self._points = table(manoeuvres)
         self._phase, self._waves = components(sea, seed)
-        motion.initialise(self._x, self._p, self._phase, self._waves)
+        self._eddies = eddies(current, seed)
+        motion.initialise(self._x, self._p, self._phase, self._waves, self._eddies)
 
     @property
     def time(self) -> float:
@@ -136,7 +137,7 @@ class World:
         order = np.argsort(times, kind="stable")
         sorted_states = np.empty((len(times), motion.TAP_COLUMNS))
         motion.advance(
-            self._x, self._index, self._p, self._rows, self._points, self._phase, self._waves,
+            self._x, self._index, self._p, self._rows, self._points, self._phase, self._waves, self._eddies,
             times[order], sorted_states, rate, force,
         )  # fmt: skip
         states = np.empty_like(sorted_states)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import simnav
-from simnav.rotation import wrap_angle
+from simnav.geometry.rotation import wrap_angle
 from simnav.scenario import parse
 from tests.agreement.voyages import turned, voyage
 

@@ -27,8 +27,8 @@ import numpy as np
 
 import simnav
 from simnav.estimator import make
+from simnav.geometry.rotation import wrap_angle
 from simnav.recording import Recording
-from simnav.rotation import wrap_angle
 from simnav.scenario import parse
 
 __all__ = ["BEST_OF", "run", "turned", "voyage"]

@@ -206,7 +206,7 @@ def test_cost_against_the_length_of_the_window(benchmark, recording: Recording):
 
 
 def draw(costs: dict[str, dict[int, float]]) -> None:
-    """The figure of docs/window-length.png, among the results."""
+    """The figure of docs/figures/window-length.png, among the results."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simnav import earth, rotation, strapdown
+from simnav import strapdown
+from simnav.geometry import earth, rotation
 from simnav.recording import AidStream, Block, Recording
 from simnav.types import (
     KINDS,

@@ -1,4 +1,4 @@
-"""The examples of docs/estimators.md keep the contract, and the tables tell the truth."""
+"""The examples of docs/reference/estimators.md keep the contract, and the tables tell the truth."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.contract_check import check
 from simnav.estimator import describe, make, names
+from simnav.testing.contract_check import check
 
-PAGE = Path(__file__).parents[2] / "docs" / "estimators.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "estimators.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
 

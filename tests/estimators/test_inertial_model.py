@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav import earth, rotation
 from simnav.estimators.models.base import gauss_markov
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.propagation import HELD_VELOCITY, propagate_covariance
+from simnav.geometry import earth, rotation
 from simnav.scenario import load
 from simnav.simulator import ideal
 from simnav.types import Datasheet, ImuDatasheet, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet

@@ -7,10 +7,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from simnav.earth import displace
 from simnav.estimator import EstimatorError, make
 from simnav.estimators.rows.robust_windows import GaFgoPaper
 from simnav.estimators.rows.windows import SwFgoPaper
+from simnav.geometry.earth import displace
 from simnav.recording import AidStream, Recording
 from simnav.scenario import load
 from simnav.scoring import score

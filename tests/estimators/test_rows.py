@@ -9,13 +9,13 @@ import pytest
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from simnav.contract_check import check
 from simnav.estimator import UnsuitableScenario, make, names
 from simnav.estimators.filterpy_adapter import FilterpyEstimator
 from simnav.estimators.rows.dead_reckoning import DeadReckoning
 from simnav.recording import FaultLabel
 from simnav.scenario import load
 from simnav.source import record
+from simnav.testing.contract_check import check
 from simnav.types import Datasheet, Instruments
 
 
@@ -130,7 +130,7 @@ def test_the_oracle_knows_noise_and_flags(recording_of, run_over):
     gnss = recording.data.aids["gnss"]
     wild = rng.random(len(gnss)) < 0.3
     added = np.where(wild[:, None], rng.uniform(20, 60, gnss.value.shape), 0.0)
-    from simnav import earth
+    from simnav.geometry import earth
 
     faulty = replace(gnss, value=earth.displace(gnss.value, added), fault_error=added, faults=wild.astype(np.uint32))
     aids = {**recording.data.aids, "gnss": faulty}

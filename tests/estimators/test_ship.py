@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav import earth, rotation
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.rows.kalman import ShipEkf
+from simnav.geometry import earth, rotation
 from simnav.recording import AidStream, Block, Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -132,6 +132,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         ["bound", "open-sea", "-n", "1"],
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
+    "cite": (["cite"], lambda: simnav.cite().to_dict()),
     "warmup": (["warmup"], lambda: {"kernels": len(__import__("simnav.compiled").compiled.kernels())}),
 }  # fmt: skip
 
@@ -177,7 +178,7 @@ def test_names_load_with_their_first_use() -> None:
         "assert set(simnav.__all__) <= set(dir(simnav))\n"
         "simnav.run, simnav.check, simnav.load\n"
         "assert not {'gtsam', 'matplotlib', 'pyarrow', 'scipy', 'typer'} & set(sys.modules)\n"
-        "import simnav.contract_check\n"
+        "import simnav.testing.contract_check\n"
         "assert callable(simnav.check)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -274,7 +275,7 @@ class Unfinished(Estimator):
         (lambda: simnav.rank("nowhere"), "there are no results in"),
         (lambda: simnav.bound("car-kitti"), "car-kitti"),
         (lambda: simnav.reproduce("999"), "there is no paper '999'"),
-        (lambda: simnav.reproduce("001", methods=["nobody"]), "has no method 'nobody'"),
+        (lambda: simnav.reproduce("mao-2025", methods=["nobody"]), "has no method 'nobody'"),
     ],
 )
 @pytest.mark.usefixtures("here")

@@ -15,12 +15,12 @@ from simnav.scenario import Scenario, load
 from simnav.source import record
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
-CATALOGUE = [h for h in headers() if h.path.parent == FOLDER]
+CATALOGUE = [h for h in headers() if h.path.is_relative_to(FOLDER)]
 SIMULATED = [h for h in CATALOGUE if not load(h.id).recorded]
 
 
 def test_the_catalogue_is_complete():
-    assert {h.path for h in CATALOGUE} == set(FOLDER.glob("*.toml"))
+    assert {h.path for h in CATALOGUE} == {*FOLDER.glob("*.toml"), *FOLDER.glob("families/*.toml")}
     # Issue 2, item 5, and the paper that each of the six follows.
     wanted = {"open-sea", "coastal-voyage", "gnss-noise-step", "ship-dead-reckoning", "uuv-surface", "auv-survey"}
     assert wanted <= {h.name for h in CATALOGUE}
@@ -35,6 +35,7 @@ def test_every_scenario_loads_and_is_what_its_head_says(header: Header):
     scenario = load(header.id)
     assert (scenario.id, scenario.gym_id) == (header.id, header.gym_id)
     assert (scenario.duration, scenario.title, scenario.tags) == (header.duration, header.title, header.tags)
+    assert (scenario.track, scenario.group) == (header.track, header.group)
     assert header.path.stem in (scenario.name, scenario.id)
     assert load(header.path) == scenario
 
@@ -55,6 +56,9 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
     assert scenario.recorded or re.match(r"(ours|paper 00[0-4])\b", scenario.source)
     assert scenario.source
     assert scenario.tags
+    assert scenario.track in ("aided-ins", "no-imu", "underwater", "generalisation", "training", "recorded", "papers")
+    assert scenario.training == header.training == (scenario.track == "training")
+    assert scenario.group != "other"
 
 
 @pytest.mark.parametrize("header", SIMULATED, ids=lambda h: h.id)
@@ -204,5 +208,5 @@ def test_the_catalogue_is_packaged():
     """The wheel takes the files that pyproject.toml names."""
     with (FOLDER.parent / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)
-    assert project["tool"]["setuptools"]["package-data"]["simnav.scenarios"] == ["*.toml"]
+    assert project["tool"]["setuptools"]["package-data"]["simnav.scenarios"] == ["*.toml", "families/*.toml"]
     assert project["project"]["entry-points"]["simnav.scenarios"] == {"simnav": "simnav.scenarios"}

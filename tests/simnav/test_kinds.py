@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav import earth
+from simnav.geometry import earth
 from simnav.kinds import EQUATIONS, KINDS, Component, Kind, geodetic_components, kinds_with
 from simnav.plugins import PluginError
 from simnav.sensors import instrument_specs

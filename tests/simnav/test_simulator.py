@@ -9,9 +9,9 @@ import sys
 import numpy as np
 import pytest
 
-from simnav.earth import displace
+from simnav.geometry.earth import displace
+from simnav.geometry.rotation import dcm_from_rpy
 from simnav.recording import Block, Recording
-from simnav.rotation import dcm_from_rpy
 from simnav.scenario import Scenario, load, names
 from simnav.simulator import Simulator, ideal, sample_times, simulate, simulate_many
 from simnav.spec import SpecError
@@ -113,7 +113,7 @@ def test_runs_that_share_one_truth_are_the_runs_themselves():
 
 
 def test_initial_errors_are_drawn_from_their_covariance():
-    from simnav.earth import relative_position
+    from simnav.geometry.earth import relative_position
 
     scenario = shortened("open-sea", 1.0)
     sigma = np.array(scenario.initial_error.position)

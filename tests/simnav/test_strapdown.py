@@ -10,8 +10,8 @@ import pyins.sim
 import pyins.strapdown
 import pytest
 
-from simnav import earth
-from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.geometry import earth
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.strapdown import increments, integrate
 from simnav.types import ImuSamples, NavigationStates
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.earth import displace
 from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.geometry.earth import displace
 from simnav.recording import AidStream, Block, Recording
 from simnav.trial import DIVERGENCE_LIMIT, run_trial
 from simnav.types import (

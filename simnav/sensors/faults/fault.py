@@ -7,7 +7,7 @@ of variates per measurement, those counted that something else has dropped, so t
 Bits: a fault takes one bit of the labels, and one `FaultLabel`, per interval in ``intervals``, consecutive; a fault
 with a start and an end, or with random intervals, takes one.
 
-`register_fault` makes a kind of fault known, ours and others' alike (``docs/instruments.md``).
+`register_fault` makes a kind of fault known, ours and others' alike (``docs/how-to/add-an-instrument.md``).
 """
 
 from __future__ import annotations

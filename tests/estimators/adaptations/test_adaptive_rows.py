@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav.earth import displace
 from simnav.estimator import EstimatorError, UnsuitableScenario, find, make, names
+from simnav.geometry.earth import displace
 from simnav.scenario import load
 from simnav.source import record
 from simnav.trial import run_trial

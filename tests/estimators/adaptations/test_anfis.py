@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.earth import relative_position
 from simnav.estimator import make
 from simnav.estimators.adaptations.anfis import Anfis, Features, Motion
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters, ParametersError, shipped
@@ -26,6 +25,7 @@ from simnav.estimators.training.anfis_training import (
     scenarios,
     train,
 )
+from simnav.geometry.earth import relative_position
 from simnav.scenario import load, parse
 from simnav.scoring import score
 from simnav.source import record

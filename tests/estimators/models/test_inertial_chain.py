@@ -9,8 +9,8 @@ from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
 from simnav.estimators.models.nine_state import NineStateModel
+from simnav.geometry.rotation import dcm_from_rotation_vector, left_jacobian, rotation_vector_from_dcm
 from simnav.recording import Recording
-from simnav.rotation import dcm_from_rotation_vector, left_jacobian, rotation_vector_from_dcm
 from simnav.scenario import load
 from simnav.source import record
 from simnav.types import Array

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav import earth
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_chain import ShipChain
 from simnav.estimators.rows.kalman import ShipEkf
 from simnav.estimators.rows.smoothers import ShipEkfRts
 from simnav.estimators.rows.windows import ShipFgo, ShipFgoFull
+from simnav.geometry import earth
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

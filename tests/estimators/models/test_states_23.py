@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav import earth, rotation
 from simnav.estimator import UnsuitableScenario, make
 from simnav.estimators.models.dvl_calibration import DELAY, LEVER_ARM, MISALIGNMENT, SCALE, DvlCalibrationModel
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.rows.kalman import Ekf9, Ekf23
+from simnav.geometry import earth, rotation
 from simnav.types import Datasheet, Instruments, Measurement
 
 LEVER = np.array([2.0, -1.0, -8.0])

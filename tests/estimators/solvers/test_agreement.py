@@ -28,8 +28,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simnav import earth, rotation
 from simnav.estimator import Estimator, make
+from simnav.geometry import earth, rotation
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -17,11 +17,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simnav import earth, rotation
 from simnav.estimator import make
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.propagation import propagate_covariance
 from simnav.estimators.solvers.federated import FederatedEstimator
+from simnav.geometry import earth, rotation
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.scoring import nees_band

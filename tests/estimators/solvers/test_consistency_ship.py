@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav import earth, rotation
 from simnav.estimator import make
 from simnav.estimators.models.ship import ShipModel
+from simnav.geometry import earth, rotation
 from simnav.recording import AidStream, Block, Recording
 from simnav.types import Datasheet, InitialState, Instruments, NavigationStates
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav import earth
 from simnav.estimator import EstimatorError, UnsuitableScenario, make
+from simnav.geometry import earth
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav import earth, rotation, strapdown
+from simnav import strapdown
 from simnav.estimator import make
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.gtsam_graph import InertialGraph
 from simnav.estimators.solvers.gtsam_solvers import FixedLagEstimator
 from simnav.estimators.solvers.tangent_frame import TangentFrame
+from simnav.geometry import earth, rotation
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record

@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from simnav import earth
 from simnav.estimators.rows.kalman import Ekf, InvariantEkf
-from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm, skew
+from simnav.geometry import earth
+from simnav.geometry.rotation import (
+    dcm_from_rotation_vector,
+    dcm_from_rpy,
+    rotation_vector_from_dcm,
+    rpy_from_dcm,
+    skew,
+)
 from simnav.types import Datasheet, Instruments, Measurement
 
 DEG = np.pi / 180.0

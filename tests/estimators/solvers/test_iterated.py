@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from simnav.estimator import make
 from simnav.estimators.rows.kalman import Ekf, IteratedEkf
-from simnav.rotation import left_jacobian, rotation_vector_from_dcm, skew
+from simnav.geometry.rotation import left_jacobian, rotation_vector_from_dcm, skew
 from simnav.types import Datasheet, Instruments, Measurement, Measurements
 
 ARM = np.array([30.0, 4.0, -10.0])
@@ -66,7 +66,7 @@ def test_it_finds_the_maximum_a_posteriori(recording_of, case: str):
     for _ in range(3):  # Newton on the value that the truth would give
         e = innovation(truth, value)
         if sheet is GNSS:
-            from simnav.earth import displace
+            from simnav.geometry.earth import displace
 
             value = displace(value, -e)
         else:

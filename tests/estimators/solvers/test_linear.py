@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav import earth, rotation, strapdown
+from simnav import strapdown
 from simnav.estimator import make
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.rows.kalman import Kf
+from simnav.geometry import earth, rotation
 from simnav.types import ImuDatasheet, TriadDatasheet
 
 DEG = np.pi / 180.0

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simnav import earth, rotation
 from simnav.estimator import EstimatorError, make
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
@@ -17,6 +16,7 @@ from simnav.estimators.models.points import PointModel
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.sigma_point import SigmaPointEstimator, draw_points
+from simnav.geometry import earth, rotation
 from simnav.types import (
     Datasheet,
     Estimate,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav import earth
 from simnav.estimator import UnsuitableScenario, make
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.models.inertial import InertialModel
@@ -14,6 +13,7 @@ from simnav.estimators.solvers.iterated import Iteration
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.estimators.solvers.two_filter import TwoFilterSmoother
+from simnav.geometry import earth
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.simulator import simulate

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav import earth, rotation
 from simnav.estimator import Estimator, make
+from simnav.geometry import earth, rotation
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.source import record

@@ -22,6 +22,7 @@ from simnav.leaderboard.campaign.campaign import CampaignError, Progress, run_ca
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.store import Result, StoreError
 from simnav.scenario import Scenario, load, parse
 from simnav.warmup import warmup
@@ -161,6 +162,10 @@ def test_one_worker_and_two_give_the_same_and_a_second_start_does_nothing(tmp_pa
     assert told[-1].done == told[-1].total == 12
     more = run_campaign(scenarios, requests, range(4), tmp_path / "1", workers=1)
     assert (more.skipped, more.computed) == (12, 4)
+    found = store.load(tmp_path / "1")
+    assert {r.provenance.benchmark for r in found} == {BENCHMARK}
+    assert len({(r.estimator_digest, r.estimator) for r in found}) == len(requests)
+    assert {r.scenario_digest for r in found} == {s.content_hash() for s in scenarios}
 
 
 RUN = """

@@ -158,7 +158,7 @@ def test_a_docstring_and_the_chart_keep_the_recordings_and_a_constant_changes_th
     assert not after(edit, library / "scoring" / "outages.py", "RECOVERY_THRESHOLD = 10.0", "RECOVERY_THRESHOLD = 11.0")
     assert not after(edit, library / "trial.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3")
     assert after(edit, library / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0")
-    assert after(constant, library / "earth.py")  # imported indirectly
+    assert after(constant, library / "geometry" / "earth.py")  # imported indirectly
     assert after(constant, library / "log" / "nmea.py")
     assert after(constant, library / "sensors" / "faults" / "additive.py")
 

@@ -161,10 +161,11 @@ def test_files_beside_a_notebook_count_but_not_what_is_installed(
     monkeypatch.syspath_prepend(tmp_path)
     helper = tmp_path / "beside_a_notebook.py"
     helper.write_text("GAIN = 1\n")
-    text = "import json\nimport numpy as np\nimport beside_a_notebook as b\nfrom simnav.earth import displace\n"
+    text = "import json\nimport numpy as np\nimport beside_a_notebook as b\n"
+    text += "from simnav.geometry.earth import displace\n"
     text += "class Mine:\n    def f(self):\n        return np.ones(b.GAIN), json.dumps(1), displace\n"
     made = session(text)
-    assert source_of(made.Mine)[1] == ["beside_a_notebook", "json", "numpy", "simnav.earth"]
+    assert source_of(made.Mine)[1] == ["beside_a_notebook", "json", "numpy", "simnav.geometry.earth"]
     before = estimator_source(made.Mine)
     (tmp_path / "unrelated.py").write_text("1\n")
     assert estimator_source(made.Mine) == before

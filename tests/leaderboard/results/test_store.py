@@ -279,7 +279,7 @@ def test_a_folder_of_another_format_is_left_alone(folder: Path) -> None:
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 99, "simnav": "9.0"}))
     before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()}
     for action in (store.create, store.load, store.compact, store.keys, lambda f: store.select(f, {})):
-        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 2"):
+        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 4"):
             action(folder)
     assert {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()} == before
 
@@ -348,21 +348,32 @@ def test_results_are_dropped_wherever_they_are(folder: Path) -> None:
     assert [r.scores["horizontal_rmse"] for r in store.load(folder)] == [1.0, 9.0, 3.0, 4.0, 5.0]
 
 
-def test_results_of_format_1_are_read(folder: Path) -> None:
-    """They have no limits."""
+@pytest.mark.parametrize(
+    ("version", "missing", "ending"),
+    [
+        (1, ["time_limit", "memory_limit", "scoring"], ("ok", 0.0, 0, "")),
+        (2, [], ("ok", 60.0, 1 << 30, "{}")),
+    ],
+)
+def test_results_of_older_formats_are_read(
+    folder: Path, version: int, missing: list[str], ending: tuple[Any, ...]
+) -> None:
+    """What they do not have is not known."""
     import pyarrow.parquet as pq
 
     store.write(folder, result(0))
     (path,) = loose(folder)
-    new = pq.read_table(path)
-    old = new.drop_columns(["time_limit", "memory_limit", "scoring"]).replace_schema_metadata({"simnav_results": "1"})
-    pq.write_table(old, path)
+    since_3, since_4 = ["scenario_digest", "estimator_digest", "provenance"], ["draws"]
+    old = pq.read_table(path).drop_columns(missing + since_3 + since_4)
+    pq.write_table(old.replace_schema_metadata({"simnav_results": str(version)}), path)
     marker = folder / "simnav-results.json"
-    marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 1}))
-    assert store.keys(folder) == {"ekfr1-0": ("ok", 0.0, 0, "")}
+    marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": version}))
+    assert store.keys(folder) == {"ekfr1-0": ending}
     store.write(folder, result(1))
     store.compact(folder)
-    assert [(r.seed, r.time_limit) for r in store.load(folder)] == [(0, 0.0), (1, 60.0)]
+    assert [(r.seed, r.time_limit) for r in store.load(folder)] == [(0, ending[1]), (1, 60.0)]
+    assert [r.provenance.id for r in store.load(folder)] == ["", ""]
+    assert [r.draws for r in store.load(folder)] == [{}, {}]
 
 
 def test_scores_are_replaced_wherever_they_are(folder: Path) -> None:

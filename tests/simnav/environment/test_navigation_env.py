@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 
 import simnav
 from simnav.catalogue import headers
-from simnav.earth import displace
 from simnav.environment import EstimatorAgent, NavigationEnv, unpack
 from simnav.environment import navigation as environment
 from simnav.estimator import Estimator, make, names
+from simnav.geometry.earth import displace
 from simnav.log import LogError
 from simnav.recording import AidStream, Block, packets
 from simnav.scenario import load, parse

@@ -7,9 +7,9 @@ import logging
 import numpy as np
 import pytest
 
-from simnav.earth import displace
 from simnav.environment import rendering
 from simnav.environment.rendering import Chart, Trace
+from simnav.geometry.earth import displace
 
 START = np.array([0.9, 0.1, 0.0])
 

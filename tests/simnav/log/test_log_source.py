@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.earth import displace, relative_position
+from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.rotation import dcm_from_rpy
 from simnav.log import LogError, LogSource, LogWarning
 from simnav.recording import Block
-from simnav.rotation import dcm_from_rpy
 from simnav.strapdown import integrate
 
 from .conftest import CLOCK, RATE, write_csv

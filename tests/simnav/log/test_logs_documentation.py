@@ -1,4 +1,4 @@
-"""docs/logs.md stays true: its example runs on files like those that it shows."""
+"""docs/how-to/use-your-own-log.md stays true: its example runs on files like those that it shows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from simnav.log import LogSource
 from simnav.scenario import parse
 
-TEXT = (Path(__file__).resolve().parents[3] / "docs" / "logs.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).resolve().parents[3] / "docs" / "how-to" / "use-your-own-log.md").read_text(encoding="utf-8")
 
 
 def block(start: str) -> str:

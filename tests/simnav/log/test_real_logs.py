@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.earth import relative_position
+from simnav.geometry.earth import relative_position
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.log import LogSource, LogWarning
 from simnav.log.nmea import read_nmea
-from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.scenario import load
 from simnav.strapdown import integrate
 

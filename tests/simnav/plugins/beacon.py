@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from simnav.earth import displace, relative_position
+from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.rotation import wrap_angle
 from simnav.kinds import Component, Kind
-from simnav.rotation import wrap_angle
 from simnav.sensors import AidSpec, Instrument, register_instrument
 from simnav.spec import NonNegative, Positive, Vector, quantity
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.earth import displace
+from simnav.geometry.earth import displace
+from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.recording import AidStream, Block, FaultLabel, Recording
-from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.trial import Trial
 from simnav.types import Datasheet, InitialState, Instruments, NavigationStates
 

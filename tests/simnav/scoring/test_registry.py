@@ -127,6 +127,6 @@ def test_a_score_reaches_another_process() -> None:
 
 
 def test_the_file_of_the_documentation_is_the_one_that_is_tested() -> None:
-    text = (Path(__file__).parents[3] / "docs" / "scores.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "how-to" / "add-a-score.md").read_text(encoding="utf-8")
     code = PLUGIN.read_text(encoding="utf-8").split("import numpy", 1)[1]
     assert f"import numpy{code}" in text

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simnav import earth
-from simnav.rotation import dcm_from_rpy
+from simnav.geometry import earth
+from simnav.geometry.rotation import dcm_from_rpy
 from simnav.sensors import (
     AidSpec,
     Depth,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simnav import earth
+from simnav.geometry import earth
 from simnav.recording import AidStream
 from simnav.sensors.faults import AnyFault, build_layers, labels
 from simnav.spec import Spec, SpecError

@@ -1,4 +1,4 @@
-"""docs/instruments.md stays true: its files are those that the tests load, its tables hold what the code knows."""
+"""The guide to instruments stays true: its files are those of the tests, its tables hold what the code knows."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from simnav.kinds import EQUATIONS, Kind, Role
 from simnav.sensors.faults import Effect
 
-TEXT = (Path(__file__).parents[3] / "docs" / "instruments.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[3] / "docs" / "how-to" / "add-an-instrument.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", ["beacon.py", "echo.py", "lagoon.toml"])

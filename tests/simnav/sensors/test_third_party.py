@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from simnav.contract_check import check, contract_recording
-from simnav.earth import displace, relative_position
 from simnav.environment import NavigationEnv
+from simnav.geometry.earth import displace, relative_position
 from simnav.kinds import Component, Kind
 from simnav.plugins import PluginError, load_plugin
 from simnav.recording import Recording
@@ -22,6 +21,7 @@ from simnav.sensors.faults import BiasStep, NoiseStep, effect_of
 from simnav.simulator import ideal
 from simnav.source import record
 from simnav.spec import SpecError, quantity
+from simnav.testing.contract_check import check, contract_recording
 from simnav.types import KINDS, Datasheet
 
 PLACE = np.array([np.radians(54.002), np.radians(7.9), -20.0])

@@ -1,4 +1,4 @@
-"""The examples of docs/testing.md work as they stand."""
+"""The examples of docs/how-to/test-your-estimator.md work as they stand."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from simnav.contract_check import CHECKS
+from simnav.testing.contract_check import CHECKS
 
-TEXT = (Path(__file__).parents[3] / "docs" / "testing.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[3] / "docs" / "how-to" / "test-your-estimator.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
 FILES = {m[1]: text for text in EXAMPLES if (m := re.match(r"# (\w+\.py)\n", text))}
 COMMANDS = re.findall(r"^simnav (bench .*?)\s*(?:#.*)?$", TEXT, flags=re.MULTILINE)

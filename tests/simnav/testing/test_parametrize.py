@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from simnav.contract_check import CHECKS
 from simnav.testing import parametrize_with_checks, parametrize_with_rows
+from simnav.testing.contract_check import CHECKS
 from simnav.testing.given import given
 
 MODULE = '''

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simnav.earth import relative_position
-from simnav.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.geometry.earth import relative_position
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.strapdown import integrate
 from simnav.world import (
     Accelerate,
@@ -267,3 +267,21 @@ def test_time_does_not_go_back():
 def test_contradictions_are_named(make, sentence):
     with pytest.raises(ValueError, match=sentence):
         make()
+
+
+def test_a_current_changes_with_time_and_place():
+    """Spread as stated over runs; smooth; the truth and the water agree."""
+    still = Start(latitude=0.9, longitude=0.1, speed=0.0)
+    current = Current(speed=0.4, direction=0.5, variation=0.15, length_scale=500.0, time_scale=900.0)
+    drift = np.array([
+        World(still, Vessel(), current=current, rate=1.0, seed=k).state().velocity[0] for k in range(400)
+    ])  # fmt: skip
+    mean = 0.4 * np.array([np.cos(0.5), np.sin(0.5)])
+    np.testing.assert_allclose(drift[:, :2].mean(axis=0), mean, atol=5 * 0.15 / 20.0)
+    np.testing.assert_allclose(drift[:, :2].std(axis=0), 0.15, rtol=0.15)
+    world = World(Start(latitude=0.9, longitude=0.1, speed=4.0), Vessel(), current=current, rate=20.0, seed=1)
+    tap = world.advance(600.0, {"a": np.arange(1.0, 601.0)}).taps["a"]
+    through = tap.velocity - tap.water_velocity
+    np.testing.assert_allclose(np.hypot(through[:, 0], through[:, 1]), 4.0, rtol=1e-6)
+    assert np.ptp(tap.water_velocity[:, 0]) > 0.1
+    assert np.abs(np.diff(tap.water_velocity[:, 0])).max() < 0.02

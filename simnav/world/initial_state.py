@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.earth import displace
-from simnav.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
+from simnav.geometry.earth import displace
+from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.streams import stream
 from simnav.types import Array, InitialState, NavigationStates
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simnav import earth
+from simnav.geometry import earth
 
 LATITUDES = np.radians(np.linspace(-89.0, 89.0, 41))
 

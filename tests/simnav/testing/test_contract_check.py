@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.contract_check import CHECKS, Candidate, check, contract_recording
 from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.testing.contract_check import CHECKS, Candidate, check, contract_recording
 from simnav.types import KINDS, Estimate
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from simnav import rotation
+from simnav.geometry import rotation
 
 angles = st.floats(-3.1, 3.1)
 vectors = st.tuples(*[st.floats(-1.8, 1.8)] * 3).map(np.array)

@@ -1,0 +1,107 @@
+"""The tables of ``docs/papers``, written from the stored results.
+
+``python -m simnav.leaderboard.papers.documentation`` writes them. Each page has a marked block for each of these:
+``citation``, ``tables`` and ``contents``; the overview has ``overview``. The text between the marks is replaced, and
+everything else is written by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from simnav.leaderboard.papers import PAPERS
+from simnav.leaderboard.papers import paper as papers
+from simnav.leaderboard.papers.contents import contents
+from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Paper
+from simnav.leaderboard.papers.report import sheets, verdicts
+from simnav.leaderboard.papers.stored import load, provenance
+
+__all__ = ["FOLDER", "blocks", "overview", "replaced", "update"]
+
+#: Where the pages are, in a checkout of the repository.
+FOLDER = Path(__file__).resolve().parents[2] / "docs" / "papers"
+
+
+def update(folder: Path = FOLDER) -> None:
+    """Write the marked blocks of all pages."""
+    pages = {f"{key}.md": blocks(papers.load(key)) for key in PAPERS} | {"index.md": {"overview": overview()}}
+    for name, texts in pages.items():
+        path = folder / name
+        path.write_text(replaced(path.read_text(encoding="utf-8"), texts), encoding="utf-8")
+
+
+def replaced(page: str, texts: dict[str, str]) -> str:
+    """A page with new texts between its marks.
+
+    >>> print(replaced("a\\n<!-- x: begin -->\\nold\\n<!-- x: end -->\\nb", {"x": "new"}))
+    a
+    <!-- x: begin -->
+    <BLANKLINE>
+    new
+    <BLANKLINE>
+    <!-- x: end -->
+    b
+    """
+    for name, text in texts.items():
+        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+        before, _, rest = page.partition(begin)
+        _, found, after = rest.partition(end)
+        if found:
+            page = f"{before}{begin}\n\n{text}\n\n{end}{after}"
+    return page
+
+
+def blocks(paper: Paper) -> dict[str, str]:
+    """The marked blocks of a paper's page: name -> Markdown."""
+    found = load(paper)
+    where = provenance(paper)
+    versions = ", ".join(f"{name} {where[name]}" for name in ("simnav", "python", "numpy", "numba", "gtsam"))
+    tables = [
+        "\n".join(f"- {plural[0].upper()}{plural[1:]}: {text}." for kind, plural in KINDS_OF_ROWS.items()
+                  if (text := verdicts(found, kind))),
+        f"Computed on {where['date']} with {versions}, on {where['processor']}.",
+    ]  # fmt: skip
+    for sheet in sheets(found):
+        number = f"{sheet.number}: " if sheet.number else ""
+        head = [c.title for c in sheet.columns]
+        rule = ["--:" if c.numeric else "---" for c in sheet.columns]
+        lines = [_line(cells) for cells in (head, rule, *(row.cells for row in sheet.rows))]
+        tables += [f"### {number}{sheet.title}", "\n".join(lines), "\n".join(f"- {note}" for note in sheet.notes)]
+    return {
+        "citation": _citation(paper),
+        "tables": "\n\n".join(text for text in tables if text),
+        "contents": _contents(paper),
+    }
+
+
+def overview() -> str:
+    """A table of the papers with the verdicts on their rows."""
+    lines = [_line(("paper", "comparison", *KINDS_OF_ROWS.values())), _line(("---",) * (2 + len(KINDS_OF_ROWS)))]
+    for key in PAPERS:
+        paper = papers.load(key)
+        found = load(paper)
+        counts = (verdicts(found, kind) or "none" for kind in KINDS_OF_ROWS)
+        lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, *counts)))
+    return "\n".join(lines)
+
+
+def _citation(paper: Paper) -> str:
+    doi = f" doi: [{paper.doi}](https://doi.org/{paper.doi})." if paper.doi else " No DOI is known."
+    return f"{paper.authors}: *{paper.title}*. {paper.published}.{doi}"
+
+
+def _contents(paper: Paper) -> str:
+    lines = [_line(("paper", "subject", "ours")), _line(("---",) * 3)]
+    for item in contents(paper):
+        lines.append(_line((item.number, item.what, "; ".join(item.shown) or f"not shown: {item.why}")))
+    return "\n".join(lines)
+
+
+def _line(cells: Iterable[str]) -> str:
+    texts = [c.replace("|", "\\|") for c in cells]
+    return f"| {' | '.join(texts)} |"
+
+
+if __name__ == "__main__":
+    update()

@@ -1,0 +1,229 @@
+"""Guo et al. (2026): KF, EKF, UKF and two sliding-window graphs on a ship with INS, GNSS and DVL."""
+
+from __future__ import annotations
+
+from simnav.leaderboard.papers.declarations import drawings, error_figures, measured
+from simnav.leaderboard.papers.paper import (
+    ATTITUDE,
+    POSITION,
+    VELOCITY,
+    Figure,
+    Gain,
+    Method,
+    NotShown,
+    Paper,
+    Row,
+    Table,
+    Value,
+)
+
+__all__ = ["PAPER"]
+
+_SCENARIO, _BIAS = "coastal-voyage", "window-bias"
+_COST = "the two figures come from different computers and programming languages"
+_OPEN_LOOP = (
+    "our KF is a linear filter in open loop, so that its inertial navigation is never corrected. With gyros of 3 deg/h "
+    "its error leaves the range of the linear model within 100 minutes. The paper's KF must have had feedback"
+)
+_STATES = (
+    "our UKF has 15 states, among them the biases of the IMU. The paper's filters have nine states and no biases, like "
+    "our nine-state EKF, whose figure agrees with the paper's"
+)
+_MEMORY = "our figure includes the libraries and the record of the run, which are the same for all methods"
+_VELOCITY = "the nine-state model has no IMU biases, and the paper's model has a DVL sigma of 0.1 m/s"
+_DISTURBED = "the sea trial is not public: the size of the GNSS errors near the shore is our choice"
+_WINDOW = (
+    "the paper's track, faults and noise are not public. In our simulation a sliding window gains nothing over a "
+    "filter with the same states"
+)
+_LINEAR = (
+    "both filters have the same states and errors for which the model is almost linear, so both give the same result"
+)
+
+# Method -> estimators with the same states and noise: EKF, SW-FGO, and GA-FGO with printed and whitened weights.
+_MODELS = {
+    "9 states": ("ekf-9", "sw-fgo-paper", "ga-fgo-paper", "ga-fgo-paper:preset=default"),
+    "9 states, datasheet noise": tuple(
+        f"{name}sigma_gnss_horizontal=0,sigma_gnss_vertical=0,sigma_dvl=0"
+        for name in ("ekf-9:", "sw-fgo-paper:", "ga-fgo-paper:", "ga-fgo-paper:preset=default,")
+    ),
+    "15 states": ("ekf", "sw-fgo", "ga-fgo:preset=paper", "ga-fgo"),
+}
+_ROLES = ("EKF", "SW-FGO", "GA-FGO, printed weights", "GA-FGO, whitened weights")
+# The paper's methods and our main alternatives have shorter names.
+_SHORT = {
+    "EKF, 9 states": "EKF",
+    "SW-FGO, 9 states": "SW-FGO",
+    "GA-FGO, printed weights, 9 states": "GA-FGO",
+    "GA-FGO, whitened weights, 15 states": "GA-FGO, 15 states",
+}
+_FACTORS = {(role, model): _SHORT.get(f"{role}, {model}", f"{role}, {model}") for model in _MODELS for role in _ROLES}
+
+_FOUR = ("EKF", "UKF", "SW-FGO", "GA-FGO")
+_ALL = ("KF", "EKF", "EKF, 15 states", "UKF", "SW-FGO", "SW-FGO, 15 states", "GA-FGO", "GA-FGO, 15 states")
+_RIVALS = ("EKF, 15 states", "SW-FGO, 15 states", "GA-FGO, 15 states", "Huber", "Tukey", "DCS", "GNC")
+
+
+def _effects() -> tuple[Row, ...]:
+    """The effect of the weights, for each model; then the effect of the model, for each kind of weights."""
+    weights = tuple(
+        Gain(_SCENARIO, _FACTORS[role, model], _FACTORS["SW-FGO", model], "position_rmse")
+        for role in _ROLES[2:]
+        for model in _MODELS
+    )
+    first, noise, states = _MODELS
+    models = tuple(
+        Gain(_SCENARIO, _FACTORS[role, b], _FACTORS[role, a], "position_rmse")
+        for role in _ROLES[1:]
+        for a, b in ((first, noise), (noise, states))
+    )
+    return (*weights, *models, *measured(_SCENARIO, _FACTORS.values(), ("position_rmse",)))
+
+
+def _gain(method: str, than: str, paper: float, *, derived: bool = False, lower: str = _WINDOW) -> Gain:
+    return Gain(_SCENARIO, method, than, "position_rmse", paper, derived=derived, lower=lower, higher=_DISTURBED)
+
+
+def _position(method: str, paper: float, **how: str | bool) -> Value:
+    return Value(_SCENARIO, method, "position_rmse", paper, **{"lower": _DISTURBED, "higher": _DISTURBED, **how})  # type: ignore[arg-type]
+
+
+PAPER = Paper(
+    key="guo-2026",
+    authors="M. Guo, B. Wang, L. Wei, M. Zhang, C. Zhang and H. Lu",
+    short="Guo et al. (2026)",
+    title="Robust INS/GNSS/DVL integrated navigation for MASS based on gradient-adaptive factor graph optimization",
+    published="Preprints 2026 (compared here); Electronics 15(3), 634, 2026",
+    doi="10.20944/preprints202601.1976.v1",
+    about="a ship with INS, GNSS and DVL: Kalman filters and gradient-adaptive factor graphs",
+    runs=6,
+    full=50,
+    methods=(
+        Method("KF", ("kf",)),
+        Method("UKF", ("ukf",)),
+        *(
+            Method(_FACTORS[role, model], (row,))
+            for model, rows in _MODELS.items()
+            for role, row in zip(_ROLES, rows, strict=True)
+        ),
+        Method("Huber", ("huber-fgo",)),
+        Method("Tukey", ("tukey-fgo",)),
+        Method("DCS", ("dcs-fgo",)),
+        Method("GNC", ("gnc-fgo",)),
+    ),
+    tables=(
+        Table(
+            "Position RMSE",
+            (
+                _position("KF", 3.84, higher=_OPEN_LOOP),
+                _position("EKF", 3.86),
+                _position("UKF", 3.70, derived=True, lower=_STATES),
+                _position("SW-FGO", 3.33, derived=True),
+                _position("GA-FGO", 3.26),
+                *measured(
+                    _SCENARIO, ("EKF, 15 states", "SW-FGO, 15 states", "GA-FGO, 15 states"), ("position_rmse",)
+                ),
+            ),
+            "Figure 7",
+        ),
+        Table(
+            "Gain of GA-FGO, and the gains of other methods that follow",
+            (
+                Gain(_SCENARIO, "GA-FGO", "KF", "position_rmse", 0.151, higher=_OPEN_LOOP),
+                _gain("GA-FGO", "EKF", 0.156),
+                _gain("GA-FGO", "UKF", 0.120, lower=_STATES),
+                _gain("GA-FGO", "SW-FGO", 0.021),
+                Gain(_SCENARIO, "SW-FGO", "EKF", "position_rmse", 0.1373, derived=True, lower=_WINDOW),
+                Gain(_SCENARIO, "KF", "EKF", "position_rmse", 0.005, derived=True, lower=_OPEN_LOOP),
+                _gain("UKF", "EKF, 15 states", 0.0415, derived=True, lower=_LINEAR),
+                _gain("GA-FGO, 15 states", "EKF, 15 states", 0.156, derived=True),
+                _gain("GA-FGO, 15 states", "UKF", 0.120, derived=True),
+                _gain("GA-FGO, 15 states", "SW-FGO, 15 states", 0.021, derived=True),
+            ),
+            "Figure 11",
+        ),
+        Table("Beyond the paper: the effects of weights, measurement noise and states", _effects()),
+        Table(
+            "Statements of the text on the error curves",
+            (
+                *(
+                    Value(_SCENARIO, m, score, bound, rule="at-least", lower=_DISTURBED)
+                    for score, bound in (("north_max", 8.0), ("east_max", 8.0), ("horizontal_max", 10.0))
+                    for m in ("EKF", "UKF")
+                ),
+                *(
+                    Value(_SCENARIO, m, f"velocity_{axis}_rmse", 0.05, rule="at-most", derived=True, higher=_VELOCITY)
+                    for m in ("GA-FGO", "GA-FGO, 15 states")
+                    for axis in ("north", "east", "vertical")
+                ),
+                *measured(_SCENARIO, _ALL, ("velocity_horizontal_rmse", "level_rmse", "heading_rmse")),
+            ),
+        ),
+        Table(
+            "Beyond the paper: a GNSS bias of 25 m for 100 s, longer than any window",
+            measured(_BIAS, _RIVALS, ("horizontal_rmse", "horizontal_max")),
+        ),
+        Table(
+            "Cost of an epoch",
+            (
+                *(
+                    Value(_SCENARIO, m, score, bound, rule="at-most", higher=why)
+                    for score, why, bounds in (
+                        ("update_mean", _COST, (8.2, 15.6, 11.8, 12.3)),
+                        ("peak_memory", _MEMORY, (12.0, 18.0, 42.0, 45.0)),
+                    )
+                    for m, bound in zip(
+                        ("EKF, 15 states", "UKF", "SW-FGO, 15 states", "GA-FGO, 15 states"), bounds, strict=True
+                    )
+                ),
+                *measured(_SCENARIO, ("EKF", "SW-FGO", "GA-FGO"), ("update_mean", "peak_memory")),
+            ),
+            "Table 3",
+        ),
+    ),
+    figures=(
+        Figure("Figure 3", "Trajectories", "track", _SCENARIO, _FOUR),
+        *error_figures(
+            _SCENARIO,
+            _FOUR,
+            {
+                "Figure 4": ("Position errors", POSITION),
+                "Figure 5": ("Velocity errors", VELOCITY),
+                "Figure 6": ("Attitude errors", ATTITUDE),
+            },
+        ),
+        Figure("Figure 7", "Position RMSE, total and by axis", "bars", _SCENARIO, _ALL,
+               {"Position [m]": "position_rmse", "North [m]": "north_rmse", "East [m]": "east_rmse",
+                "Down [m]": "vertical_rmse"}),
+        Figure("Figure 8", "Error magnitudes", "run", _SCENARIO, _FOUR,
+               {"Position error [m]": "position", "Velocity error [m/s]": "velocity",
+                "Attitude error [deg]": "attitude"}),
+        Figure("Figure 8", "Error magnitudes", "spread", _SCENARIO, _ALL[1:],
+               {"Horizontal error [m]": "horizontal", "Velocity error [m/s]": "velocity",
+                "Heading error [deg]": "heading"}, "all runs"),
+        Figure("Figure 9", "Normalised residuals of the factors of GA-FGO", "run", _SCENARIO,
+               ("GA-FGO", "GA-FGO, 15 states"),
+               {"Motion": "residual.motion", "GNSS": "residual.gnss", "DVL": "residual.dvl"}),
+        Figure("Figure 10", "Weights of the factors of GA-FGO", "run", _SCENARIO, ("GA-FGO", "GA-FGO, 15 states"),
+               {"Motion": "weight.motion", "GNSS": "weight.gnss", "DVL": "weight.dvl"}),
+        Figure("Figure 11", "Gain of GA-FGO", "gains", _SCENARIO, ("GA-FGO", "KF", "EKF", "UKF", "SW-FGO"),
+               {"Gain in position RMSE [%]": "position_rmse"}, "a"),
+        Figure("Figure 11", "Gain of GA-FGO", "gains", _SCENARIO,
+               ("GA-FGO, 15 states", "EKF, 15 states", "UKF", "SW-FGO, 15 states"),
+               {"Gain in position RMSE [%]": "position_rmse"}, "15 states"),
+        Figure("Figure 11", "Distribution of the position error", "distribution", _SCENARIO, _ALL[1:], part="b"),
+        Figure("", "A bias of 25 m for 100 s", "spread", _BIAS, _RIVALS, {"Horizontal error [m]": "horizontal"}),
+    ),
+    not_shown=(
+        NotShown("Table 1", "Methods compared in words", "it holds no figures"),
+        NotShown("Table 2", "Instruments", "settings and not results; the scenario coastal-voyage has them"),
+        *drawings({"Figure 1": "A factor graph", "Figure 2": "The algorithm"}),
+    ),
+    notes=(
+        "The paper's figures are of one sea trial that is not public. Ours are of a simulated voyage with the same "
+        "length, instruments and time of the degradation.",
+        "The paper's methods have nine states and fixed sigmas: ekf-9, sw-fgo-paper and ga-fgo-paper stand for them. "
+        "There is no UKF with nine states. The same methods with 15 states stand beside them.",
+        "Memory is the largest amount that the estimator's process takes beyond its amount at the start.",
+    ),
+)  # fmt: skip

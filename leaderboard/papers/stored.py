@@ -1,0 +1,163 @@
+"""The results of the papers' comparisons that come with simnav: one small Parquet file for each paper.
+
+A file holds one row for each run of an estimator on a scenario: status, peak memory and those scores that the paper's
+rows need, in single precision. Its metadata hold the estimators that stand for the paper's methods, and where the
+results were computed.
+
+``python -m simnav.leaderboard.papers.stored FOLDER`` writes the files from ``FOLDER/PAPER/results``, where FOLDER is
+the output of ``simnav reproduce PAPER --until-decided``, and then the tables of ``docs/papers``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import subprocess
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.papers import PAPERS
+from simnav.leaderboard.papers.measures import scores_of
+from simnav.leaderboard.papers.paper import Gain, Paper
+from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method, load_results
+from simnav.leaderboard.results.result import Result
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.request import EstimatorRequest
+
+__all__ = ["FOLDER", "load", "provenance", "save"]
+
+#: Where the files are.
+FOLDER = Path(__file__).with_name("results")
+
+_KEY = b"simnav_paper"
+
+
+def save(found: Reproduction, folder: Path = FOLDER) -> Path:
+    """Write the results of a comparison; returns the path of the file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    names = _scores(found.paper)
+    results = sorted(found.results, key=lambda r: (r.scenario, r.estimator, r.seed))
+    columns: dict[str, Any] = {
+        "scenario": pa.array([r.scenario for r in results]).dictionary_encode(),
+        "estimator": pa.array([r.estimator for r in results]).dictionary_encode(),
+        "seed": pa.array([r.seed for r in results], pa.int32()),
+        "status": pa.array([r.status for r in results]).dictionary_encode(),
+        "reason": pa.array([r.reason for r in results]).dictionary_encode(),
+        "peak_memory": pa.array([r.peak_memory for r in results], pa.int64()),
+        "variant": pa.array([r.variant for r in results]).dictionary_encode(),
+    }
+    for name in names:
+        columns[f"score.{name}"] = pa.array([r.scores.get(name, math.nan) for r in results], pa.float32())
+    about = {
+        "paper": found.paper.key,
+        "methods": {name: None if r is None else r.label for name, r in found.stands_for.items()},
+        **_here(),
+    }
+    table = pa.table(columns).replace_schema_metadata({_KEY: json.dumps(about).encode()})
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{found.paper.key}.parquet"
+    pq.write_table(table, path, compression="zstd", compression_level=19)
+    return path
+
+
+def load(paper: Paper, folder: Path = FOLDER) -> Reproduction:
+    """The comparison from the stored results; nothing is run.
+
+    Raises
+    ------
+    ValueError
+        If there are none for this paper, or the file is damaged; one sentence.
+    """
+    table, about = _read(paper.key, folder)
+    stands_for: dict[str, EstimatorRequest | None] = {}
+    for method in paper.methods:
+        request = find_method(method)
+        same = request is not None and request.label == about["methods"].get(method.name)
+        stands_for[method.name] = request if same else None
+    results = []
+    for row in table.to_pylist():
+        scores = {k.removeprefix("score."): v for k, v in row.items() if k.startswith("score.") and not math.isnan(v)}
+        results.append(
+            Result(row["scenario"], row["seed"], row["estimator"], {}, False, row["status"], row["reason"], scores,
+                   peak_memory=row["peak_memory"])
+        )  # fmt: skip
+    most = max((r.seed + 1 for r in results), default=0)
+    return fill(paper, stands_for, results, range(most))
+
+
+def provenance(paper: Paper, folder: Path = FOLDER) -> dict[str, str]:
+    """Where and with what the stored results were computed: versions, commit, processor, date."""
+    about = _read(paper.key, folder)[1]
+    return {name: str(value) for name, value in about.items() if name not in ("paper", "methods")}
+
+
+def _read(key: str, folder: Path) -> tuple[Any, Mapping[str, Any]]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = folder / f"{key}.parquet"
+    try:
+        table = pq.read_table(path)
+        return table, json.loads(table.schema.metadata[_KEY])
+    except FileNotFoundError:
+        raise ValueError(f"there are no stored results of {key}: {path} is missing") from None
+    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"the stored results {path} cannot be read: {error}") from None
+
+
+def _scores(paper: Paper) -> list[str]:
+    """The scores that the rows of a paper need, and those of its figures that show all runs."""
+    names = {row.score for row in paper.rows()}
+    names |= {row.than_score for row in paper.rows() if isinstance(row, Gain) and row.than_score}
+    names |= {s for f in paper.figures if f.draw in ("bars", "gains") for s in f.series.values()}
+    return sorted({score for name in names for score in scores_of(name)})
+
+
+def _here() -> dict[str, str]:
+    """Versions, commit, processor and date."""
+    processor = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        models = [line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line]
+        processor = models[0] if models else processor
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run(["git", "-C", str(root), "describe", "--always", "--dirty"], capture_output=True, text=True)
+    return {
+        **{name: version(name) for name in ("simnav", "numpy", "numba", "gtsam")},
+        "python": platform.python_version(),
+        "commit": done.stdout.strip() if done.returncode == 0 else "",
+        "processor": processor,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+    }
+
+
+def _main(folder: Path) -> None:
+    """Write the stored results of all papers that a folder has, and the tables of the documentation."""
+    from simnav.leaderboard.papers import documentation
+    from simnav.leaderboard.papers.paper import load as load_paper
+    from simnav.leaderboard.papers.sequential import LIMIT
+
+    for key in PAPERS:
+        if not (folder / key / "results").is_dir():
+            continue
+        paper = load_paper(key)
+        stands_for = {m.name: find_method(m) for m in paper.methods}
+        results = load_results(paper, stands_for, folder / key / "results", range(LIMIT))
+        path = save(fill(paper, stands_for, results, range(max(r.seed for r in results) + 1)))
+        print(f"{path}: {len(results)} runs, {path.stat().st_size / 1000:.0f} kB")
+    documentation.update()
+
+
+if __name__ == "__main__":
+    import sys
+
+    if len(sys.argv) != 2:
+        sys.exit("usage: python -m simnav.leaderboard.papers.stored FOLDER (the output of 'simnav reproduce')")
+    _main(Path(sys.argv[1]))

@@ -1,0 +1,193 @@
+"""Where a result comes from: the version of the benchmark, the code, the libraries, the machine and the day.
+
+A results folder holds each distinct provenance once, as ``provenance/ID.json``; a result refers to it by its short id.
+What differs from result to result stands in the result itself: digests of scenario, simulator and estimator, and the
+limits of time and memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, fields
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.results.errors import RequestError
+
+__all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here"]
+
+#: Name and version of the benchmark: its scenarios, and the rules by which results are scored and ranked.
+#: Raised whenever results before and after a change must not stand in one table.
+BENCHMARK = "simnav-bench 1.0"
+
+_LIBRARIES = ("simnav", "numpy", "numba", "gtsam")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where results come from; a text is empty where it is not known.
+
+    Attributes
+    ----------
+    benchmark : str
+        Name and version of the benchmark; empty for results that were made before it had one.
+    commit : str
+        Of the checkout of simnav; empty where simnav is installed without one.
+    dirty : bool or None
+        Whether files of that checkout differed from the commit; None without a checkout.
+    simnav, python, numpy, numba, gtsam : str
+        Versions.
+    system : str
+        Operating system and architecture.
+    cpu : str
+        Model of the processor.
+    cores : int
+        That the process may use; 0 where it is not known.
+    confinement : str
+        How estimators were kept apart from the recording.
+    date : str
+        Day of the run (UTC), as ``2026-11-22``.
+    identity : str
+        Id that a result names, where the rest was lost.
+    """
+
+    benchmark: str = ""
+    commit: str = ""
+    dirty: bool | None = None
+    simnav: str = ""
+    python: str = ""
+    numpy: str = ""
+    numba: str = ""
+    gtsam: str = ""
+    system: str = ""
+    cpu: str = ""
+    cores: int = 0
+    confinement: str = ""
+    date: str = ""
+    identity: str = ""
+
+    @property
+    def id(self) -> str:
+        """Short id: a digest of all fields; empty where nothing is known."""
+        if self.identity or self == Provenance():
+            return self.identity
+        text = json.dumps(asdict(self), sort_keys=True)
+        return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fields, with the id."""
+        return {"id": self.id} | {f.name: getattr(self, f.name) for f in fields(self) if f.name != "identity"}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Provenance:
+        """From what `to_dict` gave; fields of a later version are left out.
+
+        Raises
+        ------
+        ValueError
+            If the fields do not give the id that stands beside them.
+        """
+        known = {f.name for f in fields(cls)}
+        found = cls(**{name: value for name, value in values.items() if name in known})
+        if not set(values) - known - {"id"} and found.id != values.get("id"):
+            raise ValueError(f"the id should be {found.id}, and is {values.get('id')}")
+        return found
+
+
+def here(confinement: str = "") -> Provenance:
+    """The provenance of what this process computes now.
+
+    Parameters
+    ----------
+    confinement : str
+        How estimators are kept apart from the recording.
+    """
+    return _on(datetime.now(UTC).strftime("%Y-%m-%d"), confinement)
+
+
+@lru_cache(maxsize=8)
+def _on(date: str, confinement: str) -> Provenance:
+    from importlib.metadata import PackageNotFoundError, version
+
+    versions = {}
+    for name in _LIBRARIES:
+        with contextlib.suppress(PackageNotFoundError):
+            versions[name] = version(name)
+    commit, dirty = _checkout(Path(__file__).resolve().parents[2])
+    return Provenance(
+        benchmark=BENCHMARK,
+        commit=commit,
+        dirty=dirty,
+        python=platform.python_version(),
+        system=f"{platform.system()} {platform.machine()}",
+        cpu=_cpu(),
+        cores=_cores(),
+        confinement=confinement,
+        date=date,
+        **versions,
+    )
+
+
+def _checkout(folder: Path) -> tuple[str, bool | None]:
+    """Commit of a checkout, and whether its files differ from it; ("", None) where the folder is none."""
+    if not (folder / ".git").exists():
+        return "", None
+
+    def git(*words: str) -> str:
+        command = ["git", "-C", str(folder), *words]
+        return subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=True).stdout
+
+    try:
+        commit = git("rev-parse", "HEAD").strip()
+        return commit, bool(git("--no-optional-locks", "status", "--porcelain", "--untracked-files=no").strip())
+    except (OSError, subprocess.SubprocessError):
+        return "", None
+
+
+def _cpu() -> str:
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(errors="replace").splitlines():
+            name, _, value = line.partition(":")
+            if name.strip() in ("model name", "Model", "Hardware") and value.strip():
+                return " ".join(value.split())
+    return platform.processor()
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 0
+
+
+def distinct(provenances: Iterable[Provenance]) -> list[Provenance]:
+    """Each once, the latest day first; those of which nothing is known are left out."""
+    found = {p.id: p for p in provenances if p.id}
+    return sorted(found.values(), key=lambda p: (p.date, p.id), reverse=True)
+
+
+def benchmark_of(provenances: Iterable[Provenance]) -> str:
+    """The one version of the benchmark that results were made with; empty where it is not known.
+
+    A provenance that was lost but for its id does not count.
+
+    Raises
+    ------
+    RequestError
+        If there are several: their results must not stand in one table.
+    """
+    versions = sorted({p.benchmark for p in provenances if not p.identity})
+    if len(versions) > 1:
+        named = " and ".join(v or "of no version" for v in versions)
+        raise RequestError(
+            f"results of different versions of the benchmark must not be mixed ({named}); keep each version in a "
+            "folder of its own, or run the older results again"
+        )
+    return versions[0] if versions else ""

@@ -1,0 +1,59 @@
+"""Families: every run is another voyage, and training shares nothing with the board."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from simnav.catalogue import headers
+from simnav.leaderboard.interface import scenarios_of
+from simnav.scenario import TRAINING_ROOT, load
+from simnav.source import record
+
+FAMILIES = [h for h in headers() if h.path.parent.name == "families"]
+
+
+@pytest.mark.parametrize("header", FAMILIES, ids=lambda h: h.name)
+def test_no_two_voyages_are_alike(header):
+    family = load(header.id)
+    runs = [family.drawn(seed) for seed in range(6)]
+    assert len({run.content_hash() for run in runs}) == len(runs)
+    assert len({run.start.latitude for run in runs}) == len(runs)
+    assert family.drawn(2).content_hash() == runs[2].content_hash()
+    assert family.track == ("training" if family.training else "generalisation")
+
+
+def test_voyages_are_of_all_kinds():
+    family = load("random-voyages")
+    runs = [family.drawn(seed) for seed in range(120)]
+    assert {run.draws["draw.vessel"] for run in runs} == {"ship", "auv", "rov", "glider"}
+    kinds = {(fault.kind, name) for run in runs for fault in run.faults for name in fault.instruments}
+    assert {name for _, name in kinds} == {"gnss", "usbl", "dvl"}
+    assert {"outage", "noise_step", "multipath", "gross_error", "bias_step", "ramp", "frozen", "false_zero"} == {
+        kind for kind, _ in kinds
+    }
+    assert {len(run.faults) for run in runs} == {0, 1, 2}
+    # No fault lasts to the end, so that recovery is seen.
+    assert all(fault.end < run.duration for run in runs for fault in run.faults)
+
+
+def test_training_families_cannot_meet_the_board():
+    training = [load(h.id) for h in FAMILIES if h.training]
+    assert len(training) >= 3
+    for family in training:
+        assert family.root(0) == TRAINING_ROOT
+        # What a campaign may ask for ends below the root.
+        assert family.root(0) > 2**63 - 1
+    assert not any(s.training for s in scenarios_of(None, note=lambda _: None))
+    assert [s.name for s in scenarios_of("training-clean")] == ["training-clean"]
+
+
+def test_the_same_voyage_under_another_root_is_another_run():
+    run = load("random-ships").drawn(4).model_copy(update={"duration": 60.0, "faults": ()})
+    board, training = record(run, 4), record(run.model_copy(update={"training": True}), 4)
+    assert not np.array_equal(board.data.aids["gnss"].value, training.data.aids["gnss"].value)
+
+
+def test_a_track_is_asked_for_by_its_name():
+    assert {s.name for s in scenarios_of("generalisation")} >= {"random-voyages", "random-ships"}
+    assert all(s.training for s in scenarios_of("training"))
