@@ -21,6 +21,9 @@ from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments,
 
 __all__ = ["OracleEstimator"]
 
+#: All but roll and pitch, of which it is told where there is no IMU.
+NOT_TOLD = np.array([True, True, True, True, True, True, False, False, True])
+
 
 class OracleEstimator(KalmanEstimator):
     """The solver of the module: the inertial model, with the true motion where there is no IMU.
@@ -93,4 +96,7 @@ class OracleEstimator(KalmanEstimator):
             k = int(np.searchsorted(times, imu.time[0] - 1e-9))
             e = error[k : k + len(imu)]
             imu = replace(imu, angular_rate=imu.angular_rate - e[:, :3], specific_force=imu.specific_force - e[:, 3:])
-        return super().update(Measurements(measurements.start, measurements.time, imu, aids))
+        estimate = super().update(Measurements(measurements.start, measurements.time, imu, aids))
+        if self._motion is not None:
+            estimate.estimated = NOT_TOLD
+        return estimate

@@ -116,7 +116,7 @@ class WindowEstimator(Solver):
         window: int | None = 20,
         tolerance: float = 0.05,
         iterations: int = 10,
-        spacing: float = 0.2,
+        spacing: float = 0.5,
         every_sample: bool = False,
     ):
         if window is not None and window < 1:
