@@ -3,14 +3,16 @@ PYTHON ?= python3
 VENV ?= .venv
 RESULTS ?= results/quick
 SITE ?= site
+DOCS ?= site-docs
 BIN := $(VENV)/bin
 
-.PHONY: help leaderboard test bench clean
+.PHONY: help leaderboard test bench docs clean
 
 help:
 	@echo "make leaderboard   set up, run the quick campaign, print the ranking, write the site"
 	@echo "make test          set up and run all tests (lint, types and floors included)"
 	@echo "make bench         set up and run the benchmarks, one table"
+	@echo "make docs          set up and build the documentation as a site in $(DOCS)"
 	@echo "make clean         remove the environment, results and site"
 
 $(VENV)/pyvenv.cfg:
@@ -38,5 +40,12 @@ bench: $(VENV)/installed-test
 	$(BIN)/simnav warmup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-columns=median,mean,iqr,rounds --benchmark-sort=name
 
+$(VENV)/installed-docs: $(VENV)/pyvenv.cfg pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@ $(VENV)/installed
+
+docs: $(VENV)/installed-docs
+	$(BIN)/python -m mkdocs build --strict --site-dir $(DOCS)
+
 clean:
-	rm -rf $(VENV) $(RESULTS) $(SITE) build dist *.egg-info
+	rm -rf $(VENV) $(RESULTS) $(SITE) $(DOCS) build dist *.egg-info

@@ -20,8 +20,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, requests
 from simnav.leaderboard.campaign.request import request as one_request
-from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
-from simnav.scenario import Scenario
+from simnav.leaderboard.given import (
+    ScenarioLike,
+    Scenarios,
+    absolute,
+    quick_estimators,
+    results_of,
+    scenario_of,
+    scenarios_of,
+)
+from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -29,13 +37,14 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
     from simnav.leaderboard.papers.reproduction import Reproduction
+    from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.bounds import BoundReport
     from simnav.leaderboard.ranking.costs import CostReport
-    from simnav.leaderboard.ranking.ranking import Ranking
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.recording import Recording
+    from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
 
 __all__ = [
@@ -62,8 +71,6 @@ __all__ = [
     "scenarios_of",
 ]
 
-ScenarioLike: TypeAlias = "str | Path | Scenario"
-Scenarios: TypeAlias = "ScenarioLike | Iterable[ScenarioLike] | None"
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
 CampaignProgress: TypeAlias = "Callable[[Progress], None] | None"
 
@@ -289,7 +296,7 @@ def evaluate(
     by_scenario = group(found)
     return EvaluationReport(
         found,
-        rank(found),
+        rank(found, tracks={s.id: s.track for s in chosen}),
         tuple(labels),
         tuple(s.id for s in chosen),
         seeds,
@@ -319,8 +326,8 @@ def campaign(
 
     Parameters
     ----------
-    scenarios, estimators, optional
-        Default: all.
+    scenarios, estimators : optional
+        What is run; default: all.
     runs : int, optional
         Seeds a scenario; default: 50, or 3 where it is quick.
     output : path
@@ -350,31 +357,40 @@ def campaign(
     seeds = range(seed, seed + (runs or (QUICK_RUNS if quick else RUNS)))
     if quick and estimators is None:
         estimators = quick_estimators()
-    chosen, folder = scenarios_of(scenarios, quick=quick), _absolute(output)
+    chosen, folder = scenarios_of(scenarios, quick=quick), absolute(output)
     everyone = requests(estimators, parameters)
     summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
                    keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
     results = results_of(folder)
-    return CampaignReport(results, rank(results), summary)
+    return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
 
 
-def rank(results: str | os.PathLike[str] | Iterable[Result], *, score: str = "horizontal_rmse") -> Ranking:
+def rank(
+    results: str | os.PathLike[str] | Iterable[Result],
+    *,
+    score: str | None = None,
+    tracks: Mapping[str, str] | None = None,
+) -> Ranking:
     """Rank estimators by their results.
 
     Parameters
     ----------
     results : path or iterable of Result
         Folder that a campaign wrote, or results themselves.
-    score : str
-        Key of `simnav.scoring.SCORES`, one that is better when lower.
+    score : str, optional
+        Key of `simnav.scoring.SCORES`, one that is better when lower. Default: the horizontal error, and for
+        post-processing the smoothed one.
+    tracks : mapping of str to str, optional
+        Track of scenarios that are not in the catalogue, by versioned id.
 
     Returns
     -------
-    Ranking
+    simnav.leaderboard.ranking.board.Ranking
     """
     from simnav.leaderboard.ranking.ranking import rank
 
-    return rank(results_of(results) if isinstance(results, (str, os.PathLike)) else results, score=score)
+    given = results_of(results) if isinstance(results, (str, os.PathLike)) else results
+    return rank(given, score=score, tracks=tracks)
 
 
 def rescore(
@@ -407,7 +423,7 @@ def rescore(
     names = scores.split(",") if isinstance(scores, str) else scores
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
-        return rescore_results(_absolute(results), [n.strip() for n in names if n.strip()], given, progress)
+        return rescore_results(absolute(results), [n.strip() for n in names if n.strip()], given, progress)
 
 
 def cite(results: str | os.PathLike[str] | None = None) -> Citation:
@@ -524,112 +540,17 @@ def reproduce(
             chosen = chosen.only(methods)
         if stored:
             return shipped.load(chosen)
-    folder = _absolute(output or Path("reproduced") / chosen.key) / "results"
+    folder = absolute(output or Path("reproduced") / chosen.key) / "results"
     with mistakes(StoreError):
         if until_decided:
             return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
         return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
 
 
-# -- what is given -----------------------------------------------------------------------------------------
-
-
-def scenario_of(given: ScenarioLike) -> Scenario:
-    """A scenario itself, or by name, id or path."""
-    from simnav.scenario import load
-
-    if isinstance(given, Scenario):
-        return given
-    with mistakes():
-        return load(given)
-
-
-def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str], None] | None = None) -> list[Scenario]:
-    """The scenarios that were asked for; where none was, those of the catalogue.
-
-    Of the catalogue, families for training are left out, and logs whose files are not here.
-
-    Parameters
-    ----------
-    given : scenarios
-        A text may name several, separated by commas. The name of a track stands for its scenarios.
-    quick : bool
-        Of the catalogue, leave out those that are tagged ``long``.
-    note : callable, optional
-        Called with a sentence on what is left out; default: a warning.
-    """
-    from simnav.scenario import headers, names
-
-    items = [] if given is None else [given] if isinstance(given, (str, Path, Scenario)) else list(given)
-    asked: list[ScenarioLike] = []
-    tracks: dict[str, list[ScenarioLike]] = {}
-    for header in headers():
-        tracks.setdefault(header.track, []).append(header.name)
-    for item in items:
-        for part in [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]:
-            asked += tracks.get(part, [part]) if isinstance(part, str) else [part]
-    found = []
-    for item in dict.fromkeys(asked or names()) if all(isinstance(i, str) for i in asked) else asked:
-        chosen = scenario_of(item)
-        if not asked and (chosen.training or (quick and "long" in chosen.tags)):
-            continue
-        if chosen.log is not None:
-            from simnav.source import open_source
-
-            try:
-                open_source(chosen, 0)
-            except (ValueError, OSError) as error:
-                if asked:
-                    raise RequestError(sentence(error)) from error
-                _note(note, f"{chosen.name} is left out: {sentence(error)}")
-                continue
-        found.append(chosen)
-    if not found:
-        raise RequestError("there is no scenario to run")
-    return found
-
-
-def quick_estimators(note: Callable[[str], None] | None = None) -> list[str]:
-    """All registered estimators but the slow ones."""
-    from simnav.estimator import describe, names
-
-    slow = [name for name in names() if describe(name).slow]
-    if slow:
-        _note(note, f"left out of a quick campaign, for their cost: {', '.join(slow)} (-e names them)")
-    return [name for name in names() if name not in slow]
-
-
-def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[Result]:
-    """The current results of a folder, all of one version of the benchmark; ``series`` are what charts need."""
-    from simnav.leaderboard.results.provenance import benchmark_of
-    from simnav.leaderboard.results.store import StoreError, load
-
-    path = _absolute(folder)
-    with mistakes(StoreError):
-        results = load(path, series=series)
-    if not results:
-        raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
-    benchmark_of(r.provenance for r in results)
-    return results
-
-
-def _note(note: Callable[[str], None] | None, text: str) -> None:
-    import warnings
-
-    if note is not None:
-        note(text)
-    else:
-        warnings.warn(text, stacklevel=3)
-
-
-def _absolute(path: str | os.PathLike[str]) -> Path:
-    return Path(path).expanduser().resolve()
-
-
 @contextlib.contextmanager
 def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
     if keep is not None:
-        yield _absolute(keep)
+        yield absolute(keep)
         return
     with tempfile.TemporaryDirectory(prefix="simnav-evaluate-") as name:
         yield Path(name) / "results"

@@ -20,7 +20,7 @@ import sys
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, SupportsIndex
+from typing import Annotated, Any, Literal, Self, SupportsIndex
 
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
@@ -68,6 +68,9 @@ class InitialError(Spec):
         tuple(math.radians(d) for d in (0.05, 0.05, 0.5)),
         description="attitude error about north, east, down (the last is heading)",
     )
+    times_told: dict[Literal["position", "velocity", "attitude"], Positive] = Field(
+        {}, description="errors that really are so many times what an estimator is told, like `attitude = 10`"
+    )
 
     @field_validator("position", "velocity", "attitude")
     @classmethod
@@ -77,8 +80,12 @@ class InitialError(Spec):
         return value
 
     def covariance(self) -> Array:
-        """(9, 9) array over `simnav.types.COMPONENTS`."""
+        """(9, 9) array over `simnav.types.COMPONENTS`: what an estimator is told."""
         return np.diag(np.square([*self.position, *self.velocity, *self.attitude]))
+
+    def factors(self) -> Array:
+        """(9,) array: how many times as large as told the errors really are."""
+        return np.repeat([self.times_told.get(name, 1.0) for name in ("position", "velocity", "attitude")], 3)
 
 
 class Dial(Spec):

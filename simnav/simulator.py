@@ -123,7 +123,9 @@ class Simulator:
         self._world = _world(scenario, seed) if truth is None else None
         self.initial_truth = self._world.state() if truth is None else truth[0]  # type: ignore[union-attr]
         root = scenario.root(seed)
-        self.start = draw_start(self.initial_truth, scenario.initial_error.covariance(), root)
+        self.start = draw_start(
+            self.initial_truth, scenario.initial_error.covariance(), root, scenario.initial_error.factors()
+        )
         actual = scenario.actual()
         self._imu = None if actual.imu is None else actual.imu.build(root)
         self._aids = {

@@ -13,8 +13,7 @@ from simnav.testing.contract_check import check
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
-BLOCKS = {kind: re.findall(rf"```{kind}\n(.*?)```", README, re.DOTALL) for kind in ("python", "toml")}
-ESTIMATORS = [b for b in BLOCKS["python"] if "@register" in b]
+ESTIMATORS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 pytestmark = pytest.mark.usefixtures("clean_registry")
@@ -49,30 +48,7 @@ def test_first_estimator_is_short_and_useful(shown):
     assert rmse < (fixes**2).sum() ** 0.5  # better than the fixes that it was given
 
 
-def test_first_scenario_runs(tmp_path):
-    from simnav.source import record
-
-    path = tmp_path / "channel.toml"
-    path.write_text(BLOCKS["toml"][0])
-    recording = record(load(path), 1)
-    assert set(recording.data.aids) == {"gnss", "gyrocompass", "speed_log"}
-    assert recording.data.aids["gnss"].faults.any()
-
-
-def test_environment_is_made():
-    namespace: dict = {}
-    exec(next(b for b in BLOCKS["python"] if "gymnasium.make" in b), namespace)
-    assert namespace["env"].observation_space.contains(namespace["observation"])
-
-
-def test_calls_from_python(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    exec(next(b for b in BLOCKS["python"] if "simnav.evaluate" in b), {})
-    assert (tmp_path / "run.png").stat().st_size > 10_000
-    assert capsys.readouterr().out.strip().endswith("of 2")
-
-
 def test_links_lead_somewhere():
-    for document in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
+    for document in ROOT.glob("*.md"):  # those of docs/ are checked by the strict build of the site
         for target in re.findall(r"\]\((?!http)([^)#]+)", document.read_text()):
             assert (document.parent / target).exists(), f"{document.name}: {target}"

@@ -58,6 +58,8 @@ class ErrorModel(ABC):
     time: float
     #: Names of the arrays that `correct` changes.
     state: ClassVar[tuple[str, ...]] = ()
+    #: Names of further arrays that `propagate` keeps from one call to the next.
+    memory: ClassVar[tuple[str, ...]] = ()
     #: Place of the attitude, a rotation vector, in the error; None for a model without one.
     attitude_at: ClassVar[int | None] = None
 
@@ -160,6 +162,12 @@ class ErrorModel(ABC):
         """Take corrections back."""
         for name, value in zip(self.state, snapshot, strict=True):
             getattr(self, name)[...] = value
+
+    def take_over(self, other: ErrorModel) -> None:
+        """Go on from the state of another model of the same kind, begun with the same instruments, between steps."""
+        for name in (*self.state, *self.memory):
+            getattr(self, name)[...] = getattr(other, name)
+        self.time = other.time
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an (n,) error, or (n, k) errors, through the last propagation, of ``elapsed`` seconds, in place."""

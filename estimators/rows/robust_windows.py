@@ -94,10 +94,7 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
 
 
 @register("ga-fgo")
-class GaFgo(
-    _Robust,
-    weighting=piece(GradientAdaptive, defaults={"other": (2.0, 2.0, 0.3)}, preset="default", fewest=5),
-):
+class GaFgo(_Robust, weighting=piece(GradientAdaptive, fewest=5)):
     """Gradient-adaptive factor graph, its residuals whitened and its scales consistent.
 
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
@@ -106,7 +103,7 @@ class GaFgo(
 
 
 @register("ga-fgo-paper")
-class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, preset="paper", fewest=5)):
+class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, defaults={"preset": "paper"}, fewest=5)):
     """Gradient-adaptive factor graph as its paper prints it: 9 states, fixed sigmas, unwhitened norms and their scale.
 
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on

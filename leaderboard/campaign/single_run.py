@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from simnav.recording import Recording
     from simnav.scenario import Scenario
+    from simnav.scoring import Stanford
     from simnav.trial import Trial
 
 __all__ = ["EstimatorRun", "RunReport", "record", "run_once"]
@@ -109,6 +110,24 @@ class RunReport:
         if not any(len(trial) for _, trial in trials):
             raise RequestError("there is nothing to draw: no estimator gave an estimate")
         return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference])
+
+    def stanford(self, limit: float = 25.0) -> dict[str, Stanford]:
+        """Errors beside protection levels, by label, of the estimators that have a protection level.
+
+        Parameters
+        ----------
+        limit : float
+            Alert limit [m]; 25 m is IMO A.915(22) outside of ports.
+        """
+        import numpy as np
+
+        from simnav.scoring import protection_levels, stanford
+
+        return {
+            e.estimator: stanford([(e.trial, self.recording)], limit)
+            for e in self.estimators
+            if np.isfinite(protection_levels(e.trial)).any()
+        }
 
 
 def record(scenario: Scenario, seed: int) -> Recording:

@@ -51,7 +51,7 @@ def command(
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking import tables
         from simnav.leaderboard.ranking.failures import failure_table
-        from simnav.leaderboard.ranking.ranking_table import ranking_table
+        from simnav.leaderboard.ranking.ranking_table import ranking_tables
 
         chosen = interface.scenarios_of(scenario, quick=quick, note=out.remark)
         if quick and not estimator:
@@ -64,7 +64,7 @@ def command(
             )  # fmt: skip
         summary = report.summary
         out.document(report.to_dict())
-        out.print(ranking_table(report.ranking, report.results), *failure_table(report.results))
+        out.print(*ranking_tables(report.ranking), *failure_table(report.results))
         out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
                   f"{tables.duration(summary.seconds)})",
                   f"next:    simnav leaderboard {summary.folder}")  # fmt: skip

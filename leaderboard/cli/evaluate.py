@@ -46,7 +46,7 @@ def command(
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking.failures import failure_table
-        from simnav.leaderboard.ranking.ranking_table import ranking_table
+        from simnav.leaderboard.ranking.ranking_table import ranking_tables
         from simnav.leaderboard.ranking.standing import standing_table
 
         chosen = interface.scenarios_of(scenario, note=out.remark)
@@ -57,7 +57,7 @@ def command(
                 progress=campaign_progress(bar),
             )  # fmt: skip
         out.document(report.to_dict())
-        out.print(ranking_table(report.ranking, report.results, report.estimators))
+        out.print(*ranking_tables(report.ranking, report.estimators))
         for stand in report.standings:
             out.print(standing_table(stand))
         out.print(*failure_table(report.results))

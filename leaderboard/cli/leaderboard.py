@@ -26,7 +26,7 @@ def command(
         from simnav.leaderboard import interface
         from simnav.leaderboard.papers.page import find
         from simnav.leaderboard.ranking.failures import failure_table, failures
-        from simnav.leaderboard.ranking.ranking_table import ranking_table
+        from simnav.leaderboard.ranking.ranking_table import ranking_tables
         from simnav.leaderboard.site.site import build
 
         found = interface.results_of(results, series=True)
@@ -34,4 +34,4 @@ def command(
         with out.progress("site") as progress:
             index = build(found, ranking, output, progress=progress, workers=workers, papers=find(papers))
         out.document({"site": str(index), "runs": len(found), "failed": failures(found), "ranking": ranking.to_dict()})
-        out.print(ranking_table(ranking, found), *failure_table(found), f"site: {index}")
+        out.print(*ranking_tables(ranking), *failure_table(found), f"site: {index}")

@@ -25,6 +25,12 @@ def command(
     estimator: Estimators = None,
     seed: Seed = 0,
     plot: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
+    stanford: Annotated[
+        Path | None, typer.Option(help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf.")
+    ] = None,
+    alert_limit: Annotated[
+        float, typer.Option(min=0.01, help="Alert limit of the Stanford diagrams [m]; IMO A.915(22): 25, in ports 2.5.")
+    ] = 25.0,
     set_: Set = None,
     json: Json = False,
     debug: Debug = False,
@@ -33,10 +39,11 @@ def command(
     with session(json, debug) as out:
         from simnav.leaderboard import interface
 
-        if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
-            raise RequestError(f"--plot {plot}: the file should end in .png, .svg or .pdf")
-        if plot is not None and not plot.expanduser().resolve().parent.is_dir():
-            raise RequestError(f"--plot {plot}: there is no folder {plot.parent}")
+        for option, path in (("--plot", plot), ("--stanford", stanford)):
+            if path is not None and path.suffix not in (".png", ".svg", ".pdf"):
+                raise RequestError(f"{option} {path}: the file should end in .png, .svg or .pdf")
+            if path is not None and not path.expanduser().resolve().parent.is_dir():
+                raise RequestError(f"{option} {path}: there is no folder {path.parent}")
         chosen = interface.scenario_of(scenario)
         with out.progress(f"{chosen.id}, seed {seed}") as progress:
             report = interface.run(chosen, estimator, seed=seed, parameters=parameters(set_), progress=progress)
@@ -45,13 +52,30 @@ def command(
             from simnav.leaderboard.figures.plots import save
 
             drawn = save(report.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
-        out.document({**report.to_dict(), "plot": None if drawn is None else str(drawn)})
+        diagrams = {} if stanford is None else report.stanford(alert_limit)
+        shown = None
+        if stanford is not None and diagrams:
+            from simnav.leaderboard.figures.plots import save
+            from simnav.leaderboard.figures.stanford import stanford_diagrams
+
+            title = f"{report.recording.scenario}, seed {seed}: alert limit {alert_limit:g} m"
+            drawing = stanford_diagrams(diagrams, title=title)
+            shown = save(drawing, absolute(stanford), formats=(stanford.suffix[1:],))[0]
+        elif stanford is not None:
+            out.note("simnav: no Stanford diagram: no estimator gave a covariance or a protection level")
+        document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
+        if stanford is not None:
+            integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
+            document |= {"stanford": integrity, "stanford_plot": None if shown is None else str(shown)}
+        out.document(document)
         out.print(_table(report))
         for e in report.estimators:
             if e.status != "ok":
                 out.note(f"simnav: {e.estimator}: {e.status}: {e.reason}")
         if drawn is not None:
             out.print(f"figure: {drawn}")
+        if shown is not None:
+            out.print(f"Stanford diagrams: {shown}")
         if any(e.trial.failed for e in report.estimators):
             out.code = FAILED
         elif all(e.status == "unsuitable" for e in report.estimators):

@@ -1,215 +1,88 @@
-"""The ranking: who is how much worse than the oracle, and how sure we are.
+"""The ranking: who has which error, as a multiple of a fixed reference figure, and how sure we are.
 
-The figure of a run is the logarithm of the ratio of its horizontal RMSE to that of the oracle on the same run (a
-reference that knows the true noise and the fault labels). That of an estimator on a scenario is the interquartile mean
-over the runs, shown as a ratio: 2 is twice the oracle's error. Rules:
+**Score.** The figure of a run is the ratio of its error to the scenario's reference figure
+(`simnav.leaderboard.ranking.reference`). The score of a row is the geometric mean over its runs; each scenario counts
+the same (`simnav.leaderboard.ranking.statistics`). It never improves when a run gets worse or fails.
 
-**Baseline.** Where no oracle completed a run of a scenario, the baseline is the median RMSE of the best ranked
-estimator there; on a run that the oracle failed, the oracle's median. `ScenarioRanking.baseline` says which it was.
+**Failures count.** A failed run (error, timeout, out of memory, diverged, invalid output, no position at all) has the
+ratio `FAILURE`; no run has more. An epoch without a position counts with the last position that was given. Nothing is
+dropped.
 
-**Failures count.** A failed run (error, timeout, out of memory, diverged, invalid output, or no position at more than
-5 % of the epochs) has the ratio `WORST`, a million; no completed run counts for more than that. Nothing is dropped.
+**Tracks.** There are ranks within a track only. A row is ranked if it has run all scenarios of the track that are on
+the board. One that needs other instruments is listed as unsuitable, whatever it does elsewhere.
 
-**Unsuitable.** An estimator that needs other instruments than a scenario has, or gives no position at all, is listed as
-such there: no failure, but no score either.
+**Runs that count.** Seeds count in order up to the first that a row has not run, so that nobody can choose seeds.
 
-**Tiers.** `simnav.leaderboard.ranking.statistics.tiers`: paired by run, against the best of a tier, Holm-corrected at
-5 %; overall, each scenario counts the same in the test as it does in the score.
+**Who is told from whom.** Sign flips over all pairs of rows at once, by seed. On recorded tracks the unit is the
+recording: each one counts the same, whatever its scenario, and seeds over one recording are averaged.
 
-**Overall.** Each scenario counts the same. An estimator that covers all of them has the mean of its log ratios. One
-that covers fewer is not rewarded for leaving out the hard ones: an additive model, log ratio = estimator + scenario, is
-fitted to all there is by least squares, and its score is the estimator's effect plus the mean scenario effect (the
-adjusted or least-squares mean of an unbalanced table). Tests use the runs that two estimators have in common. Who
-covers less than half of the scenarios is listed with a score but not ranked.
+**Plausible.** A row whose errors are below the oracle's by more than chance is not ranked.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from simnav.leaderboard.ranking.ranking_figure import ranking_figure
-from simnav.leaderboard.ranking.runs import Run, Runs, group
-from simnav.leaderboard.ranking.statistics import (
-    RESAMPLES,
-    Array,
-    Place,
-    bootstrap_means,
-    interquartile_mean,
-    interval,
-    tiers,
+from simnav.leaderboard.ranking.board import (
+    Consistency,
+    Ranking,
+    ScenarioRanking,
+    ScenarioRow,
+    Standing,
+    TrackRanking,
+    TrackRow,
 )
-from simnav.leaderboard.results.frame import frame
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.ranking.plausibility import too_good
+from simnav.leaderboard.ranking.reference import reference_of
+from simnav.leaderboard.ranking.remarks import remarks
+from simnav.leaderboard.ranking.runs import Runs, group
+from simnav.leaderboard.ranking.statistics import (
+    FAILURE,
+    Separation,
+    score,
+    separate,
+    share,
+    tiers,
+    weighted_quantile,
+)
+from simnav.leaderboard.ranking.tracks import RECORDED, Track, catalogued_tracks, tracks_of
 from simnav.scoring import badge
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["WORST", "OverallRow", "RankedRow", "Ranking", "ScenarioRanking", "ScenarioRow", "rank"]
+__all__ = ["PROVISIONAL", "rank"]
 
-#: Ratio to the oracle's error that stands for a failed run, and that no completed run exceeds.
-WORST = 1e6
-#: Least share of the scenarios that an estimator covers to be ranked overall.
-MIN_COVERAGE = 0.5
+Array = NDArray[np.float64]
+Unit = tuple[str, Any]  # scenario, and seed or recording
 
-_CAP = math.log(WORST)
+#: Fewer seeds or recordings than this are provisional.
+PROVISIONAL = 10
 
-
-@dataclass(frozen=True, kw_only=True)
-class RankedRow:
-    """One estimator, as it is ranked.
-
-    Attributes
-    ----------
-    estimator : str
-    reference : bool
-        Told the truth, not ranked.
-    rank, tier : int or None
-        None for references, and overall for those that cover too few scenarios.
-    score, low, high : float
-        Ratio to the baseline's error with its 95 % bootstrap interval (NaN with fewer than two runs).
-    p_value : float or None
-        Holm-adjusted, against the first; None for the first and for references.
-    runs, failed : int
-    badge : str
-        Consistency of the horizontal position (`simnav.scoring.badge`) over all runs.
-    update_median : float
-        Median time per epoch [s]; overall, the median over the scenarios.
-    peak_memory : int
-        Largest [bytes].
-    """
-
-    estimator: str
-    reference: bool
-    rank: int | None
-    tier: int | None
-    score: float
-    low: float
-    high: float
-    p_value: float | None
-    runs: int
-    failed: int
-    badge: str
-    update_median: float
-    peak_memory: int
+_CAP = math.log(FAILURE)
+_LEAST = math.log(1e-9)  # of an error of zero
+_RECORDING = re.compile(r"recording '([^']*)'")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScenarioRow(RankedRow):
-    """One estimator on one scenario.
-
-    Attributes
-    ----------
-    median : float
-        Of the ranked score over the completed runs, in its unit; NaN without any.
-    statuses : dict of str to int
-        How many runs ended how; ``incomplete`` are those with too few positions.
-    nees : float
-        Mean over the runs, by degree of freedom; NaN without a covariance.
-    """
-
-    median: float
-    statuses: dict[str, int]
-    nees: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class OverallRow(RankedRow):
-    """One estimator over all scenarios; the interval is stratified by scenario.
-
-    Attributes
-    ----------
-    covered, scenarios : int
-        How many scenarios it covers, of how many.
-    ratios : dict of str to float
-        Score by scenario.
-    """
-
-    covered: int
-    scenarios: int
-    ratios: dict[str, float]
-
-
-@dataclass(frozen=True)
-class ScenarioRanking:
-    """The ranking on one scenario.
-
-    Attributes
-    ----------
-    scenario : str
-    baseline : str
-        What the ratios are to, in words.
-    rows : tuple of ScenarioRow
-        In order of rank; then the references.
-    unsuitable : dict of str to str
-        Estimators that have no score here, and why.
-    """
-
-    scenario: str
-    baseline: str
-    rows: tuple[ScenarioRow, ...]
-    unsuitable: dict[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Ranking:
-    """The whole ranking.
-
-    Attributes
-    ----------
-    score : str
-        Key of `simnav.scoring.SCORES` that is ranked.
-    rows : tuple of OverallRow
-        In order of rank; then those not ranked, then the references.
-    scenarios : tuple of ScenarioRanking
-        In order of their ids.
-    """
-
-    score: str
-    rows: tuple[OverallRow, ...]
-    scenarios: tuple[ScenarioRanking, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain dicts and lists for JSON; numbers that are not finite become None."""
-        found: dict[str, Any] = plain(vars(self))
-        return found
-
-    def to_frame(self) -> Any:
-        """A row an estimator, over all scenarios; see `simnav.leaderboard.results.frame.frame`."""
-        return frame([{k: v for k, v in vars(row).items() if k != "ratios"} | row.ratios for row in self.rows])
-
-    def plot(self) -> Figure:
-        """The scores with their intervals."""
-        return ranking_figure(self.rows)
-
-
-def rank(
-    results: Iterable[Result],
-    *,
-    score: str = "horizontal_rmse",
-    oracle: str = "oracle",
-    resamples: int = RESAMPLES,
-) -> Ranking:
+def rank(results: Iterable[Result], *, score: str | None = None, tracks: Mapping[str, str] | None = None) -> Ranking:
     """Rank estimators by their results.
 
     Parameters
     ----------
     results : iterable of Result
         In any order; the ranking does not depend on it.
-    score : str
-        Key of `simnav.scoring.SCORES` to rank by, one whose ``better`` is ``lower``: ``smoothed_horizontal_rmse`` for
-        the post-processing track.
-    oracle : str
-        Label of the reference that is the baseline; if it did not run, the best reference with this in its label.
-    resamples : int
-        Of the bootstrap.
+    score : str, optional
+        Key of `simnav.scoring.SCORES` to rank all tracks by, one whose ``better`` is ``lower``. Default: the horizontal
+        error, and for post-processing the smoothed one.
+    tracks : mapping of str to str, optional
+        Track of scenarios that are not in the catalogue, by versioned id; otherwise they are in ``other``.
 
     Returns
     -------
@@ -220,170 +93,320 @@ def rank(
     ValueError
         If an estimator has two results for one run.
     """
-    runs = group(results, score)
-    scenarios = [_Scenario(name, runs[name], oracle, resamples, k) for k, name in enumerate(sorted(runs))]
-    return Ranking(score, tuple(_overall(scenarios)), tuple(s.ranking() for s in scenarios))
+    runs = group(results)
+    known = dict(tracks or {})
+    if not known.keys() >= runs.keys():
+        known = {**catalogued_tracks(), **known}
+    boards: list[TrackRanking] = []
+    scenarios: dict[str, ScenarioRanking] = {}
+    for track in tracks_of(runs, known, score):
+        tables = [_Scenario(name, runs[name], track) for name in track.scenarios]
+        tables = [t for t in tables if t.cells]
+        if not tables:
+            continue
+        boards.append(_track(track, tables))
+        if track.name != "post-processing":
+            scenarios |= {t.name: t.ranking() for t in tables}
+    return Ranking(tuple(boards), tuple(scenarios[name] for name in sorted(scenarios)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Cell:
+    """The runs of one estimator on one scenario that count.
+
+    Attributes
+    ----------
+    runs : Runs
+    units : list
+        The seed or recording of each.
+    logs : (n,) array
+        Logarithms of the ratios to the reference figure; infinite where a run failed.
+    """
+
+    runs: Runs
+    units: list[Any]
+    logs: Array
+
+    @property
+    def capped(self) -> Array:
+        """The logarithms as they count."""
+        return np.minimum(self.logs, _CAP)
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which runs failed."""
+        return np.isinf(self.logs)
 
 
 class _Scenario:
-    """The runs of one scenario with their log ratios."""
+    """One scenario with its rows: those that have runs, and those that it does not suit."""
 
-    def __init__(self, name: str, cells: Mapping[str, Runs], oracle: str, resamples: int, index: int):
-        self.name = name
-        self.unsuitable = {n: why for n in sorted(cells) if (why := cells[n].unsuitable())}
-        self.cells = {n: cells[n] for n in sorted(cells) if n not in self.unsuitable}
-        self.baseline, errors, constant = self._baseline(oracle)
-        self.logs: dict[str, dict[Run, float]] = {}
-        for n, cell in self.cells.items():
-            good, tried = cell.completed, [(r.seed, r.note) for r in cell.tried]
-            self.logs[n] = {
-                run: _log_ratio(good[run], errors.get(run, constant)) if run in good else _CAP for run in tried
-            }
-        self.strata = {n: np.array(list(logs.values())) for n, logs in self.logs.items()}
-        self.means = {n: interquartile_mean(x) for n, x in self.strata.items()}
-        self.draws = {n: bootstrap_means([x], resamples=resamples, seed=index)[:, 0] for n, x in self.strata.items()}
+    def __init__(self, name: str, by: Mapping[str, Runs], track: Track):
+        self.name, self.track = name, track
+        self.recorded = track.name == RECORDED or any(_RECORDING.match(r.note) for x in by.values() for r in x.results)
+        self.unsuitable = {n: why for n in sorted(by) if (why := by[n].unsuitable())}
+        entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
+        if track.name == "post-processing":  # whoever never smooths is not in it
+            entries = {n: r for n, r in entries.items() if any(_finite(x, track.score) for x in r.tried)}
+        self.reference = reference_of(name, track.score, entries)
+        ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
+        seeds = sorted({x.seed for r in ranked for x in r.tried})
+        self.cells = {n: self._cell(r, seeds) for n, r in entries.items()}
 
-    def _baseline(self, oracle: str) -> tuple[str, dict[Run, float], float]:
-        """In words, by run, and for runs without one."""
-        medians = {n: m for n, c in self.cells.items() if math.isfinite(m := _median(c.completed.values()))}
-        references = {n: m for n, m in medians.items() if self.cells[n].reference and oracle in n}
-        if oracle in references:
-            references = {oracle: references[oracle]}
-        ranked = {n: m for n, m in medians.items() if not self.cells[n].reference}
-        if references:
-            name = min(references, key=lambda n: (references[n], n))
-            return f"{name}, on the same run", self.cells[name].completed, references[name]
-        if ranked:
-            name = min(ranked, key=lambda n: (ranked[n], n))
-            return f"median of {name}, the best here: no oracle ran", {}, ranked[name]
-        return "none: no run was completed", {}, 1.0
+    def _cell(self, runs: Runs, seeds: Sequence[int]) -> _Cell:
+        there = {r.seed: r for r in runs.tried}
+        counted = []
+        for seed in seeds if not runs.reference else sorted(there):
+            if seed not in there:
+                break
+            counted.append(there[seed])
+        logs = [self._log(r) for r in counted]
+        return _Cell(runs, [self.unit(r) for r in counted], np.array(logs, dtype=np.float64))
 
-    def differences(self, a: str, b: str) -> Array:
-        """Paired differences of log ratios over the runs that both have."""
-        mine, other = self.logs[a], self.logs[b]
-        if mine.keys() == other.keys():
-            return np.asarray(self.strata[a] - self.strata[b])
-        return np.array([mine[run] - other[run] for run in mine if run in other])
+    def _log(self, result: Result) -> float:
+        value = float(result.scores.get(self.track.score, math.nan))
+        if result.status != "ok" or not math.isfinite(value):
+            return math.inf
+        return max(math.log(value / self.reference.value), _LEAST) if value > 0.0 else _LEAST
+
+    def unit(self, result: Result) -> Any:
+        """The independent unit of a run."""
+        if not self.recorded:
+            return result.seed
+        found = _RECORDING.match(result.note)
+        return found.group(1) if found else result.note
+
+    def implausible(self, name: str, scenarios: int = 1) -> bool:
+        """Whether a row is better here than what is possible."""
+        cell = self.cells[name]
+        return not cell.runs.reference and too_good(cell.logs[~cell.failed], self.reference, scenarios)
 
     def ranking(self) -> ScenarioRanking:
-        ranked = {n: m for n, m in self.means.items() if not self.cells[n].reference}
-        places = tiers(ranked, lambda a, b: [self.differences(a, b)])
-        references = sorted((n for n in self.cells if n not in ranked), key=lambda n: (self.means[n], n))
-        rows = [self._row(n, k + 1, p) for k, (n, p) in enumerate(places.items())]
-        rows += [self._row(n, None, None) for n in references]
-        return ScenarioRanking(self.name, self.baseline, tuple(rows), self.unsuitable)
-
-    def _row(self, name: str, position: int | None, place: Place | None) -> ScenarioRow:
-        cell, x = self.cells[name], self.strata[name]
-        spread = interval(self.draws[name]) if len(x) > 1 else (math.nan, math.nan)
-        nees = cell.numbers("nees_horizontal")
-        return ScenarioRow(
-            **_common([cell], place, self.means[name], spread),
-            rank=position,
-            update_median=_median(cell.numbers("update_median")),
-            median=_median(cell.completed.values()),
-            statuses=cell.statuses,
-            nees=float(np.mean(nees)) if len(nees) else math.nan,
-        )
-
-
-def _common(cells: Sequence[Runs], place: Place | None, score: float, spread: tuple[float, float]) -> dict[str, Any]:
-    """The fields of a row that are the same on one scenario and over all."""
-    runs = sum(len(c.tried) for c in cells)
-    return {
-        "estimator": cells[0].estimator,
-        "reference": any(c.reference for c in cells),
-        "tier": place.tier if place else None,
-        "score": math.exp(score),
-        "low": math.exp(spread[0]),
-        "high": math.exp(spread[1]),
-        "p_value": place.p_value if place else None,
-        "runs": runs,
-        "failed": runs - sum(c.statuses.get("ok", 0) for c in cells),
-        "badge": badge(np.concatenate([c.numbers("nees_horizontal") for c in cells])),
-        "peak_memory": max(c.peak_memory for c in cells),
-    }
+        """The ranking on this scenario alone."""
+        standing: dict[str, tuple[Standing, str]] = {}
+        for n, cell in self.cells.items():
+            standing[n] = ("ranked", "")
+            if cell.runs.reference:
+                standing[n] = ("reference", "")
+            elif not len(cell.logs):
+                standing[n] = ("incomplete", _NO_SEED)
+            elif self.implausible(n):
+                standing[n] = ("implausible", _IMPLAUSIBLE.format(self.name))
+        shown = {n: self.cells[n] for n in self.cells if len(self.cells[n].logs)}
+        rows, separation = _rows([self], {n: {self.name: c} for n, c in shown.items()}, standing)
+        found = []
+        for row in rows:
+            cell = shown[row["estimator"]]
+            errors = [r.scores.get(self.track.score, math.nan) for r in cell.runs.good]
+            found.append(ScenarioRow(
+                **row,
+                median=float(np.median(errors)) if errors else math.nan,
+                statuses=cell.runs.statuses,
+                ratios={str(u): math.exp(x) for u, x in zip(*_by_unit(cell), strict=True)},
+            ))  # fmt: skip
+        unit = "recording" if self.recorded else "seed"
+        return ScenarioRanking(
+            self.name, self.track.name, self.track.score, self.reference, unit, _units(found, [self], shown),
+            remarks(separation, unit, found, [self.reference]), tuple(found), self.unsuitable,
+        )  # fmt: skip
 
 
-def _median(values: Iterable[float]) -> float:
-    found = list(values)
-    return float(np.median(found)) if found else math.nan
+_NO_SEED = "it has not run the first seed that the others have run"
+_IMPLAUSIBLE = (
+    "its errors on {} are below those of an oracle, which knows the noise and every fault, by more than chance"
+)
 
 
-def _log_ratio(value: float, baseline: float) -> float:
-    """Logarithm of a ratio of errors, within the cap on both sides."""
-    if value <= 0.0:
-        return -_CAP if baseline > 0.0 else 0.0
-    return float(np.clip(math.log(value) - math.log(max(baseline, 1e-300)), -_CAP, _CAP))
+def _finite(result: Result, name: str) -> bool:
+    return result.status == "ok" and math.isfinite(result.scores.get(name, math.nan))
 
 
-def _overall(scenarios: Sequence[_Scenario]) -> list[OverallRow]:
-    names = sorted({n for s in scenarios for n in s.cells})
-    covers = {n: [s for s in scenarios if n in s.cells] for n in names}
-    references = [n for n in names if any(s.cells[n].reference for s in covers[n])]
-    entries = [n for n in names if n not in references]
-    used = [s for s in scenarios if any(n in s.cells for n in entries)]
-
-    pairs = [(n, s) for n in entries for s in covers[n]]
-    weights = _adjusted_means([(n, s.name) for n, s in pairs])
-    score, draws = {}, {}
-    for n in entries:
-        parts = [(w, s, m) for w, (m, s) in zip(weights[n].tolist(), pairs, strict=True) if abs(w) > 1e-12]
-        score[n] = float(sum(w * s.means[m] for w, s, m in parts))
-        draws[n] = np.sum([w * s.draws[m] for w, s, m in parts], axis=0)
-    for n in references:  # a plain mean over what they cover
-        score[n] = float(np.mean([s.means[n] for s in covers[n]]))
-        draws[n] = np.mean([s.draws[n] for s in covers[n]], axis=0)
-    several = {n: all(len(s.strata[n]) > 1 for s in covers[n]) for n in names}
-    spread = {n: interval(draws[n]) if several[n] else (math.nan, math.nan) for n in names}
-
-    ranked = {n: score[n] for n in entries if len(covers[n]) >= MIN_COVERAGE * len(used)}
-    places = tiers(ranked, lambda a, b: [s.differences(a, b) for s in scenarios if {a, b} <= s.cells.keys()])
-    order = list(places) + sorted((n for n in entries if n not in places), key=lambda n: (score[n], n))
-    order += sorted(references, key=lambda n: (score[n], n))
-
-    def row(name: str, position: int) -> OverallRow:
-        mine, place = covers[name], places.get(name)
-        seconds = [float(np.median(x)) for s in mine if len(x := s.cells[name].numbers("update_median"))]
-        return OverallRow(
-            **_common([s.cells[name] for s in mine], place, score[name], spread[name]),
-            rank=position if place else None,
-            update_median=_median(seconds),
+def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
+    """The ranking over the scenarios of a track."""
+    names = sorted({n for t in tables for n in (*t.cells, *t.unsuitable)})
+    used = [t for t in tables if any(len(c.logs) and not c.runs.reference for c in t.cells.values())] or list(tables)
+    standing: dict[str, tuple[Standing, str]] = {}
+    cells: dict[str, dict[str, _Cell]] = {}
+    for n in names:
+        cells[n] = {t.name: t.cells[n] for t in used if n in t.cells and len(t.cells[n].logs)}
+        if not cells[n]:
+            if track.name != "post-processing" and any(n in t.unsuitable for t in used):
+                standing[n] = _not_suited(n, used)
+            elif any(n in t.cells for t in used):
+                standing[n] = ("incomplete", _NO_SEED)
+            continue
+        missing = [t.name for t in used if t.name not in cells[n]]
+        standing[n] = ("ranked", "")
+        if any(c.runs.reference for c in cells[n].values()):
+            standing[n] = ("reference", "")
+        elif any(n in t.unsuitable for t in used):
+            standing[n] = _not_suited(n, used)
+        elif missing:
+            more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+            standing[n] = ("incomplete", f"it has not run {missing[0]}{more}")
+        elif bad := [t.name for t in used if t.implausible(n, len(used))]:
+            standing[n] = ("implausible", _IMPLAUSIBLE.format(bad[0]))
+    shown = {n: c for n, c in cells.items() if c}
+    rows, separation = _rows(used, shown, standing)
+    found = []
+    for row in rows:
+        mine = shown[row["estimator"]]
+        found.append(TrackRow(
+            **row,
             covered=len(mine),
-            scenarios=len(scenarios),
-            ratios={s.name: math.exp(s.means[name]) for s in mine},
-        )
+            scenarios=len(used),
+            ratios={s: math.exp(float(c.capped.mean())) for s, c in mine.items()},
+        ))  # fmt: skip
+    for n, (kind, why) in standing.items():
+        if n not in shown:
+            found.append(TrackRow(estimator=n, standing=kind, why=why, score=math.nan, scenarios=len(used)))
+    unit = "recording" if any(t.recorded for t in used) else "seed"
+    relative = any(t.reference.estimator for t in used)
+    return TrackRanking(
+        track.name, track.title, track.score, relative, unit, _units(found, used, shown),
+        tuple(t.name for t in used), remarks(separation, unit, found, [t.reference for t in used]), tuple(found),
+    )  # fmt: skip
 
-    return [row(name, k + 1) for k, name in enumerate(order)]
+
+def _not_suited(name: str, tables: Sequence[_Scenario]) -> tuple[Standing, str]:
+    table = next(t for t in tables if name in t.unsuitable)
+    return "unsuitable", f"{table.name}: {table.unsuitable[name]}"
 
 
-def _adjusted_means(cells: Sequence[tuple[str, str]]) -> dict[str, Array]:
-    """Weights of the cells (estimator, scenario) in the adjusted mean of each estimator.
+def _by_unit(cell: _Cell) -> tuple[list[Any], Array]:
+    """The units of a cell, each once, and the mean of what counts."""
+    if len(set(cell.units)) == len(cell.units):
+        return cell.units, cell.capped
+    units = list(dict.fromkeys(cell.units))
+    index = np.array([units.index(u) for u in cell.units])
+    return units, np.bincount(index, cell.capped) / np.bincount(index)
 
-    The additive model estimator + scenario is fitted by least squares; the adjusted mean is the estimator's effect plus
-    the mean of the scenario effects. Estimators without a chain of common scenarios cannot be adjusted to each other:
-    each such group is adjusted within itself. With full coverage the weights are those of a plain mean.
-    """
-    weights: dict[str, Array] = {}
-    left = list(range(len(cells)))
-    while left:
-        group, grown = [left[0]], True
-        while grown:  # all cells that share an estimator or a scenario with the group
-            rows, columns = {cells[i][0] for i in group}, {cells[i][1] for i in group}
-            more = [i for i in left if i not in group and (cells[i][0] in rows or cells[i][1] in columns)]
-            group += more
-            grown = bool(more)
-        left = [i for i in left if i not in group]
-        estimators = sorted({cells[i][0] for i in group})
-        scenarios = sorted({cells[i][1] for i in group})
-        # Effects: one an estimator, one a scenario with their sum zero (the last row), so that the mean effect is zero.
-        design = np.zeros((len(group) + 1, len(estimators) + len(scenarios)))
-        for row, i in enumerate(group):
-            design[row, estimators.index(cells[i][0])] = 1.0
-            design[row, len(estimators) + scenarios.index(cells[i][1])] = 1.0
-        design[-1, len(estimators) :] = 1.0
-        solution = np.linalg.pinv(design)[:, :-1]
-        for k, name in enumerate(estimators):
-            weights[name] = np.zeros(len(cells))
-            weights[name][group] = solution[k]
-    return weights
+
+@dataclass(frozen=True, eq=False)
+class _Figures:
+    """What the statistics of one row are made from: a figure a unit."""
+
+    strata: list[str]
+    clusters: list[Any]
+    logs: Array
+    failed: NDArray[np.bool_]
+
+    @property
+    def keys(self) -> list[Unit]:
+        return list(zip(self.strata, self.clusters, strict=True))
+
+
+def _figures(tables: Sequence[_Scenario], cells: Mapping[str, _Cell]) -> _Figures:
+    """Simulated: a figure a scenario and seed. Recorded: one a recording, each counting the same."""
+    strata: list[str] = []
+    clusters: list[Any] = []
+    logs, failed = [], []
+    for t in tables:
+        if t.name not in cells:
+            continue
+        units, values = _by_unit(cells[t.name])
+        lost = {u for u, bad in zip(cells[t.name].units, cells[t.name].failed.tolist(), strict=True) if bad}
+        lost -= {u for u, bad in zip(cells[t.name].units, cells[t.name].failed.tolist(), strict=True) if not bad}
+        strata += ["recordings" if t.recorded else t.name] * len(units)
+        clusters += [(t.name, u) if t.recorded else u for u in units]
+        logs.append(values)
+        failed += [u in lost for u in units]
+    return _Figures(strata, clusters, np.concatenate(logs), np.array(failed, dtype=bool))
+
+
+def _rows(
+    tables: Sequence[_Scenario], cells: Mapping[str, Mapping[str, _Cell]], standing: Mapping[str, tuple[Standing, str]]
+) -> tuple[list[dict[str, Any]], Separation | None]:
+    """The fields that all rows have, in the order of a table, and which ranked rows are told apart."""
+    figures = {n: _figures(tables, c) for n, c in cells.items()}
+    scores = {n: score(f.logs, f.strata, f.clusters, f.failed) for n, f in figures.items()}
+    ranked = sorted((n for n in cells if standing[n][0] == "ranked"), key=lambda n: (scores[n].value, n))
+    separation, places = _places(ranked, {n: figures[n] for n in ranked}, {n: scores[n].value for n in ranked})
+    order: dict[str, int] = {"ranked": 0, "implausible": 1, "incomplete": 2, "unsuitable": 3, "reference": 4}
+    rest = sorted((n for n in cells if n not in places), key=lambda n: (order[standing[n][0]], scores[n].value, n))
+    rows = []
+    for n in [*ranked, *rest]:
+        f, mine = figures[n], list(cells[n].values())
+        runs = sum(len(c.logs) for c in mine)
+        failed = sum(int(c.failed.sum()) for c in mine)
+        weights = np.concatenate([np.full(len(c.logs), 1.0 / len(c.logs)) for c in mine])
+        every = np.concatenate([c.capped for c in mine])
+        lost = share(failed, runs)
+        units = min(len(set(f.clusters)), *(len(set(c.units)) for c in mine)) if not tables[0].recorded else len(f.logs)
+        rows.append({
+            "estimator": n,
+            "standing": standing[n][0],
+            "why": standing[n][1],
+            **places.get(n, {}),
+            "provisional": units < PROVISIONAL,
+            "score": scores[n].value,
+            "low": scores[n].low,
+            "high": scores[n].high,
+            "worst": math.exp(float(every.max())),
+            "p95": math.exp(weighted_quantile(every, weights, 0.95)),
+            "runs": runs,
+            "failed": failed,
+            "failed_low": lost.low,
+            "failed_high": lost.high,
+            "clean": _consistency([c.runs for c in mine], "_clean"),
+            "faulty": _consistency([c.runs for c in mine], "_faulty"),
+            "update_median": _median([_median(x) for c in mine if len(x := c.runs.numbers("update_median"))]),
+            "peak_memory": max(c.runs.peak_memory for c in mine),
+        })  # fmt: skip
+    return rows, separation
+
+
+def _places(
+    ranked: Sequence[str], figures: Mapping[str, _Figures], scores: Mapping[str, float]
+) -> tuple[Separation | None, dict[str, dict[str, Any]]]:
+    """Ranks, tiers and what is told apart, of the rows that are ranked, which are given in order of score."""
+    if not ranked:
+        return None, {}
+    keys = sorted({k for f in figures.values() for k in f.keys}, key=repr)
+    index = {k: i for i, k in enumerate(keys)}
+    values = np.full((len(keys), len(ranked)), np.nan)
+    for j, n in enumerate(ranked):
+        values[[index[k] for k in figures[n].keys], j] = figures[n].logs
+    found = separate(values, [k[0] for k in keys], [k[1] for k in keys])
+    tier = tiers(range(len(ranked)), found.better)
+    places: dict[str, dict[str, Any]] = {}
+    for j, n in enumerate(ranked):
+        equal = next(i for i, m in enumerate(ranked) if math.isclose(scores[m], scores[n], rel_tol=1e-9))
+        places[n] = {
+            "rank": equal + 1,
+            "rank_low": int(found.rank_low[j]),
+            "rank_high": int(found.rank_high[j]),
+            "tier": tier[j],
+            "may_be_best": bool(found.may_be_best[j]),
+            "p_value": None if j == 0 else float(found.p_values[0, j]),
+            "better_than": tuple(m for i, m in enumerate(ranked) if found.better[j, i]),
+            "worse_than": tuple(m for i, m in enumerate(ranked) if found.better[i, j]),
+        }
+    return found, places
+
+
+def _units(rows: Sequence[Any], tables: Sequence[_Scenario], cells: Mapping[str, Any]) -> int:
+    """How many seeds (recordings) the ranked rows have at least, in a scenario (over a recorded track)."""
+    names = [r.estimator for r in rows if r.ranked] or [r.estimator for r in rows if r.estimator in cells]
+    counts = []
+    for n in names:
+        mine = cells[n]
+        each = [len(set(c.units)) for c in (mine.values() if isinstance(mine, Mapping) else [mine])]
+        counts.append(sum(each) if tables[0].recorded else min(each))
+    return min(counts, default=0)
+
+
+def _consistency(runs: Sequence[Runs], part: str) -> Consistency:
+    """Over all runs that went as far as having a figure."""
+    nees = np.concatenate([r.numbers(f"nees_horizontal{part}") for r in runs])
+    inside = np.concatenate([r.numbers(f"coverage_95{part}") for r in runs])
+    return Consistency(
+        badge(nees),
+        float(nees.mean()) if len(nees) else math.nan,
+        float(inside.mean()) if len(inside) else math.nan,
+        float(inside.min()) if len(inside) else math.nan,
+    )
+
+
+def _median(values: Sequence[float] | Array) -> float:
+    return float(np.median(values)) if len(values) else math.nan

@@ -1,9 +1,8 @@
-"""The ranking as a figure."""
+"""The ranking of a track as a figure."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.figures.plots import Dot, Style, dots
@@ -11,15 +10,14 @@ from simnav.leaderboard.figures.plots import Dot, Style, dots
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from simnav.leaderboard.ranking.ranking import OverallRow
+    from simnav.leaderboard.ranking.board import TrackRanking
 
 __all__ = ["ranking_figure"]
 
-_AXIS = "Horizontal RMSE, as a multiple of the oracle's"
 
-
-def ranking_figure(rows: Sequence[OverallRow], style: Style | None = None) -> Figure:
-    """Overall score of every estimator with its interval; references are hollow."""
+def ranking_figure(track: TrackRanking, style: Style | None = None) -> Figure:
+    """Score of every estimator of a track with its interval; references are hollow."""
+    rows = track.rows
     if style is None:
         style = Style([r.estimator for r in rows], [r.estimator for r in rows if r.reference])
     points = [
@@ -27,4 +25,5 @@ def ranking_figure(rows: Sequence[OverallRow], style: Style | None = None) -> Fi
         for r in rows
         if math.isfinite(r.score)
     ]
-    return dots(points, style, label=_AXIS, title="Overall, 95 % interval")
+    axis = "Error, as a multiple of the reference figure" if track.relative else "Error [m]"
+    return dots(points, style, label=axis, title=f"{track.title}, 95 % interval")

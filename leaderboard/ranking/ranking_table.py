@@ -1,56 +1,45 @@
-"""The overall ranking as tables show it: captions, how a ratio is written, the table of the terminal."""
+"""The ranking of a track as tables show it: captions, how a ratio is written, the table of the terminal."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.ranking import WORST
+from simnav.leaderboard.ranking.statistics import FAILURE
+from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from simnav.leaderboard.ranking.ranking import Ranking
-    from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.ranking.board import Consistency, Ranking, TrackRanking
 
 __all__ = [
-    "SCORE_LEAD",
-    "SCORE_TITLE",
     "between",
-    "coverages",
-    "ranking_table",
+    "consistency",
+    "ranking_tables",
     "ratio",
     "score_caption",
+    "score_title",
     "tier_starts",
+    "track_table",
 ]
 
-SCORE_TITLE = "× oracle"
 _CAPTION = (
-    "× oracle: ratio of the horizontal RMSE to the oracle's on the same run; interquartile mean over the runs, "
-    "each scenario counting the same. Who does not suit all scenarios is adjusted for how hard the others are."
-)
-_NO_ORACLE = " Where no oracle ran ({}), 1 is the best estimator's median."
-SCORE_LEAD = (
-    "Ranked is the horizontal error as a multiple of that of an oracle, which knows the true noise and every fault."
+    "{score}: geometric mean over the runs, each scenario counting the same; a failed run counts {cap:g}. 95 % "
+    "interval: of the errors of completed runs. Rank: rows that share a rank cannot be told apart."
 )
 
 
-def score_caption(ranking: Ranking) -> str:
-    """What the score is, and what it is a multiple of where that is not the oracle's error."""
-    without = [s.scenario for s in ranking.scenarios if s.baseline.endswith("no oracle ran")]
-    return _CAPTION + (_NO_ORACLE.format(", ".join(without)) if without else "")
+def score_title(track: TrackRanking) -> str:
+    """Heading of the score: ``× reference``, or the error in metres where there is no reference figure."""
+    return "× reference" if track.relative else "error [m]"
 
 
-def coverages(results: Iterable[Result]) -> dict[str, float]:
-    """Median 95 % coverage of each estimator over all its runs; NaN without a covariance."""
-    found: dict[str, list[float]] = {}
-    for r in results:
-        values = found.setdefault(r.estimator, [])
-        if not math.isnan(value := r.scores.get("coverage_95", math.nan)):
-            values.append(value)
-    return {label: sorted(values)[len(values) // 2] if values else math.nan for label, values in found.items()}
+def score_caption(track: TrackRanking) -> str:
+    """What the score is, in two sentences."""
+    what = f"{SCORES[track.score].title} [{SCORES[track.score].unit}]" if track.score in SCORES else track.score
+    what = f"× reference: {what} over the scenario's fixed reference figure" if track.relative else f"Error: {what}"
+    return _CAPTION.format(score=what, cap=FAILURE)
 
 
 def tier_starts(tiers: Sequence[int | None]) -> list[bool]:
@@ -63,8 +52,8 @@ def tier_starts(tiers: Sequence[int | None]) -> list[bool]:
 
 
 def ratio(value: float) -> str:
-    """A ratio to the baseline's error; at the cap it stands for failure."""
-    return "failed" if value >= 0.999 * WORST else tables.number(value)
+    """A ratio to the reference figure; there is none above that of a failed run."""
+    return f"≥ {FAILURE:.0f}" if value >= 0.999 * FAILURE else tables.number(value)
 
 
 def between(low: float, high: float, write: Callable[[Any], str] = tables.number) -> str:
@@ -72,24 +61,57 @@ def between(low: float, high: float, write: Callable[[Any], str] = tables.number
     return f"{write(low)} – {write(high)}" if math.isfinite(low) and math.isfinite(high) else ""
 
 
-def ranking_table(ranking: Ranking, results: Sequence[Result], mine: Collection[str] = ()) -> Table:
-    """The overall ranking for the terminal; ``mine`` are the labels that stand out."""
-    coverage = coverages(results)
-    cells = [
-        [r.rank, r.tier, r.estimator + (" *" if r.reference else ""), ratio(r.score), between(r.low, r.high, ratio),
-         r.badge, tables.percent(coverage.get(r.estimator)), f"{r.failed} of {r.runs}",
-         tables.duration(r.update_median), tables.size(r.peak_memory or None)]
-        for r in ranking.rows
-    ]  # fmt: skip
-    columns = ["rank", "tier", "estimator", SCORE_TITLE, "95 % interval", "consistency", "95 % coverage", "failed",
-               "per epoch", "memory"]  # fmt: skip
-    reference = [i for i, r in enumerate(ranking.rows) if r.reference]
-    return tables.table(
-        "Ranking",
+def consistency(c: Consistency) -> str:
+    """A verdict, and the NEES that it is from.
+
+    >>> from simnav.leaderboard.ranking.board import Consistency
+    >>> consistency(Consistency("optimistic", 7.31)), consistency(Consistency())
+    ('optimistic 7.31', '–')
+    """
+    return tables.MISSING if c.badge == "unknown" else f"{c.badge} {tables.number(c.nees)}"
+
+
+def ranking_tables(ranking: Ranking, mine: Collection[str] = ()) -> list[tables.Fitted]:
+    """A table a track for the terminal; ``mine`` are the labels that stand out."""
+    return [track_table(track, mine) for track in ranking.tracks]
+
+
+def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitted:
+    """The table of a track for the terminal; the columns of least value go first where it is narrow."""
+    title = score_title(track)
+    cells = []
+    for r in track.rows:
+        name = r.estimator + (" *" if r.reference else "")
+        failed = f"{r.failed} of {r.runs}" if r.runs else ""
+        cells.append([
+            r.ranks if r.ranked else tables.MISSING, r.tier, name, ratio(r.score), between(r.low, r.high, ratio),
+            ratio(r.p95), ratio(r.worst), failed, f"{r.covered} of {r.scenarios}", consistency(r.clean),
+            consistency(r.faulty), tables.percent(r.clean.coverage), tables.percent(r.clean.worst_coverage),
+            tables.duration(r.update_median), tables.size(r.peak_memory or None),
+        ])  # fmt: skip
+    columns = ["rank", "tier", "estimator", title, "95 % interval", "95th perc.", "worst run", "failed", "scenarios",
+               "NEES, no fault", "NEES, faults", "95 % coverage", "worst coverage", "per epoch",
+               "memory"]  # fmt: skip
+    value = ["estimator", title, "rank", "95 % interval", "failed", "worst run", "per epoch", "NEES, no fault",
+             "scenarios", "NEES, faults", "95th perc.", "tier", "95 % coverage", "memory",
+             "worst coverage"]  # fmt: skip
+    numeric = [c for c in columns if c not in ("estimator", "95 % interval", "NEES, no fault", "NEES, faults")]
+    notes = [score_caption(track), *track.remarks]
+    best = [r.estimator for r in track.rows if r.may_be_best]
+    if len(best) > 1 and len(best) < sum(r.ranked for r in track.rows):
+        notes.append(f"May be the best (95 %): {', '.join(best)}.")
+    if any(r.reference for r in track.rows):
+        notes.append("* reference: told the truth, not ranked.")
+    notes += [f"Not ranked: {r.estimator} ({r.standing}: {r.why})." for r in track.rows if r.why]
+    scenarios = f"{len(track.scenarios)} scenario{'s' if len(track.scenarios) != 1 else ''}"
+    units = f"{track.units} {track.unit}{'s' if track.units != 1 else ''}"
+    return tables.Fitted(
+        f"{track.title}: {scenarios}, {units}{', provisional' if track.provisional else ''}",
         columns,
         cells,
-        numeric=["rank", "tier", SCORE_TITLE, "95 % coverage", "failed", "per epoch", "memory"],
-        dim=reference,
-        strong=[i for i, r in enumerate(ranking.rows) if r.estimator in mine],
-        caption=score_caption(ranking) + (" * reference: told the truth, not ranked." if reference else ""),
+        value,
+        numeric=numeric,
+        dim=[i for i, r in enumerate(track.rows) if not r.ranked],
+        strong=[i for i, r in enumerate(track.rows) if r.estimator in mine],
+        caption=" ".join(notes),
     )

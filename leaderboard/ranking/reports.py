@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.failures import failures
-from simnav.leaderboard.ranking.ranking import Ranking
 from simnav.leaderboard.ranking.standing import Standing
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.plain import plain
@@ -43,7 +43,7 @@ class _Report:
         return frame(table(self.results).to_pylist())
 
     def plot(self) -> Figure:
-        """The ranking with its intervals."""
+        """The ranking of the first track with its intervals."""
         return self.ranking.plot()
 
 

@@ -16,10 +16,7 @@ from simnav.leaderboard.ranking.statistics import Interval, median
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["MIN_AVAILABILITY", "Run", "Runs", "group", "tracks"]
-
-#: Least share of the epochs with a position in a run that does not count as failed.
-MIN_AVAILABILITY = 0.95
+__all__ = ["Run", "Runs", "group", "tracks"]
 
 Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
 
@@ -31,8 +28,6 @@ class Runs:
     ----------
     results : sequence of Result
         At least one.
-    ranked : str
-        Key of `simnav.scoring.SCORES` that the ranking is by; it decides which runs are `completed`.
 
     Attributes
     ----------
@@ -47,9 +42,9 @@ class Runs:
         If there are two results for one run.
     """
 
-    def __init__(self, results: Sequence[Result], ranked: str = "horizontal_rmse"):
+    def __init__(self, results: Sequence[Result]):
         self.results = sorted(results, key=_run)
-        self.scenario, self.estimator, self.ranked = results[0].scenario, results[0].estimator, ranked
+        self.scenario, self.estimator = results[0].scenario, results[0].estimator
         self.reference = any(r.reference for r in results)
         for a, b in pairwise(self.results):
             if _run(a) == _run(b):
@@ -89,36 +84,16 @@ class Runs:
         x = np.array([r.scores.get(name, math.nan) for r in self.tried], dtype=np.float64)
         return x[np.isfinite(x)]
 
-    # -- as the ranking counts them ------------------------------------------------------------------
-
-    def status(self, result: Result) -> str:
-        """Status of a run in the ranking: "incomplete" where too little came out of a run that ended well."""
-        if result.status != "ok":
-            return result.status
-        sparse = self.ranked == "horizontal_rmse" and not result.scores.get("availability", 1.0) >= MIN_AVAILABILITY
-        return "incomplete" if sparse or not math.isfinite(self._value(result)) else "ok"
-
     @cached_property
     def statuses(self) -> dict[str, int]:
-        """How many runs have which `status`."""
-        found = [self.status(r) for r in self.tried]
+        """How many runs ended how."""
+        found = [r.status for r in self.tried]
         return {s: found.count(s) for s in sorted(set(found))}
 
-    @cached_property
-    def completed(self) -> dict[Run, float]:
-        """The ranked score of the runs that are ok in the ranking."""
-        return {_run(r): self._value(r) for r in self.tried if self.status(r) == "ok"}
-
     def unsuitable(self) -> str:
-        """Why the ranking has no score here, or nothing."""
-        if not self.tried:
-            return min(r.reason or r.status for r in self.results)
-        if len(self.good) == len(self.tried) and not any(math.isfinite(self._value(r)) for r in self.good):
-            return f"has no {self.ranked}"
-        return ""
-
-    def _value(self, result: Result) -> float:
-        return float(result.scores.get(self.ranked, math.nan))
+        """Which instrument is lacking, where the scenario does not suit the estimator; otherwise nothing."""
+        lacking = [r.reason or r.status for r in self.results if r.status == "unsuitable"]
+        return min(lacking) if lacking else ""
 
     # -- curves --------------------------------------------------------------------------------------
 
@@ -154,12 +129,12 @@ def _has(result: Result, name: str) -> bool:
     return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
 
 
-def group(results: Iterable[Result], ranked: str = "horizontal_rmse") -> dict[str, dict[str, Runs]]:
+def group(results: Iterable[Result]) -> dict[str, dict[str, Runs]]:
     """Scenario -> estimator -> runs, both in the order in which they come."""
     lists: dict[str, dict[str, list[Result]]] = {}
     for r in results:
         lists.setdefault(r.scenario, {}).setdefault(r.estimator, []).append(r)
-    return {s: {e: Runs(found, ranked) for e, found in by.items()} for s, by in lists.items()}
+    return {s: {e: Runs(found) for e, found in by.items()} for s, by in lists.items()}
 
 
 def tracks(runs: Iterable[Runs], seed: int) -> tuple[Track | None, list[Track]]:

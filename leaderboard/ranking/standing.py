@@ -12,8 +12,6 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.statistics import compare
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from simnav.leaderboard.ranking.runs import Runs
 
 __all__ = ["Standing", "StandingRow", "standing", "standing_table"]
@@ -100,7 +98,7 @@ def _row(runs: Runs, mine: Runs | None) -> StandingRow:
     if mine is not None and runs is not mine and mine.tried:
         with contextlib.suppress(ValueError):  # no seed in common, or errors of zero
             c = compare(_errors(mine), _errors(runs))
-            return StandingRow(*figures, c.ratio, math.exp(c.low), math.exp(c.high), c.better, c.p_value)
+            return StandingRow(*figures, c.ratio, c.low, c.high, c.better, c.p_value)
     return StandingRow(*figures)
 
 
@@ -109,7 +107,7 @@ def _errors(runs: Runs) -> dict[object, float]:
     return {r.seed: r.scores.get("horizontal_rmse", math.nan) if r.status == "ok" else math.inf for r in runs.tried}
 
 
-def standing_table(stand: Standing) -> Table:
+def standing_table(stand: Standing) -> tables.Fitted:
     """The table of a standing for the terminal."""
     rows = []
     for r in stand.rows:
@@ -121,13 +119,15 @@ def standing_table(stand: Standing) -> Table:
     mine = stand.estimator
     columns = ["estimator", "failed", "horizontal RMSE [m]", f"{mine} / it", f"{mine} better in", "p"]
     place = f"is {stand.place} of {stand.of}" if stand.place else "does not suit it"
-    return tables.table(
+    return tables.Fitted(
         f"{stand.scenario}: {mine} {place}",
         columns,
         rows,
+        ["estimator", f"{mine} / it", "p", "horizontal RMSE [m]", "failed", f"{mine} better in"],
         numeric=columns[1:],
         dim=[i for i, r in enumerate(stand.rows) if r.reference],
         strong=[i for i, r in enumerate(stand.rows) if r.estimator == mine],
         caption="Median over the seeds with its 95 % interval. Ratio: geometric mean over the same seeds; below 1 "
-        "the estimator is better. p: Wilcoxon signed-rank test. * reference: told the truth.",
+        "the estimator is better; a run that only one of the two failed counts 1000. p: sign-flip test. "
+        "Intervals need 6 seeds. * reference: told the truth.",
     )

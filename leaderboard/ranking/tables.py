@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table
 
-__all__ = ["duration", "interval", "number", "parameters", "percent", "size", "table"]
+__all__ = ["Fitted", "duration", "interval", "number", "parameters", "percent", "size", "table"]
 
 MISSING = "–"
 
@@ -162,3 +164,66 @@ def table(
         style = "bold" if index in bold else "dim" if index in faint else ""
         result.add_row(*(Text(MISSING if c is None else str(c)) for c in row), style=style)
     return result
+
+
+_BETWEEN, _EDGES = 3, 2  # characters between two columns, and at both ends of a line
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A table that leaves out the columns of least value where the terminal is too narrow for all.
+
+    Parameters
+    ----------
+    title : str
+    columns : sequence of str
+    rows : sequence of sequences
+    value : sequence of str
+        Columns from the most valuable on. The first ones are never left out, be the terminal ever so narrow; columns
+        that are not named go first.
+    always : int
+        How many are never left out.
+    numeric, dim, strong, caption
+        As of `table`.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+    value: Sequence[str]
+    always: int = 2
+    numeric: Sequence[str] = ()
+    dim: Sequence[int] = ()
+    strong: Sequence[int] = ()
+    caption: str | None = None
+
+    def shown(self, width: int) -> list[str]:
+        """The columns that fit into a width [characters], in the order of the table."""
+        filled = [c for i, c in enumerate(self.columns) if not self.rows or any(row[i] != "" for row in self.rows)]
+        order = sorted(filled, key=lambda c: self.value.index(c) if c in self.value else len(self.value))
+        kept: list[str] = []
+        used = _EDGES - _BETWEEN
+        for count, name in enumerate(order):
+            wanted = used + self._width(name) + _BETWEEN
+            if count < self.always or wanted <= width:
+                kept.append(name)
+                used = wanted
+        return [name for name in self.columns if name in kept]
+
+    def _width(self, name: str) -> int:
+        index = self.columns.index(name)
+        heading = max(map(len, _fold(name).split("\n"))) if name in self.numeric else len(name)
+        return max([heading, *(len(MISSING if r[index] is None else str(r[index])) for r in self.rows)])
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        kept = self.shown(options.max_width)
+        where = [self.columns.index(name) for name in kept]
+        left = [c for i, c in enumerate(self.columns) if c not in kept and any(row[i] != "" for row in self.rows)]
+        caption = self.caption
+        if left:
+            note = f"Left out for want of width: {', '.join(left)}."
+            caption = f"{caption} {note}" if caption else note
+        yield table(
+            self.title, kept, [[row[i] for i in where] for row in self.rows], numeric=self.numeric, dim=self.dim,
+            strong=self.strong, caption=caption,
+        )  # fmt: skip

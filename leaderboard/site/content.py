@@ -12,7 +12,7 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_table import between
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.ranking import OverallRow, ScenarioRow
+    from simnav.leaderboard.ranking.board import Row, ScenarioRow, TrackRow
     from simnav.leaderboard.ranking.runs import Runs
     from simnav.leaderboard.ranking.statistics import Interval
 
@@ -28,6 +28,7 @@ __all__ = [
     "Failure",
     "Image",
     "IndexRow",
+    "IndexTrack",
     "MatrixRow",
     "ScenarioEntry",
     "ScenarioPage",
@@ -220,13 +221,40 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class IndexRow:
-    """A row of the overall ranking: coverage is the median over all runs of the 95 % coverage."""
+    """A row of the ranking of a track."""
 
-    row: OverallRow
+    row: TrackRow
     entry: EstimatorEntry
-    coverage: float
     starts_tier: bool
     bar: Bar | None
+
+
+@dataclass(frozen=True)
+class IndexTrack:
+    """The ranking of a track on the index.
+
+    Attributes
+    ----------
+    track : str
+        In kebab-case.
+    title, caption : str
+    score : str
+        Heading of the score.
+    provisional : bool
+    rows : tuple of IndexRow
+    notes : tuple of str
+        Sentences below the table.
+    figure : Image or None
+    """
+
+    track: str
+    title: str
+    caption: str
+    score: str
+    provisional: bool
+    rows: tuple[IndexRow, ...]
+    notes: tuple[str, ...]
+    figure: Image | None
 
 
 @dataclass(frozen=True)
@@ -263,6 +291,7 @@ class ScenarioPage:
 
     entry: ScenarioEntry
     baseline: str
+    remarks: tuple[str, ...]
     columns: tuple[Column, ...]
     rows: tuple[ScenarioPageRow, ...]
     unsuitable: Mapping[str, Sequence[str]]
@@ -314,7 +343,7 @@ def score_cells(runs: Sequence[tuple[Runs, bool]]) -> tuple[tuple[Column, ...], 
     return tuple(columns), [tuple(row) for row in cells]
 
 
-def bars(rows: Iterable[OverallRow]) -> list[Bar | None]:
+def bars(rows: Iterable[Row]) -> list[Bar | None]:
     """Every score with its interval on one logarithmic scale, which ends at `_WIDEST` times the least."""
     rows = list(rows)
     ends = [v for r in rows for v in (r.score, r.low, r.high) if v > 0.0 and math.isfinite(v)]
@@ -325,7 +354,7 @@ def bars(rows: Iterable[OverallRow]) -> list[Bar | None]:
     def place(value: float) -> float:
         return round(min(2.0 + 96.0 * (math.log(value) - low) / span, 100.0), 2)
 
-    def bar(row: OverallRow) -> Bar | None:
+    def bar(row: Row) -> Bar | None:
         if not row.score > 0.0 or not math.isfinite(row.score):
             return None
         known = row.low > 0.0 and math.isfinite(row.high)

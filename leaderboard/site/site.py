@@ -24,14 +24,7 @@ import numpy as np
 from simnav.leaderboard.figures.plots import Style
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
-from simnav.leaderboard.ranking.ranking_table import (
-    SCORE_LEAD,
-    SCORE_TITLE,
-    coverages,
-    ratio,
-    score_caption,
-    tier_starts,
-)
+from simnav.leaderboard.ranking.ranking_table import ratio, score_caption, score_title, tier_starts
 from simnav.leaderboard.ranking.runs import Runs, group
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
@@ -46,6 +39,7 @@ from simnav.leaderboard.site.content import (
     Failure,
     Image,
     IndexRow,
+    IndexTrack,
     MatrixRow,
     ScenarioEntry,
     ScenarioPage,
@@ -59,7 +53,7 @@ from simnav.leaderboard.site.scenario_figures import catalogued, scenario_figure
 from simnav.scoring import badge
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.ranking import Ranking, ScenarioRanking
+    from simnav.leaderboard.ranking.board import Ranking, ScenarioRanking, TrackRanking
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["build"]
@@ -207,7 +201,12 @@ class _Site:
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
         self.runs = group(self.results)
         labels = list(
-            dict.fromkeys([*(row.estimator for row in ranking.rows), *sorted({r.estimator for r in self.results})])
+            dict.fromkeys(
+                [
+                    *(row.estimator for track in ranking.tracks for row in track.rows),
+                    *sorted({r.estimator for r in self.results}),
+                ]
+            )
         )
         references = {r.estimator for r in self.results if r.reference}
         self.style = Style(labels, references)
@@ -290,31 +289,34 @@ class _Site:
     # -- index -----------------------------------------------------------------------------------
 
     def _index(self) -> dict[str, object]:
-        ranked = self.ranking.rows
         facts = [
             Fact("Scenarios", len(self.scenarios)),
             Fact("Estimators", len(self.estimators)),
             Fact("Seeds a scenario", max(len(s.seeds) for s in self.scenarios)),
             Fact("Runs", sum(r.tried for r in self.results)),
-            Fact("Failed", sum(row.failed for row in ranked)),
+            Fact("Failed", sum(runs.failed for by in self.runs.values() for runs in by.values())),
         ]
-        coverage = coverages(self.results)
-        rows = [
-            IndexRow(row, self.estimators[row.estimator], coverage[row.estimator], starts, bar)
-            for row, starts, bar in zip(ranked, tier_starts([r.tier for r in ranked]), bars(ranked), strict=True)
-        ]
+        return {"facts": facts, "tracks": [self._track(t) for t in self.ranking.tracks], "matrix": self._matrix()}
+
+    def _track(self, track: TrackRanking) -> IndexTrack:
+        starts = tier_starts([r.tier for r in track.rows])
+        rows = tuple(
+            IndexRow(row, self.estimators[row.estimator], first, bar)
+            for row, first, bar in zip(track.rows, starts, bars(track.rows), strict=True)
+        )
         figure = None
-        if any(math.isfinite(row.score) for row in ranked):
+        if any(math.isfinite(row.score) for row in track.rows):
             figure = write_figure(
                 self.folder,
-                ranking_figure(ranked, self.style),
-                "ranking",
-                "The ranking with its intervals; hollow: reference.",
-                "Overall score of every estimator with its interval, as in the table above",
+                ranking_figure(track, self.style),
+                f"ranking-{track.track}",
+                f"{track.title}: the ranking with its intervals; hollow: reference.",
+                "Score of every estimator with its interval, as in the table above",
             )
-        title = SCORE_TITLE.replace(" ", "\u00a0")
-        texts = {"title": title, "lead": SCORE_LEAD, "caption": score_caption(self.ranking)}
-        return {"texts": texts, "facts": facts, "ranking": rows, "matrix": self._matrix(), "figure": figure}
+        barred = [r for r in track.rows if r.why]
+        notes = (*track.remarks, *(f"{r.estimator} is not ranked ({r.standing}): {r.why}." for r in barred))
+        title = score_title(track).replace(" ", "\u00a0")
+        return IndexTrack(track.track, track.title, score_caption(track), title, track.provisional, rows, notes, figure)
 
     def _matrix(self) -> list[MatrixRow]:
         medians = {
@@ -342,7 +344,8 @@ class _Site:
         columns, cells = score_cells([(by[row.estimator], row.reference) for row in ranking.rows])
         return ScenarioPage(
             entry=entry,
-            baseline=ranking.baseline,
+            baseline=ranking.reference.text,
+            remarks=ranking.remarks,
             columns=columns,
             rows=tuple(
                 ScenarioPageRow(row, self.estimators[row.estimator], c, starts)
@@ -364,11 +367,12 @@ class _Site:
         mine = [(s, self.runs[s.id][label]) for s in self.scenarios if label in self.runs[s.id]]
         suited = [(s, r) for s, r in mine if r.tried]
         columns, cells = score_cells([(r, True) for _, r in suited])
-        row = next((r for r in self.ranking.rows if r.estimator == label), None)  # None: no scenario suits it
-        facts = () if row is None else (
-            Fact("Rank", row.rank or "–"), Fact("Tier", row.tier or "–"), Fact(SCORE_TITLE, ratio(row.score)),
-            Fact("Failed", f"{row.failed} of {row.runs}"), Fact("Per epoch", tables.duration(row.update_median)),
-        )  # fmt: skip
+        facts = tuple(
+            Fact(track.title, f"{row.ranks or '–'} of {sum(r.ranked for r in track.rows)}, {ratio(row.score)}")
+            for track in self.ranking.tracks
+            for row in track.rows
+            if row.estimator == label and math.isfinite(row.score)
+        )
         return EstimatorPage(
             entry=self.estimators[label],
             summary=_summary(label),

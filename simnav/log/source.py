@@ -97,7 +97,7 @@ class LogSource:
         if simulated:
             notes.append(f"simulated from the reference: {', '.join(simulated)}")
         self.note = "; ".join(notes)
-        self.start = draw_start(told, scenario.initial_error.covariance(), root)
+        self.start = draw_start(told, scenario.initial_error.covariance(), root, scenario.initial_error.factors())
         self._imu_labels: ImuLabels | None = None
         if self._imu is not None and any("imu" in f.instruments for f in scenario.faults):
             n = len(self._imu)

@@ -3,6 +3,8 @@
 Radii are empirical quantiles of the horizontal error over the epochs of a run, not multiples of a sigma: CEP50 is its
 median, R95 its 95th percentile (the form of requirement in IMO resolutions A.915(22) and A.1046(27), for example 10 m
 at 95 % in harbour approaches).
+
+An epoch without a position counts with the last position that was given (`simnav.scoring.ScoringInput.held_error`).
 """
 
 from __future__ import annotations
@@ -93,7 +95,7 @@ def _register_component(
 
     @register_score(name, title=title, unit=unit, better="lower")
     def component(given: ScoringInput) -> float:
-        error = given.error
+        error = given.held_error
         if len(columns) == 2:
             return measure(np.hypot(error[:, columns[0]], error[:, columns[1]]))
         return measure(error[:, columns[0]])
@@ -134,4 +136,5 @@ def _drift(given: ScoringInput) -> float:
 @register_score("availability", title="Share of all epochs with a horizontal position", unit="-", better="higher")
 def _availability(given: ScoringInput) -> float:
     known = np.isfinite(given.recording.data.truth.position[:, :2]).all(axis=1)
-    return float(np.isfinite(given.horizontal).sum() / known.sum()) if known.any() else float("nan")
+    given_here = np.isfinite(given.error[:, :2]).all(axis=1)
+    return float(given_here.sum() / known.sum()) if known.any() else float("nan")

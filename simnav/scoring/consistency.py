@@ -8,6 +8,9 @@ Navigation*, Wiley 2001, section 5.4). Scores here are divided by d: 1 is ideal,
 Errors are correlated over the epochs of a run, so that the epochs are no independent samples; runs are. Bands are
 therefore those of the mean over M runs, chi-square with M d degrees of freedom: exact at one epoch, and wider than
 needed for a mean over time.
+
+The horizontal NEES and the coverage are also scored by parts: before the first measurement that a fault touched, and
+from then on. An estimator may be consistent while nothing is wrong, and not know when something is.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.recording import Recording
 from simnav.scoring.registry import ScoringInput, register_score
 from simnav.types import Array
 
@@ -28,6 +32,7 @@ __all__ = [
     "Badge",
     "badge",
     "coverage",
+    "first_fault",
     "nees",
     "nees_band",
 ]
@@ -141,38 +146,70 @@ def _nees_of(given: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
     return {group: nees(given.error, covariance, components) for group, components in GROUPS.items()}
 
 
-def _register_nees(group: str, title: str) -> None:
+def first_fault(recording: Recording) -> float:
+    """Time of the first measurement or IMU sample that a fault touched [s]; infinite without any.
+
+    Missing measurements are no faults here: a consistent estimator knows that it hears nothing.
+    """
+    data = recording.data
+    times = [s.time[s.faults != 0] for s in data.aids.values()]
+    if data.imu is not None and data.imu_labels is not None:
+        times.append(data.imu.time[data.imu_labels.faults != 0])
+    return min((float(t[0]) for t in times if len(t)), default=math.inf)
+
+
+def _before_faults(given: ScoringInput) -> NDArray[np.bool_]:
+    """Which epochs lie before the first fault."""
+    return given.trial.time < first_fault(given.recording) - 1e-9
+
+
+#: Parts of a run that are judged: all of it, before the first fault, and from then on.
+_PARTS = {"": "", "_clean": ", before the first fault", "_faulty": ", from the first fault on"}
+
+
+def _part(given: ScoringInput, part: str) -> NDArray[np.bool_]:
+    if not part:
+        return np.ones(len(given.trial.time), dtype=bool)
+    before = given.shared(_before_faults)
+    return before if part == "_clean" else ~before
+
+
+def _register_nees(group: str, title: str, part: str = "") -> None:
     """The mean over the epochs, divided by the degrees of freedom: 1 is ideal, at most `LARGEST`."""
 
     @register_score(
-        f"nees_{group}", title=f"Mean NEES by degree of freedom, {title}", unit="-", better="one", uses_covariance=True
-    )
+        f"nees_{group}{part}", title=f"Mean NEES by degree of freedom, {title}{_PARTS[part]}", unit="-", better="one",
+        uses_covariance=True,
+    )  # fmt: skip
     def mean(given: ScoringInput) -> float:
         found = given.shared(_nees_of).get(group)
-        if found is None or not (found[1] > 0).any():
+        if found is None:
             return float("nan")
         values, degrees = found
-        known = degrees > 0
-        return min(float(values[known].sum() / degrees[known].sum()), LARGEST)
+        known = (degrees > 0) & _part(given, part)
+        return min(float(values[known].sum() / degrees[known].sum()), LARGEST) if known.any() else float("nan")
 
 
-def _register_coverage(percent: int) -> None:
+def _register_coverage(percent: int, part: str = "") -> None:
     @register_score(
-        f"coverage_{percent}", title=f"Coverage of the {percent} % horizontal ellipse", unit="-", better="nominal",
-        uses_covariance=True,
+        f"coverage_{percent}{part}", title=f"Coverage of the {percent} % horizontal ellipse{_PARTS[part]}", unit="-",
+        better="nominal", uses_covariance=True,
     )  # fmt: skip
     def share(given: ScoringInput) -> float:
         found = given.shared(_nees_of).get("horizontal")
         if found is None:
             return float("nan")
         values, degrees = found
-        return coverage(np.where(degrees == 2, values, np.nan), percent / 100.0)
+        return coverage(np.where((degrees == 2) & _part(given, part), values, np.nan), percent / 100.0)
 
 
 for _group in GROUPS:
     _register_nees(_group, "horizontal position" if _group == "horizontal" else _group)
 for _percent in (50, 95):
     _register_coverage(_percent)
+for _of in ("_clean", "_faulty"):
+    _register_nees("horizontal", "horizontal position", _of)
+    _register_coverage(95, _of)
 
 
 def badge(nees_by_run: Array, degrees: int = 2) -> Badge:

@@ -11,7 +11,7 @@ from simnav.recording import Recording
 from simnav.trial import Trial
 from simnav.types import Array, NavigationStates
 
-__all__ = ["attitude_error", "errors", "horizontal", "smoothed_errors", "state_errors"]
+__all__ = ["attitude_error", "errors", "held_errors", "horizontal", "smoothed_errors", "state_errors"]
 
 
 def errors(trial: Trial, recording: Recording) -> Array:
@@ -41,15 +41,41 @@ def errors(trial: Trial, recording: Recording) -> Array:
     return state_errors(states, truth, trial.estimated)
 
 
+def held_errors(trial: Trial, recording: Recording) -> Array:
+    """Errors like `errors`, but at an epoch without a position that of the last position that was given.
+
+    So there is nothing to gain by giving no position where it is hard. Before the first position, that of the start
+    counts. Horizontal position and height are held separately, and only where the estimator ever gives them.
+    """
+    states = NavigationStates(trial.time, trial.position, trial.velocity, trial.attitude)
+    states, estimated = _held(states, trial.estimated, recording.start.position)
+    return state_errors(states, recording.data.truth[: len(trial)], estimated)
+
+
+def _held(
+    states: NavigationStates, estimated: NDArray[np.bool_], start: Array
+) -> tuple[NavigationStates, NDArray[np.bool_]]:
+    """States without gaps in the position, and which components they then hold."""
+    position, estimated = states.position.copy(), estimated.copy()
+    for part in (slice(0, 2), slice(2, 3)):
+        given: NDArray[np.bool_] = np.asarray((estimated[:, part] & np.isfinite(position[:, part])).all(axis=1))
+        if not given.any() or given.all():
+            continue
+        last = np.maximum.accumulate(np.where(given, np.arange(len(position)), -1))
+        position[:, part] = np.where((last >= 0)[:, None], position[last, part], start[part])
+        estimated[:, part] = True
+    return NavigationStates(states.time, position, states.velocity, states.attitude), estimated
+
+
 def smoothed_errors(trial: Trial, recording: Recording) -> Array | None:
-    """Errors of the smoothed trajectory, like `errors`, or None where the estimator does not smooth."""
+    """Errors of the smoothed trajectory, like `held_errors`, or None where the estimator does not smooth."""
     if trial.smoothed is None:
         return None
     given: NDArray[np.bool_] = np.any(trial.estimated, axis=0)
     if not given.any():  # all that it does is smooth
         given = np.ones(9, dtype=bool)
-    given = np.broadcast_to(given, trial.estimated.shape)
-    return state_errors(trial.smoothed, recording.data.truth[: len(trial)], given)
+    states, estimated = _held(trial.smoothed, np.broadcast_to(given, trial.estimated.shape), recording.start.position)
+    return state_errors(states, recording.data.truth[: len(trial)], estimated)
 
 
 def state_errors(states: NavigationStates, truth: NavigationStates, estimated: NDArray[np.bool_]) -> Array:

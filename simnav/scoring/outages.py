@@ -131,7 +131,7 @@ def outage_scores(error: Array, recording: Recording, *, threshold: float = RECO
 
 
 def _of_run(given: ScoringInput) -> dict[str, float]:
-    return outage_scores(given.error, given.recording)
+    return outage_scores(given.held_error, given.recording)
 
 
 def _register(name: str, title: str, unit: str, better: Better) -> None:

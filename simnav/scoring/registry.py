@@ -21,7 +21,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 from simnav.plugins import PluginError, Registry
 from simnav.recording import Recording
-from simnav.scoring.navigation_error import errors, horizontal, smoothed_errors
+from simnav.scoring.navigation_error import errors, held_errors, horizontal, smoothed_errors
 from simnav.trial import Trial
 from simnav.types import Array
 
@@ -44,7 +44,7 @@ class ScoringInput:
     Attributes
     ----------
     error : (T, 9) array
-        As from `simnav.scoring.errors`.
+        As from `simnav.scoring.errors`; NaN at epochs without an estimate.
 
     Raises
     ------
@@ -58,9 +58,14 @@ class ScoringInput:
         self._shared: dict[Any, Any] = {}
 
     @cached_property
+    def held_error(self) -> Array:
+        """As ``error``, (T, 9), but at an epoch without a position that of the last position that was given."""
+        return held_errors(self.trial, self.recording)
+
+    @cached_property
     def horizontal(self) -> Array:
-        """Length of the horizontal position error [m], (T,); NaN where it is not known."""
-        return horizontal(self.error)
+        """Length of the horizontal position error [m], (T,), of `held_error`; NaN where the truth is not known."""
+        return horizontal(self.held_error)
 
     @cached_property
     def smoothed_error(self) -> Array | None:

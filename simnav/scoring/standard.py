@@ -6,6 +6,7 @@ from __future__ import annotations
 from simnav.scoring import accuracy
 from simnav.scoring import outages
 from simnav.scoring import consistency
+from simnav.scoring import integrity
 from simnav.scoring import detection
 from simnav.scoring import noise_estimation
 from simnav.scoring import smoothed
@@ -13,4 +14,4 @@ from simnav.scoring import cost
 
 # isort: on
 
-__all__ = ["accuracy", "consistency", "cost", "detection", "noise_estimation", "outages", "smoothed"]
+__all__ = ["accuracy", "consistency", "cost", "detection", "integrity", "noise_estimation", "outages", "smoothed"]

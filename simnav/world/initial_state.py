@@ -12,7 +12,7 @@ from simnav.types import Array, InitialState, NavigationStates
 __all__ = ["draw_start"]
 
 
-def draw_start(truth: NavigationStates, covariance: Array, seed: int) -> InitialState:
+def draw_start(truth: NavigationStates, covariance: Array, seed: int, factors: Array | float = 1.0) -> InitialState:
     """Draw the initial state of a run.
 
     Parameters
@@ -23,6 +23,8 @@ def draw_start(truth: NavigationStates, covariance: Array, seed: int) -> Initial
         Of the errors, over `simnav.types.COMPONENTS`.
     seed : int
         Seed of the run.
+    factors : (9,) array or float
+        How many times as large as the covariance says the errors really are.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def draw_start(truth: NavigationStates, covariance: Array, seed: int) -> Initial
         raise ValueError(
             f"the initial covariance is not positive definite: its least eigenvalue is {least:.3g}"
         ) from None
-    error = root @ stream(seed, "initial error").standard_normal(9)
+    error = factors * (root @ stream(seed, "initial error").standard_normal(9))
     dcm = dcm_from_rotation_vector(error[6:9]) @ dcm_from_rpy(truth.attitude[0])
     return InitialState(
         float(truth.time[0]),

@@ -1,51 +1,14 @@
-"""The examples of docs/reference/estimators.md keep the contract, and the tables tell the truth."""
+"""The tables of docs/reference/estimators.md are true."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-import numpy as np
-import pytest
-
-from simnav.estimator import describe, make, names
-from simnav.testing.contract_check import check
+from simnav.estimator import describe, names
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "estimators.md"
 TEXT = PAGE.read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"^```python\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
-
-
-@pytest.mark.usefixtures("clean_registry")
-@pytest.mark.parametrize("k", range(len(EXAMPLES)))
-def test_examples_keep_the_contract(tmp_path: Path, k: int):
-    path = tmp_path / f"example_{k}.py"
-    path.write_text(EXAMPLES[k])
-    report = check(str(path))
-    assert report.passed, str(report)
-
-
-def test_the_first_example_is_short():
-    lines = [line for line in EXAMPLES[0].splitlines() if line.strip()]
-    body = [line for line in lines if not line.startswith(("import", "from"))]
-    assert len(lines) <= 25, len(lines)
-    assert len(body) <= 22
-
-
-@pytest.mark.usefixtures("clean_registry")
-def test_the_first_example_is_useful(tmp_path: Path, recording_of, run_over):
-    """Half the error of the fixes, and gross errors do not matter."""
-    path = tmp_path / "alpha_beta.py"
-    path.write_text(EXAMPLES[0])
-    recording = recording_of(1, 300.0, turning=0.0, sea=0.0)
-    gnss = recording.data.aids["gnss"]
-    gnss.value[::20, 0] += 100.0 / 6.37e6
-    errors, _ = run_over(make(str(path)), recording)
-    lever = np.array([2.0, -1.0, -8.0])  # not corrected for
-    yaw = recording.data.truth.attitude[0, 2]
-    ned = np.array([np.cos(yaw) * lever[0] - np.sin(yaw) * lever[1], np.sin(yaw) * lever[0] + np.cos(yaw) * lever[1]])
-    rmse = np.sqrt(np.mean((errors[50:, :2] - ned) ** 2))
-    assert rmse < 0.6 * 1.5
 
 
 def test_the_parameter_table_is_true():

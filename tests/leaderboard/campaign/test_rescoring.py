@@ -67,7 +67,7 @@ def test_a_new_score_after_a_campaign(here: Path, monkeypatch: pytest.MonkeyPatc
         assert rescored == pytest.approx(old.scores, rel=1e-6, nan_ok=True)
         assert new.scores["north_spread"] > 0.0
     ranking = simnav.rank("out", score="north_spread")
-    assert ranking.score == "north_spread"
+    assert ranking.tracks[0].score == "north_spread"
     medians = {row.estimator: row.median for row in ranking.scenarios[0].rows}
     for label, median in medians.items():
         values = [r.scores["north_spread"] for r in after if r.estimator == label]

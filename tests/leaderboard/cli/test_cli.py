@@ -341,7 +341,7 @@ def test_campaign_goes_on_where_it_was_and_the_board_follows(here):
     assert (first["asked"], first["computed"], first["runs"], first["failed"]) == (4, 4, 4, {})
     again = document(*words, "--runs", "3")
     assert (again["asked"], again["computed"], again["runs"]) == (6, 2, 6)
-    assert [r["estimator"] for r in again["ranking"]["rows"]] == ["gnss-only", "mine"]
+    assert [r["estimator"] for r in again["ranking"]["tracks"][0]["rows"]] == ["gnss-only", "mine"]
 
     board = document("leaderboard", "out", "--output", "board", "--workers", "1")
     assert Path(board["site"]) == here / "board" / "index.html"
@@ -350,7 +350,7 @@ def test_campaign_goes_on_where_it_was_and_the_board_follows(here):
     rows = json.loads((here / "board" / "results.json").read_text())["results"]
     assert len(rows) == board["runs"] == 6
     shown = call("leaderboard", "out", "--output", "board", "--workers", "1").stdout
-    assert "Ranking" in shown
+    assert "Other scenarios: 1 scenario, 3 seeds, provisional" in shown
     assert str(here / "board" / "index.html") in shown.replace("\n", "")
 
 

@@ -11,8 +11,8 @@ from simnav.leaderboard.ranking.runs import Runs, group
 from simnav.leaderboard.results.result import Result
 
 
-def ended(seed: int, status: str = "ok", availability: float = 1.0, **fields: Any) -> Result:
-    scores = {"horizontal_rmse": 1.0 + seed, "availability": availability} if status == "ok" else {}
+def ended(seed: int, status: str = "ok", **fields: Any) -> Result:
+    scores = {"horizontal_rmse": 1.0 + seed} if status == "ok" else {}
     return Result("s-v1", seed, "e", {}, False, status, "why", scores, **fields)
 
 
@@ -34,15 +34,11 @@ def test_failures_do_not_count_as_runs_that_do_not_suit():
     ]
     assert [r.seed for r in runs.results] == [0, 1, 2, 3, 4]
     assert (len(runs.tried), len(runs.good), runs.failed) == (3, 2, 1)
+    assert runs.statuses == {"ok": 2, "timeout": 1}
     assert runs.scores("horizontal_rmse") == [1.0, 2.0]
+    assert runs.unsuitable() == "why"
     assert Runs([ended(0, "unsuitable")]).tried == []
-
-
-def test_too_few_positions_are_a_failure_of_the_ranking_alone():
-    runs = Runs([ended(0), ended(1, availability=0.5), ended(2, "error")])
-    assert runs.failed == 1
-    assert runs.statuses == {"error": 1, "incomplete": 1, "ok": 1}
-    assert runs.completed == {(0, ""): 1.0}
+    assert Runs([ended(0, "no-recording")]).unsuitable() == ""
 
 
 def test_a_run_counts_once():

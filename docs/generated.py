@@ -1,0 +1,177 @@
+"""Pages of the documentation that are made from the code: commands, estimators, scores, instruments and faults.
+
+mkdocs calls `on_files` (``hooks`` in ``mkdocs.yml``).
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+NOTE = "*This page is generated from the code.*"
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the generated pages."""
+    pages = {
+        "reference/commands.md": commands(),
+        "reference/rows.md": rows(),
+        "reference/scores.md": scores(),
+        "reference/instruments.md": instruments(),
+    }
+    for path, text in pages.items():
+        files.append(File.generated(config, path, content=text))
+    return files
+
+
+def commands() -> str:
+    """All commands with their arguments and options."""
+    import typer.main
+
+    from simnav.leaderboard.cli import app
+
+    root = typer.main.get_command(app)
+    parts = [
+        "# Command line",
+        NOTE,
+        "Results go to standard output, messages to standard error. The exit code is 0 for success, 1 for a failure "
+        "and 2 for a mistake of the user. `--json` prints a document for other programs.",
+    ]
+    for name, command in _commands(root, "simnav"):
+        help_text = re.sub(r"\s+", " ", command.help or "").strip()
+        parts += [f"## {name}", help_text]
+        lines = [
+            _line((f"`{_invocation(p)}`", _escaped(p.help or ""), _default(p)))
+            for p in command.params
+            if p.name != "help" and not getattr(p, "hidden", False)
+        ]
+        if lines:
+            parts.append("\n".join((*_head("argument or option", "meaning", "default"), *lines)))
+    return "\n\n".join(parts) + "\n"
+
+
+def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
+    children = getattr(command, "commands", {})
+    for key, child in sorted(children.items()):
+        if getattr(child, "commands", None):
+            yield from _commands(child, f"{name} {key}")
+        else:
+            yield f"{name} {key}", child
+
+
+def _invocation(parameter: Any) -> str:
+    if parameter.param_type_name == "argument":
+        return str(parameter.metavar or parameter.name.upper())
+    return ", ".join((*parameter.opts, *parameter.secondary_opts))
+
+
+def _default(parameter: Any) -> str:
+    value = parameter.default
+    if parameter.required:
+        return "required"
+    return "" if value is None or value is False or callable(value) or value == [] else f"`{value}`"
+
+
+def rows() -> str:
+    """All estimators with their docstrings and parameters."""
+    from simnav.estimator import describe, find, names
+
+    parts = [
+        "# Estimators in detail",
+        NOTE,
+        "The descriptions of the parameters come from the pieces that an estimator is made of. "
+        "[Estimators](estimators.md) has an overview.",
+    ]
+    for name in names():
+        about = describe(name)
+        text, parameters = _sections(inspect.getdoc(find(name)) or "")
+        aliases = f" Also: {', '.join(f'`{a}`' for a in about.aliases)}." if about.aliases else ""
+        kind = " A reference, which is not ranked." if about.reference else ""
+        parts += [f"## {name}", _escaped(text) + aliases + kind]
+        if about.parameters:
+            lines = (
+                _line((f"`{p.name}`", f"`{p.default}`", _escaped(parameters.get(p.name, "")))) for p in about.parameters
+            )
+            parts.append("\n".join((*_head("parameter", "default", "meaning"), *lines)))
+    return "\n\n".join(parts) + "\n"
+
+
+def _sections(docstring: str) -> tuple[str, dict[str, str]]:
+    """The text before the parameters of a numpydoc docstring, and the meaning of each parameter."""
+    text, _, rest = docstring.partition("\nParameters\n----------\n")
+    text = re.split(r"\n\w[\w ]*\n-{4,}\n", text)[0]
+    meanings: dict[str, str] = {}
+    body = re.split(r"\n\n\w[\w ]*\n-{4,}\n", rest)[0]
+    for match in re.finditer(
+        r"^(\S[^\n]*?) ?: ?([^\n]*)\n((?:[ \t]+[^\n]*\n?|\n(?=[ \t]))*)", body + "\n", re.MULTILINE
+    ):
+        for name in match[1].split(","):
+            meanings[name.strip()] = re.sub(r"\s+", " ", match[3]).strip()
+    return text.strip(), meanings
+
+
+def scores() -> str:
+    """All scores with title, unit and direction."""
+    from simnav.scoring import SCORES
+
+    better = {"lower": "lower is better", "higher": "higher is better", "one": "one is best", None: ""}
+    lines = [_line((f"`{name}`", s.title, s.unit, better.get(s.better, str(s.better)))) for name, s in SCORES.items()]
+    head = _head("name", "title", "unit", "direction")
+    text = "Scores are computed for each run. A score that does not apply to a run is left out. "
+    text += "[Add a score](../how-to/add-a-score.md) shows how to register one, and the [glossary](../glossary.md) "
+    text += "explains the terms."
+    return "\n\n".join(("# Scores", NOTE, text, "\n".join((*head, *lines)))) + "\n"
+
+
+def instruments() -> str:
+    """All kinds of instruments and faults with what they measure and do."""
+    from simnav.kinds import KINDS
+    from simnav.sensors import fault_specs
+
+    lines = []
+    for name, kind in sorted(KINDS.items()):
+        components = ", ".join(f"{c.name} [{c.unit.replace('_', '/')}]" for c in kind.components)
+        lines.append(_line((f"`{name}`", kind.quantity, components, kind.role)))
+    parts = [
+        "# Instruments and faults",
+        NOTE,
+        "The keys of each kind in a scenario file are in [Scenarios](scenarios.md).",
+        "## Kinds of instruments",
+        "Beside these there is the IMU (`imu`).",
+        "\n".join((*_head("kind", "quantity", "components", "role"), *lines)),
+        "## Kinds of faults",
+        "\n".join(
+            (
+                *_head("kind", "effect"),
+                *sorted(_line((f"`{_kind(s)}`", _escaped(_summary(s)))) for s in fault_specs()),
+            )
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _kind(spec: Any) -> str:
+    return str(spec.model_fields["kind"].default)
+
+
+def _summary(cls: type) -> str:
+    return (inspect.getdoc(cls) or "").partition("\n\n")[0].replace("\n", " ")
+
+
+def _head(*titles: str) -> tuple[str, str]:
+    return _line(titles), _line(["---"] * len(titles))
+
+
+def _line(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _escaped(text: str) -> str:
+    """Text of a docstring as Markdown: code marks, and no characters that a table or HTML would take."""
+    text = text.replace("``", "`").replace("|", "\\|").replace("<", "&lt;")
+    return re.sub(r"`(simnav\.[\w.]+)`", r"`\1`", text)

@@ -1,0 +1,106 @@
+"""Measurement noise with heavy tails: Student's t distribution, by variational Bayes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.noise import NoiseAdaptation, posterior
+from simnav.estimators.algebra.cholesky import factorise
+from simnav.types import Array, Instruments
+
+__all__ = ["StudentT", "normalised_trace", "student_weight"]
+
+
+@kernel("f8(f8[:, ::1], f8[::1], f8[:, ::1])")
+def normalised_trace(noise, residual, spread):  # type: ignore[no-untyped-def]
+    """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A; -1 where R is singular."""
+    m = residual.size
+    L, pivot = noise.copy(), np.empty(m)
+    if not factorise(L, m, 1e-14, pivot):
+        return -1.0
+    inverse = np.zeros((m, m))  # of L
+    for c in range(m):
+        for r in range(c, m):
+            x = 1.0 if r == c else 0.0
+            for k in range(c, r):
+                x -= L[r, k] * inverse[k, c]
+            inverse[r, c] = x / L[r, r]
+    total = 0.0
+    for r in range(m):
+        for i in range(r + 1):
+            for j in range(r + 1):
+                total += inverse[r, i] * inverse[r, j] * (residual[i] * residual[j] + spread[i, j])
+    return total
+
+
+@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8)")
+def student_weight(innovation, predicted, noise, dof, iterations):  # type: ignore[no-untyped-def]
+    """The weight of a measurement: its noise is R over it (see `StudentT`).
+
+    Parameters
+    ----------
+    innovation : (m,) array
+    predicted, noise : (m, m) arrays
+        H P H' and R.
+    dof : float
+    iterations : int
+    """
+    m = innovation.size
+    residual, after, used = np.empty(m), np.empty((m, m)), np.empty((m, m))
+    weight = 1.0
+    for _ in range(iterations):
+        for i in range(m):
+            for j in range(m):
+                used[i, j] = noise[i, j] / weight
+        if posterior(innovation, predicted, used, residual, after) < 0.0:
+            return 1.0
+        trace = normalised_trace(noise, residual, after)
+        if trace < 0.0:
+            return 1.0
+        weight = (dof + m) / (dof + trace)
+    return weight
+
+
+class StudentT(NoiseAdaptation):
+    """Every measurement's noise is of Student's t distribution, with the datasheet's covariance for its scale matrix.
+
+    A variable of that distribution is Gaussian with the covariance ``R / w``, where w is gamma distributed,
+    ``w ~ gamma(dof/2, dof/2)``. State and w are estimated in turns, in variational Bayes (with P+ of the last turn)::
+
+        w = (dof + m) / (dof + tr(R^-1 (e e' + H P+ H'))),    e: residual after an update with the noise R / w
+
+    Unlike `VariationalBayes` it has no memory: each measurement is judged for itself. With infinitely many degrees of
+    freedom it is the plain filter.
+
+    After the measurement model of Y. Huang, Y. Zhang, N. Li, Z. Wu and J. A. Chambers, *A novel robust Student's
+    t-based Kalman filter*, IEEE Trans. Aerospace and Electronic Systems 53(3), 2017; the prediction stays Gaussian.
+    M. Roth, E. Ozkan and F. Gustafsson, *A Student's t filter for heavy tailed process and measurement noise*, ICASSP
+    2013, keep the whole state of that distribution; their correction is linear in the innovation.
+
+    Parameters
+    ----------
+    dof : float
+        Degrees of freedom, above 0: the fewer, the heavier the tails. Infinite: Gaussian.
+    turns : int
+        Of state and weight, for a measurement; at least 1.
+    """
+
+    def __init__(self, dof: float = 8.0, turns: int = 5):
+        if not dof > 0.0:
+            raise ValueError(f"dof = {dof:g}: it must be above 0")
+        if turns < 1:
+            raise ValueError(f"turns = {turns}: it must be at least 1")
+        self.dof, self.turns = min(dof, 1e12), turns
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self._weights = {name: f"weight.{name}" for name in instruments}
+
+    def choose(self, innovation: Innovation) -> Array:
+        """The noise over the weight, which is reported."""
+        weight = student_weight(innovation.residual, innovation.predicted, innovation.noise, self.dof, self.turns)
+        self.report(self._weights[innovation.measurement.instrument], weight)
+        return np.asarray(innovation.noise / weight)

@@ -1,0 +1,98 @@
+"""Models with states for what is correlated in the errors of position fixes.
+
+The error of a GNSS fix is white noise and a slow part: orbits, clocks, ionosphere and mild multipath, correlated over
+minutes. Taken for white, a hundred fixes of the same error count as a hundred independent ones, and the filter is sure
+of a position that they share. A first-order Gauss-Markov state for each component tells the filter what it cannot
+average away (P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013, section
+14.2; A. Gelb (ed.), *Applied Optimal Estimation*, 1974, section 3.6).
+
+A datasheet may say the size and the correlation time of the slow part (``bias_instability``, ``correlation_time``);
+every model of simnav then has these states. Here a fix has them also where its datasheet is silent, and a slow error
+of a certain size at least: reflections are no part of a datasheet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.ship import ShipModel
+from simnav.types import Array, InitialState, Instruments
+
+__all__ = ["CorrelatedFixes", "with_correlated_fixes"]
+
+
+def with_correlated_fixes(instruments: Instruments, slow: float, slow_time: float) -> Instruments:
+    """The datasheets, with a slow error of a certain size or more for every fix.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    slow : float
+        Least sigma of the slow error over that of the white noise.
+    slow_time : float
+        Its correlation time where a datasheet says nothing of a slow error [s].
+    """
+    sheets = []
+    for sheet in instruments.values():
+        if sheet.role == "fix":
+            told, least = np.any(sheet.bias_instability), slow * sheet.sigma
+            sheet = replace(
+                sheet,
+                bias_instability=np.maximum(sheet.bias_instability, least),
+                correlation_time=sheet.correlation_time if told else slow_time,
+            )
+        sheets.append(sheet)
+    return Instruments(sheets, instruments.imu, instruments.step)
+
+
+class _Inertial(InertialModel):
+    """The inertial model, begun with the datasheets of `with_correlated_fixes`."""
+
+    def __init__(self, slow: float, slow_time: float):
+        super().__init__()
+        self.slow, self.slow_time = slow, slow_time
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; UnsuitableScenario without an IMU."""
+        return super().begin(start, with_correlated_fixes(instruments, self.slow, self.slow_time))
+
+
+class _Ship(ShipModel):
+    """The ship model, likewise."""
+
+    def __init__(self, slow: float, slow_time: float):
+        super().__init__()
+        self.slow, self.slow_time = slow, slow_time
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; UnsuitableScenario without a position and a speed."""
+        return super().begin(start, with_correlated_fixes(instruments, self.slow, self.slow_time))
+
+
+class CorrelatedFixes:
+    """The inertial model where there is an IMU, else the ship model, with states for the slow error of every fix.
+
+    Parameters
+    ----------
+    slow : float
+        Sigma of the slow error over that of the datasheet's white noise, which stays; a larger one of the datasheet
+        holds. 0: the plain filter.
+    slow_time : float
+        Correlation time of the slow error [s], where the datasheet gives none.
+    """
+
+    def __init__(self, slow: float = 1.0, slow_time: float = 120.0):
+        if not 0.0 <= slow < np.inf:
+            raise ValueError(f"slow = {slow:g}: it must be 0 or more, and finite")
+        if not 0.0 < slow_time < np.inf:
+            raise ValueError(f"slow_time = {slow_time:g} s: it must be above 0 and finite")
+        self.slow, self.slow_time = slow, slow_time
+
+    def choose(self, instruments: Instruments, name: str) -> ErrorModel:
+        """A new model; UnsuitableScenario where neither will do."""
+        model = _Ship if instruments.imu is None else _Inertial
+        return model(self.slow, self.slow_time).choose(instruments, name)

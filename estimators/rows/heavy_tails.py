@@ -1,0 +1,35 @@
+"""Rows for measurement noise of Student's t distribution: a filter, and a smoother behind it."""
+
+from simnav.estimator import register
+from simnav.estimators.adaptations.student_t import StudentT
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.solvers.iterated import poor_heading
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.student_t_smoother import StudentTSmoother
+
+__all__ = ["StudentTKf", "StudentTRts"]
+
+
+@register("student-t")
+class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=StudentT, iteration=poor_heading):
+    """Student-t filter: each measurement's noise has heavy tails, so that a large residual counts for little.
+
+    Source: Y. Huang, Y. Zhang, N. Li, Z. Wu and J. A. Chambers, *A novel robust Student's t-based Kalman filter*, IEEE
+    Trans. Aerospace and Electronic Systems 53(3), 2017.
+    """
+
+
+@register("student-t-rts")
+class StudentTRts(
+    Row,
+    solver=KalmanEstimator,
+    model=Suitable,
+    adaptation=StudentT,
+    smoother=piece(StudentTSmoother, rename={"dof": "smoothed_dof"}),
+):
+    """The Student-t filter with a robust smoother behind it: measurements are judged by the smoothed trajectory.
+
+    Source: A. Y. Aravkin, J. V. Burke and G. Pillonetto, *Robust and trend-following Student's t Kalman smoothers*,
+    SIAM J. Control and Optimization 52(5), 2014.
+    """

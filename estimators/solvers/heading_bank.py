@@ -1,0 +1,233 @@
+"""An EKF for each of several initial headings, until the measurements tell which one is right.
+
+The error equations of an EKF are linear in the attitude error, which holds to about twenty degrees. A vessel that
+starts without a heading is outside of that: one filter with a standard deviation of 100 degrees linearises about the
+wrong heading and may settle on it. So the initial density of the heading is written as a mixture of narrow Gaussians
+round the circle, and each has a filter of its own. A filter's weight is multiplied by the likelihood of every
+innovation, N(v; 0, S); a filter of negligible weight is dropped, and of two filters that have come to the same heading
+one is dropped, its weight given to the other. When one is left, it is the plain EKF.
+
+The estimate is the mean of the mixture, its covariance holds the spread between the filters. A gross error must not
+decide: a normalised innovation squared counts as no more than its `_CLIP` quantile.
+
+Where the start is known to `above_deg` or better there is one filter from the beginning.
+
+Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; H. W.
+Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*, Automatica 7(4), 1971; for large
+heading errors B. M. Scherzinger, *Inertial navigator error models for large heading uncertainty*, PLANS 1996.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import ceil, degrees, exp, log, pi, radians, sqrt
+from typing import ClassVar
+
+import numpy as np
+
+from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.composition import Solver
+from simnav.estimators.models.base import Observation
+from simnav.estimators.models.suitable import ModelChoice
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.state_difference import difference, displaced
+from simnav.geometry.rotation import wrap_angle
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
+
+__all__ = ["HeadingBank", "initial_headings"]
+
+#: A measurement less probable than this counts as just so probable.
+_CLIP = 0.9999
+#: A filter of less weight is dropped.
+_LEAST = 1e-4
+#: Sigma of a filter's heading over the distance to the next filter, at the start.
+_OVERLAP = 0.6
+#: Two filters are the same where their headings differ by less than this part of their sigma.
+_SAME = 0.5
+
+
+def initial_headings(sigma: float, spacing: float) -> tuple[Array, Array]:
+    """Offsets from the initial heading, and the weights of a mixture of Gaussians there.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation of the initial heading [rad].
+    spacing : float
+        Largest distance between neighbours [rad].
+
+    Returns
+    -------
+    offsets, weights : (k,) array
+        Over three sigma to both sides, or once round the circle; the weights sum to 1.
+    """
+    if 6.0 * sigma >= 2.0 * pi:
+        count = ceil(2.0 * pi / spacing)
+        offsets = np.asarray(wrap_angle(2.0 * pi / count * np.arange(count, dtype=np.float64)))
+    else:
+        count = 2 * ceil(3.0 * sigma / spacing) + 1
+        offsets = np.linspace(-3.0 * sigma, 3.0 * sigma, count)
+    turns = offsets[:, None] + 2.0 * pi * np.arange(-4, 5)
+    weights = np.exp(-0.5 * np.square(turns / sigma)).sum(axis=1)
+    return offsets, weights / weights.sum()
+
+
+class _Scored(KalmanEstimator):
+    """The filter, with the logarithm of the likelihood of its innovations."""
+
+    assimilates = False
+    log_likelihood: float
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(start, instruments)
+        self.log_likelihood = 0.0
+        self._limits = chi_square_limits(_CLIP)
+
+    def _absorb(self, observation: Observation) -> float:
+        residual, _, predicted, noise = observation
+        spread = 2.0 * pi * (predicted + noise)
+        nis = super()._absorb(observation)
+        if nis >= 0.0:
+            determinant = float(np.linalg.det(spread))
+            if determinant > 0.0:
+                self.log_likelihood -= 0.5 * (min(nis, self._limits[len(residual)]) + log(determinant))
+        return nis
+
+
+@dataclass
+class _Hypothesis:
+    filter: KalmanEstimator
+    weight: float
+    estimate: Estimate | None = None
+
+    @property
+    def heading(self) -> tuple[float, float]:
+        """Heading and its standard deviation [rad]."""
+        assert self.estimate is not None
+        assert self.estimate.attitude is not None
+        assert self.estimate.covariance is not None
+        return float(self.estimate.attitude[2]), sqrt(max(float(self.estimate.covariance[8, 8]), 0.0))
+
+
+class HeadingBank(Solver):
+    """The solver of the module.
+
+    The diagnostic ``hypotheses`` is the number of filters that are left.
+
+    Parameters
+    ----------
+    model : ErrorModel or ModelChoice
+    above_deg : float
+        With an initial heading known better than this [deg], one sigma, there is one filter only.
+    spacing_deg : float
+        Largest distance between neighbouring initial headings [deg].
+    """
+
+    pieces: ClassVar[tuple[str, ...]] = ("model",)
+    refuses: ClassVar[Mapping[str, str]] = {
+        "adaptation": "an adapted noise would decide the likelihood of a heading",
+        "smoother": "a filter that is dropped leaves no trajectory",
+    }
+
+    def __init__(self, model: ModelChoice, above_deg: float = 15.0, spacing_deg: float = 20.0):
+        if not above_deg > 0.0:
+            raise ValueError(f"above_deg = {above_deg:g}: it must be above 0")
+        if not 1.0 <= spacing_deg <= 90.0:
+            raise ValueError(f"spacing_deg = {spacing_deg:g}: it must lie between 1 and 90")
+        self._choice, self.above_deg, self.spacing_deg = model, above_deg, spacing_deg
+        self._hypotheses: list[_Hypothesis] = []
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        sigma = sqrt(float(start.covariance[8, 8]))
+        offsets, weights = np.zeros(1), np.ones(1)
+        if degrees(sigma) > self.above_deg:
+            offsets, weights = initial_headings(sigma, radians(self.spacing_deg))
+        self._hypotheses = []
+        for offset, weight in zip(offsets.tolist(), weights.tolist(), strict=True):
+            kind = KalmanEstimator if len(offsets) == 1 else _Scored
+            one = kind(copy.deepcopy(self._choice))
+            one.row = self.label
+            own = start
+            if len(offsets) > 1:
+                narrow = min(1.0, _OVERLAP * _step(offsets) / sigma)
+                covariance = start.covariance.copy()
+                covariance[8] *= narrow
+                covariance[:, 8] *= narrow
+                attitude = start.attitude + np.array([0.0, 0.0, offset])
+                own = replace(start, attitude=np.asarray(wrap_angle(attitude)), covariance=covariance)
+            one.reset(own, instruments)
+            self._hypotheses.append(_Hypothesis(one, weight))
+
+    @property
+    def best(self) -> KalmanEstimator:
+        """The filter of the largest weight."""
+        return max(self._hypotheses, key=lambda h: h.weight).filter
+
+    @property
+    def covariance(self) -> Array:
+        """(n, n) covariance of the filter of the largest weight."""
+        return self.best.covariance
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step's measurements, each at its own time."""
+        several = len(self._hypotheses) > 1
+        for h in self._hypotheses:
+            h.estimate = h.filter.update(measurements)
+        if several:
+            self._judge()
+        first = max(self._hypotheses, key=lambda h: h.weight)
+        assert first.estimate is not None
+        estimate = first.estimate if len(self._hypotheses) == 1 else self._mean(first)
+        estimate.diagnostics = {**estimate.diagnostics, "hypotheses": float(len(self._hypotheses))}
+        return estimate
+
+    def _judge(self) -> None:
+        """Weigh the filters by their likelihoods; drop those that do not count, and doubles."""
+        logs = []
+        for h in self._hypotheses:
+            assert isinstance(h.filter, _Scored)
+            logs.append(log(h.weight) + h.filter.log_likelihood)
+            h.filter.log_likelihood = 0.0
+        best = max(logs)
+        weights = np.array([exp(x - best) for x in logs])
+        weights /= weights.sum()
+        for h, weight in zip(self._hypotheses, weights.tolist(), strict=True):
+            h.weight = weight
+        kept: list[_Hypothesis] = []
+        for h in sorted(self._hypotheses, key=lambda h: -h.weight):
+            if kept and h.weight < _LEAST:
+                continue
+            heading, sigma = h.heading
+            for other in kept:
+                theirs, wide = other.heading
+                if abs(float(wrap_angle(heading - theirs))) < _SAME * min(sigma, wide):
+                    other.weight += h.weight
+                    break
+            else:
+                kept.append(h)
+        total = sum(h.weight for h in kept)
+        for h in kept:
+            h.weight /= total
+        self._hypotheses = kept
+
+    def _mean(self, first: _Hypothesis) -> Estimate:
+        """The mean of the mixture and its covariance, in the tangent space of the most probable filter."""
+        assert first.estimate is not None
+        apart = np.stack([difference(h.estimate, first.estimate) for h in self._hypotheses if h.estimate is not None])
+        weights = np.array([h.weight for h in self._hypotheses])
+        mean = weights @ apart
+        covariance = np.zeros((9, 9))
+        for h, d in zip(self._hypotheses, apart - mean, strict=True):
+            assert h.estimate is not None
+            assert h.estimate.covariance is not None
+            covariance += h.weight * (h.estimate.covariance + np.outer(d, d))
+        return displaced(first.estimate, mean, covariance)
+
+
+def _step(offsets: Array) -> float:
+    """Distance between neighbours on the circle [rad]."""
+    return float(abs(wrap_angle(offsets[1] - offsets[0])))

@@ -1,0 +1,397 @@
+"""Solution separation: a filter for every instrument that could be wrong, which does without it.
+
+The main filter uses all instruments, sub-filter i all but instrument i. If instrument i is wrong, sub-filter i is right
+and the main filter is not: they separate. Both use the same measurements but for those of i, so that for filters with
+the right model the separation d has the covariance
+
+    cov(d) = P_i - P_0                                              (R. G. Brown and P. W. McBurney 1988)
+
+which gives the threshold of the test, component by component of the position, velocity and heading:
+``T_i = K_fa sqrt(P_i - P_0)``. Where a test fails, an instrument is excluded: of those with a large separation, the one
+whose sub-filter is in the best agreement with the instruments that it uses (the least mean NIS of its worst instrument
+over `_RECENT` seconds; residual monitoring after Young and McGraw). Where several agree (a mean NIS of up to
+`_AGREEMENT`), it is one on probation (see below), else that of the largest separation. Its sub-filter becomes the main
+one, so that what the fault has done so far is undone, too.
+
+Where a fix is excluded, the sub-filter without the log is kept beside, and the other way round: the hypothesis that was
+not chosen. If the instrument that was believed fails a test in its turn, and the one excluded agrees with all others in
+that filter, the two change places.
+
+Single gross errors are none of this: a measurement that the main filter finds improbable (`_NOT_GROSS`) is left out of
+all filters, unless its instrument goes on so for `_PATIENCE` seconds.
+
+An excluded instrument is tried on: when it has agreed with the main filter for ``recovery`` seconds it is used again;
+twice as long after every further exclusion, up to `_LONGEST` times. For the next ``horizon`` seconds it is on
+probation: if any test fails, it is suspected, too. Fixes and logs are out together for `_COASTING` seconds at most,
+since an IMU alone is soon worse than either: then the logs are used again or, where they are silent, the fixes.
+
+**Protection level.** For the north and the east component, with the sigmas of main and sub-filters, ::
+
+    PL = max(K_0 sigma_0, max_i (T_i + K_i sigma_i))
+
+bounds the error whatever single instrument is wrong, but for a risk that is shared out evenly between the hypotheses
+"none" and "instrument i", the latter weighed by the prior probability of a fault (the closed form of Blanch et al.
+2015). The horizontal protection level is the root of the sum of the two squared. It is the diagnostic
+``protection_level`` [m].
+
+**Horizon.** A sub-filter without GNSS grows less certain for ever, until it tests nothing. Sub-filters are therefore
+begun anew from the main filter: there are two for each instrument, the elder ``horizon / 2`` to ``horizon`` seconds
+old. So a fault that grows more slowly than the dead reckoning of that time is followed, and the protection level covers
+faults that began after the elder sub-filters. After an exclusion all of them are new.
+
+Sources: R. G. Brown and P. W. McBurney, *Self-contained GPS integrity check using maximum solution separation*,
+Navigation 35(1), 1988; M. Brenner, *Integrated GPS/inertial fault detection availability*, Navigation 43(2), 1996;
+R. S. Y. Young and G. A. McGraw, *Fault detection and exclusion using normalized solution separation and residual
+monitoring methods*, Navigation 50(3), 2003; J. Blanch, T. Walter, P. Enge et al., *Baseline advanced RAIM user
+algorithm and possible improvements*, IEEE Trans. Aerospace and Electronic Systems 51(1), 2015.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from math import exp, hypot, sqrt
+from typing import ClassVar
+
+import numpy as np
+
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.noise import normalised_square
+from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.composition import Solver
+from simnav.estimators.models.roles import fixes_and_logs
+from simnav.estimators.models.suitable import ModelChoice
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.state_difference import difference
+from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
+
+__all__ = ["SolutionSeparation"]
+
+#: Components whose separation is tested: position, velocity, heading.
+_TESTED = (0, 1, 2, 3, 4, 5, 8)
+#: Part of the main filter's sigma that a separation may have by linearisation alone.
+_LINEARISATION = 0.1
+#: Memory of the mean NIS of an instrument in a filter [s].
+_RECENT = 10.0
+#: A mean NIS by component up to this is no disagreement: two sigma above 1 for ten measurements of one component.
+_AGREEMENT = 1.6
+#: Where a test fails, an instrument is suspected if its separation is more than this part of the largest, each over
+#: its threshold. Were there two sources only, both would be the same.
+_SUSPECT = 0.3
+#: Most that ``recovery`` is multiplied by.
+_LONGEST = 16
+#: Longest time without fixes and logs by exclusion [s].
+_COASTING = 60.0
+#: An instrument that has said nothing for so long, or for three periods, is silent [s].
+_SILENCE = 5.0
+#: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
+_NOT_GROSS, _PATIENCE = 0.99999, 5.0
+#: Of a good measurement to agree with the main filter.
+_AGREES = 0.999
+
+
+class _Exclusion(Adaptation):
+    """Leaves the excluded instruments and single gross errors out; notes since when an excluded one has agreed."""
+
+    def __init__(self) -> None:
+        self.excluded: set[str] = set()
+        self.agrees_since: dict[str, float] = {}
+        self.gross: set[tuple[str, float]] = set()
+        self._failing: dict[str, float] = {}
+        self._agrees, self._gross = chi_square_limits(_AGREES), chi_square_limits(_NOT_GROSS)
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """The nominal noise, or None."""
+        name, time = innovation.measurement.instrument, innovation.measurement.time
+        nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
+        m = len(innovation.residual)
+        if name in self.excluded:
+            if nis <= self._agrees[m]:
+                self.agrees_since.setdefault(name, time)
+            else:
+                self.agrees_since.pop(name, None)
+            return None
+        if nis <= self._gross[m]:
+            self._failing.pop(name, None)
+        elif time - self._failing.setdefault(name, time) < _PATIENCE:
+            self.gross.add((name, time))
+            return None
+        return innovation.noise
+
+
+class _Watched(KalmanEstimator):
+    """The filter, with the fading mean of the NIS by component of each instrument."""
+
+    mean_nis: dict[str, float]
+
+    def take_over(self, other: _Watched) -> None:
+        """Go on from the state of another one."""
+        self.model.take_over(other.model)
+        self.covariance[...] = other.covariance
+        self.mean_nis = dict(other.mean_nis)
+
+    def watch(self, estimate: Estimate, components: Mapping[str, int], fading: float) -> None:
+        """Take a step into the means; components by instrument."""
+        for name, m in components.items():
+            nis = float(estimate.diagnostics.get(f"nis.{name}", np.nan))
+            if nis == nis:
+                self.mean_nis[name] = fading * self.mean_nis.get(name, 1.0) + (1.0 - fading) * nis / m
+
+
+@dataclass
+class _Without:
+    """A sub-filter: the instrument that it does without, when it was begun, and its estimate."""
+
+    name: str
+    filter: _Watched
+    begun: float
+    estimate: Estimate | None = None
+
+
+class SolutionSeparation(Solver):
+    """The solver of the module.
+
+    Diagnostics: ``protection_level`` [m]; ``separation.<instrument>``, the largest separation over its threshold;
+    ``excluded.<instrument>``, 1 where it is excluded.
+
+    Parameters
+    ----------
+    model : ErrorModel or ModelChoice
+    false_alarm : float
+        Probability of each test to fail where nothing is wrong, in (0, 1).
+    horizon : float
+        Age at which a sub-filter is begun anew [s].
+    recovery : float
+        Time for which an excluded instrument must agree before it is used again [s].
+    risk : float
+        Probability that the horizontal error exceeds the protection level. IMO A.915(22) allows 1e-5 in three hours.
+    fault_probability : float
+        Prior probability that a certain instrument is wrong.
+    """
+
+    pieces: ClassVar[tuple[str, ...]] = ("model",)
+    refuses: ClassVar[Mapping[str, str]] = {
+        "adaptation": "the covariance of the separation holds for filters that believe the same noise",
+        "smoother": "an exclusion changes the filter",
+    }
+
+    def __init__(
+        self,
+        model: ModelChoice,
+        false_alarm: float = 1e-6,
+        horizon: float = 300.0,
+        recovery: float = 30.0,
+        risk: float = 1e-5,
+        fault_probability: float = 1e-2,
+    ):
+        for name, p in (("false_alarm", false_alarm), ("risk", risk), ("fault_probability", fault_probability)):
+            if not 0.0 < p < 1.0:
+                raise ValueError(f"{name} = {p:g}: it must lie between 0 and 1")
+        if not horizon > 0.0:
+            raise ValueError(f"horizon = {horizon:g} s: it must be above 0")
+        if not recovery >= 0.0:
+            raise ValueError(f"recovery = {recovery:g} s: it must not be negative")
+        self._choice = model
+        self.false_alarm, self.horizon, self.recovery = false_alarm, horizon, recovery
+        self.risk, self.fault_probability = risk, fault_probability
+
+    def _filter(self, exclusion: _Exclusion | None = None) -> _Watched:
+        one = _Watched(copy.deepcopy(self._choice), exclusion)
+        one.row, one.mean_nis = self.label, {}
+        one.reset(*self._begin_with)
+        return one
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        from scipy.stats import norm
+
+        self._begin_with = start, instruments
+        self._exclusion = _Exclusion()
+        self._main = self._filter(self._exclusion)
+        self._names = [name for name, sheet in instruments.items() if self._main.model.observes(sheet)]
+        self._components = {name: len(KINDS[instruments[name].kind].errors) for name in self._names}
+        self._pairs = {name: [_Without(name, self._filter(), start.time) for _ in range(2)] for name in self._names}
+        for _, younger in self._pairs.values():
+            younger.begun = start.time - 0.5 * self.horizon  # so that the two come of age in turns
+        tests = max(len(self._names), 1) * len(_TESTED)
+        hypotheses = len(self._names) + 1
+        self._threshold = float(norm.isf(0.5 * self.false_alarm / tests))
+        self._quiet = float(norm.isf(0.25 * self.risk / hypotheses))
+        share = self.risk / (2.0 * hypotheses * self.fault_probability)
+        self._missed = float(norm.isf(min(share, 0.5)))
+        self._group = fixes_and_logs(instruments)
+        self._coasting: float | None = None
+        self._heard = dict.fromkeys(self._names, start.time)
+        self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
+        self._readmitted: dict[str, float] = {}
+        self._count = dict.fromkeys(self._names, 0)
+        self._alternatives: dict[str, _Without] = {}
+        self._time = start.time
+
+    @property
+    def model(self) -> object:
+        """Of the main filter."""
+        return self._main.model
+
+    @property
+    def covariance(self) -> Array:
+        """(n, n) covariance of the main filter."""
+        return self._main.covariance
+
+    @property
+    def excluded(self) -> frozenset[str]:
+        """The instruments that are excluded now."""
+        return frozenset(self._exclusion.excluded)
+
+    def update(self, measurements: Measurements) -> Estimate:
+        """Take one step's measurements, each at its own time."""
+        out, gross = self._exclusion.excluded, self._exclusion.gross
+        gross.clear()
+        estimate = self._main.update(measurements)
+        fading = exp(-max(measurements.time - self._time, 0.0) / _RECENT)
+        self._main.watch(estimate, self._components, fading)
+        self._time = measurements.time
+        self._heard.update({m.instrument: m.time for m in measurements.aids if m.instrument in self._heard})
+        running = [(sub, {sub.name, *out}) for name in self._names if name not in out for sub in self._pairs[name]]
+        running += [(sub, {sub.name}) for sub in self._alternatives.values()]
+        for sub, without in running:
+            left = [m for m in measurements.aids if m.instrument not in without and (m.instrument, m.time) not in gross]
+            packet = Measurements(measurements.start, measurements.time, measurements.imu, left)
+            sub.estimate = sub.filter.update(packet)
+            sub.filter.watch(sub.estimate, self._components, fading)
+        flagged = list(estimate.flagged)
+        ratios = {name: self._separation(name, estimate) for name in self._names if name not in out}
+        most = max(ratios.values(), default=0.0)
+        diagnostics = dict(estimate.diagnostics)
+        if most > 1.0:
+            guilty = self._guilty([name for name, ratio in ratios.items() if ratio > _SUSPECT * most], ratios)
+            estimate = self._exclude(guilty)
+            flagged += [(guilty, m.time) for m in measurements.aids if m.instrument == guilty]
+        self._readmit(measurements.time)
+        self._renew(measurements.time)
+        diagnostics["protection_level"] = self._protection_level(estimate)
+        for name in self._names:
+            diagnostics[f"separation.{name}"] = ratios.get(name, np.nan)
+            diagnostics[f"excluded.{name}"] = float(name in self._exclusion.excluded)
+        estimate.diagnostics, estimate.flagged = diagnostics, flagged
+        return estimate
+
+    def _disagreement(self, sub: _Without, out: Collection[str]) -> float:
+        """The largest mean NIS of an instrument in a sub-filter."""
+        means = sub.filter.mean_nis
+        return max((v for n, v in means.items() if n != sub.name and n not in out), default=1.0)
+
+    def _guilty(self, suspects: list[str], ratios: Mapping[str, float]) -> str:
+        """Of the suspects and the instruments on probation, the one to exclude."""
+        probation = {
+            name for name, since in self._readmitted.items() if self._time - since < self.horizon and name in ratios
+        }
+        return min(
+            {*suspects, *probation},
+            key=lambda n: (
+                max(self._disagreement(self._elder(n), self._exclusion.excluded), _AGREEMENT),
+                n not in probation,
+                -ratios[n],
+            ),
+        )
+
+    def _elder(self, name: str) -> _Without:
+        return min(self._pairs[name], key=lambda sub: sub.begun)
+
+    def _sigmas(self, sub: _Without, estimate: Estimate) -> tuple[Array, Array]:
+        """Variances of a sub-filter's nine components, and of its separation."""
+        assert sub.estimate is not None
+        assert sub.estimate.covariance is not None
+        assert estimate.covariance is not None
+        main = estimate.covariance.diagonal()
+        own = sub.estimate.covariance.diagonal()
+        return own, np.maximum(own - main, 0.0) + _LINEARISATION**2 * main
+
+    def _separation(self, name: str, estimate: Estimate) -> float:
+        """The largest separation over its threshold, of all tested components and both sub-filters."""
+        mask, largest = estimate.mask(), 0.0
+        for sub in self._pairs[name]:
+            assert sub.estimate is not None
+            apart = difference(sub.estimate, estimate).tolist()
+            _, variance = self._sigmas(sub, estimate)
+            for q in _TESTED:
+                if mask[q] and variance[q] > 0.0:
+                    largest = max(largest, abs(apart[q]) / (self._threshold * sqrt(variance[q])))
+        return largest
+
+    def _exclude(self, name: str) -> Estimate:
+        """Take the sub-filter without an instrument for the main filter; all others begin anew from it."""
+        excluded, before = self._exclusion.excluded, self._alternatives.pop(name, None)
+        chosen = self._elder(name)
+        if before is not None and self._disagreement(before, ()) <= _AGREEMENT:
+            chosen = before  # it was another one that should have been excluded
+            excluded.clear()
+        elif not excluded:
+            self._alternatives = {n: self._elder(n) for n in self._group if n != name and name in self._group}
+            for n, sub in self._alternatives.items():
+                self._pairs[n] = [other for other in self._pairs[n] if other is not sub]
+                self._pairs[n].append(_Without(n, self._filter(), self._time))
+        if excluded or chosen is before:
+            self._alternatives = {}
+        assert chosen.estimate is not None
+        self._count[name] += 1
+        self._exclusion.agrees_since.pop(name, None)
+        excluded.add(name)
+        self._main.take_over(chosen.filter)
+        for other in self._names:
+            for k, sub in enumerate(self._pairs[other]):
+                self._begin(sub, self._time - 0.5 * self.horizon * k, chosen.estimate)
+        return copy.copy(chosen.estimate)
+
+    def _readmit(self, time: float) -> None:
+        """Use instruments again that have agreed for long enough."""
+        excluded, agrees = self._exclusion.excluded, self._exclusion.agrees_since
+        again = [
+            name
+            for name, since in agrees.items()
+            if time - since >= self.recovery * min(2.0 ** (self._count[name] - 1), _LONGEST)
+        ]
+        heard = [name for name in self._group if time - self._heard[name] <= self._silence[name]]
+        coasting = bool(heard) and set(heard) <= excluded
+        self._coasting = (time if self._coasting is None else self._coasting) if coasting else None
+        if self._coasting is not None and time - self._coasting >= _COASTING:
+            again += [n for n in [n for n in heard if not self._group[n]] or heard if n not in again]
+        if again:
+            self._alternatives = {}
+        for name in again:
+            excluded.discard(name)
+            self._readmitted[name] = time
+            agrees.pop(name, None)
+            for one in (self._main, *(sub.filter for pair in self._pairs.values() for sub in pair)):
+                one.mean_nis.pop(name, None)
+            for k, sub in enumerate(self._pairs[name]):
+                self._begin(sub, time - 0.5 * self.horizon * k, None)
+
+    def _renew(self, time: float) -> None:
+        """Begin sub-filters anew that have come of age."""
+        for name in self._names:
+            for sub in self._pairs[name]:
+                if time - sub.begun >= self.horizon and name not in self._exclusion.excluded:
+                    self._begin(sub, time, None)
+        self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.begun < 2.0 * self.horizon}
+
+    def _begin(self, sub: _Without, time: float, estimate: Estimate | None) -> None:
+        """Begin a sub-filter from the main filter's state."""
+        sub.filter.take_over(self._main)
+        sub.begun = time
+        sub.estimate = estimate if estimate is not None else self._main.model.estimate(self._main.covariance)
+
+    def _protection_level(self, estimate: Estimate) -> float:
+        """The horizontal protection level [m]."""
+        assert estimate.covariance is not None
+        levels = []
+        for q in (0, 1):
+            level = self._quiet * sqrt(max(float(estimate.covariance[q, q]), 0.0))
+            for name in self._names:
+                if name in self._exclusion.excluded:
+                    continue
+                own, apart = self._sigmas(self._elder(name), estimate)
+                level = max(level, self._threshold * sqrt(float(apart[q])) + self._missed * sqrt(float(own[q])))
+            levels.append(level)
+        return hypot(*levels)

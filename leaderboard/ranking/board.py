@@ -1,0 +1,379 @@
+"""A ranked board: the frozen objects that tables, pages and JSON documents are made from.
+
+A `Ranking` holds one `TrackRanking` a track, with one `TrackRow` an estimator, and one `ScenarioRanking` a scenario,
+with one `ScenarioRow` an estimator. `simnav.leaderboard.ranking.ranking.rank` makes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
+
+from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.plain import plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from simnav.scoring.consistency import Badge
+
+__all__ = [
+    "Consistency",
+    "Ranking",
+    "Reference",
+    "Row",
+    "ScenarioRanking",
+    "ScenarioRow",
+    "Standing",
+    "TrackRanking",
+    "TrackRow",
+]
+
+#: Whether a row is ranked, and if not, why: a reference is told the truth; one that is unsuitable needs instruments
+#: that a scenario of the track lacks; one that is incomplete has not run the whole track; one that is implausible has
+#: smaller errors than are possible.
+Standing = Literal["ranked", "reference", "unsuitable", "incomplete", "implausible"]
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """How the covariance that an estimator states agrees with its horizontal errors, over all its runs.
+
+    Attributes
+    ----------
+    badge : str
+        Verdict on the NEES: ``optimistic``, ``consistent``, ``pessimistic``, or ``unknown`` without a covariance.
+    nees : float
+        Mean over the runs of the mean NEES by degree of freedom; 1 is ideal.
+    coverage, worst_coverage : float
+        Share of the epochs at which the truth lies in the stated 95 % ellipse: mean over the runs, and of the run with
+        the smallest.
+    """
+
+    badge: Badge = "unknown"
+    nees: float = math.nan
+    coverage: float = math.nan
+    worst_coverage: float = math.nan
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The fixed figure that the errors of a scenario are divided by.
+
+    Attributes
+    ----------
+    value : float
+        In the unit of the score [m].
+    estimator : str
+        Whose error it is; empty where there is none, and the figures are in metres.
+    runs : int
+        Of how many runs it is the geometric mean.
+    spread : float
+        Standard deviation of the logarithm of its error from run to run.
+    stored : bool
+        Whether it comes with the scenario; otherwise it is of the runs that are ranked.
+    """
+
+    value: float = 1.0
+    estimator: str = ""
+    runs: int = 0
+    spread: float = math.nan
+    stored: bool = False
+
+    @property
+    def bounds(self) -> bool:
+        """Whether it is the error of an oracle, below which nobody can be."""
+        return self.estimator.startswith("oracle")
+
+    @property
+    def text(self) -> str:
+        """What the ratios are to, in words."""
+        if not self.estimator:
+            return "1 m: there is no reference figure"
+        origin = "stored with the scenario" if self.stored else "here"
+        return f"{self.value:.4g} m, the geometric mean of {self.estimator} over {self.runs} runs ({origin})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One estimator on a board.
+
+    Attributes
+    ----------
+    estimator : str
+        Label.
+    standing : Standing
+        Whether it is ranked.
+    why : str
+        Why it is not ranked, in one sentence; empty for those that are, and for references.
+    rank : int or None
+        Position by score from 1; equal scores share it. None for rows that are not ranked.
+    rank_low, rank_high : int or None
+        Interval of the rank: the rows above ``rank_low`` are told from it and better, those below ``rank_high`` are
+        told from it and worse. The intervals of all rows hold together with 95 % probability.
+    tier : int or None
+        From 1, the best; within a tier no row is told from another one of it.
+    may_be_best : bool
+        Whether it belongs to the set that holds the best row with 95 % probability.
+    provisional : bool
+        Whether it has fewer than ten seeds (recordings) somewhere.
+    score, low, high : float
+        Geometric mean of the ratio of the error to the reference figure, with its 95 % interval (NaN with fewer than
+        six seeds). The interval takes the share of failures as it was observed.
+    worst, p95 : float
+        Largest ratio of a run, and the one that 95 % of the runs do not exceed.
+    runs, failed : int
+        How many runs count, and how many of them failed.
+    failed_low, failed_high : float
+        95 % interval of the share of runs that fail.
+    p_value : float or None
+        Adjusted for all pairs, against the row with the best score; None for that row and rows that are not ranked.
+    better_than, worse_than : tuple of str
+        The rows that it is told from.
+    clean, faulty : Consistency
+        Before the first fault of a run, and from then on.
+    update_median : float
+        Median time per epoch [s].
+    peak_memory : int
+        Largest of all runs [bytes].
+    """
+
+    estimator: str
+    standing: Standing
+    why: str = ""
+    rank: int | None = None
+    rank_low: int | None = None
+    rank_high: int | None = None
+    tier: int | None = None
+    may_be_best: bool = False
+    provisional: bool = False
+    score: float
+    low: float = math.nan
+    high: float = math.nan
+    worst: float = math.nan
+    p95: float = math.nan
+    runs: int = 0
+    failed: int = 0
+    failed_low: float = math.nan
+    failed_high: float = math.nan
+    p_value: float | None = None
+    better_than: tuple[str, ...] = ()
+    worse_than: tuple[str, ...] = ()
+    clean: Consistency = field(default_factory=Consistency)
+    faulty: Consistency = field(default_factory=Consistency)
+    update_median: float = math.nan
+    peak_memory: int = 0
+
+    @property
+    def ranked(self) -> bool:
+        """Whether it has a rank."""
+        return self.standing == "ranked"
+
+    @property
+    def reference(self) -> bool:
+        """Whether it is told the truth."""
+        return self.standing == "reference"
+
+    @property
+    def ranks(self) -> str:
+        """The rank interval as tables show it: ``1-4``, ``2``, or nothing."""
+        if self.rank_low is None or self.rank_high is None:
+            return ""
+        return str(self.rank_low) if self.rank_low == self.rank_high else f"{self.rank_low}-{self.rank_high}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioRow(Row):
+    """One estimator on one scenario.
+
+    Attributes
+    ----------
+    median : float
+        Of the ranked score over the completed runs, in its unit; NaN without any.
+    statuses : dict of str to int
+        How many runs ended how.
+    ratios : dict of str to float
+        Ratio to the reference figure of each unit of the test: by seed, or by recording.
+    """
+
+    median: float = math.nan
+    statuses: dict[str, int] = field(default_factory=dict)
+    ratios: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackRow(Row):
+    """One estimator on one track.
+
+    Attributes
+    ----------
+    covered, scenarios : int
+        How many scenarios of the track it has run, of how many.
+    ratios : dict of str to float
+        Score by scenario, of those that it has run.
+    """
+
+    covered: int = 0
+    scenarios: int = 0
+    ratios: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ScenarioRanking:
+    """The ranking on one scenario.
+
+    Attributes
+    ----------
+    scenario : str
+        Versioned id.
+    track : str
+        The track that it belongs to.
+    score : str
+        Key of `simnav.scoring.SCORES` that is ranked.
+    reference : Reference
+        What the ratios are to.
+    unit : str
+        ``seed`` or ``recording``: what the tests and intervals take for independent.
+    units : int
+        How many of them the ranked rows have, at least.
+    remarks : tuple of str
+        Sentences that a table has to show: what cannot be told, and why.
+    rows : tuple of ScenarioRow
+        In order of score; then those not ranked, then the references.
+    unsuitable : dict of str to str
+        Estimators that need other instruments, and which.
+    """
+
+    scenario: str
+    track: str
+    score: str
+    reference: Reference
+    unit: str
+    units: int
+    remarks: tuple[str, ...]
+    rows: tuple[ScenarioRow, ...]
+    unsuitable: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def provisional(self) -> bool:
+        """Whether a ranked row has fewer than ten seeds or recordings."""
+        return any(r.provisional for r in self.rows if r.ranked)
+
+
+@dataclass(frozen=True)
+class TrackRanking:
+    """The ranking on one track: scenarios that the same estimators can do, each counting the same.
+
+    Attributes
+    ----------
+    track : str
+        In kebab-case.
+    title : str
+        For people.
+    score : str
+        Key of `simnav.scoring.SCORES` that is ranked.
+    relative : bool
+        Whether the figures are multiples of a reference figure; otherwise they are in the unit of the score.
+    unit : str
+        ``seed`` or ``recording``: what the tests and intervals take for independent.
+    units : int
+        How many of them the ranked rows have, at least, in a scenario (all recordings of the track are counted).
+    scenarios : tuple of str
+        Versioned ids.
+    remarks : tuple of str
+        Sentences that a table has to show: what cannot be told, and why.
+    rows : tuple of TrackRow
+        In order of score; then those not ranked, then the references.
+    """
+
+    track: str
+    title: str
+    score: str
+    relative: bool
+    unit: str
+    units: int
+    scenarios: tuple[str, ...]
+    remarks: tuple[str, ...]
+    rows: tuple[TrackRow, ...]
+
+    @property
+    def provisional(self) -> bool:
+        """Whether a ranked row has fewer than ten seeds or recordings."""
+        return any(r.provisional for r in self.rows if r.ranked)
+
+    def plot(self) -> Figure:
+        """The scores with their intervals."""
+        from simnav.leaderboard.ranking.ranking_figure import ranking_figure
+
+        return ranking_figure(self)
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """The whole ranking. There are ranks within a track only.
+
+    Attributes
+    ----------
+    tracks : tuple of TrackRanking
+        In the order in which they are shown.
+    scenarios : tuple of ScenarioRanking
+        In order of their ids, ranked by the score of their own track.
+    """
+
+    tracks: tuple[TrackRanking, ...]
+    scenarios: tuple[ScenarioRanking, ...]
+
+    def track(self, name: str) -> TrackRanking:
+        """The ranking of one track.
+
+        Raises
+        ------
+        KeyError
+            If there is none of this name.
+        """
+        return next((t for t in self.tracks if t.track == name), None) or _missing("track", name)
+
+    def scenario(self, identity: str) -> ScenarioRanking:
+        """The ranking on one scenario.
+
+        Raises
+        ------
+        KeyError
+            If there is none of this id.
+        """
+        return next((s for s in self.scenarios if s.scenario == identity), None) or _missing("scenario", identity)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain dicts and lists for JSON; numbers that are not finite become None."""
+        found: dict[str, Any] = plain(vars(self))
+        return found
+
+    def to_frame(self) -> Any:
+        """A row an estimator and track, with its ratios; see `simnav.leaderboard.results.frame.frame`."""
+        scenarios = [s.scenario for s in self.scenarios]
+        return frame([
+            {"track": t.track}
+            | {k: v for k, v in vars(row).items() if not isinstance(v, (Mapping, tuple, Consistency))}
+            | {f"{part}_{k}": v for part in ("clean", "faulty") for k, v in vars(getattr(row, part)).items()}
+            | {s: row.ratios.get(s, math.nan) for s in scenarios}
+            for t in self.tracks
+            for row in t.rows
+        ])  # fmt: skip
+
+    def plot(self) -> Figure:
+        """The scores of the first track with their intervals.
+
+        Raises
+        ------
+        ValueError
+            If nothing is ranked.
+        """
+        if not self.tracks:
+            raise ValueError("there is nothing to draw: no track has a row")
+        return self.tracks[0].plot()
+
+
+def _missing(what: str, name: str) -> NoReturn:
+    raise KeyError(f"there is no ranking of the {what} {name!r}")

@@ -1,0 +1,90 @@
+"""Tracks: scenarios that the same estimators can do. There are ranks within a track only.
+
+A scenario names its track in its file. The track ``post-processing`` is made of the scenarios of `POST_PROCESSED`,
+ranked by the smoothed trajectory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+__all__ = ["POST_PROCESSED", "RECORDED", "Track", "catalogued_tracks", "tracks_of"]
+
+RECORDED = "recorded"
+#: The tracks whose scenarios are ranked for smoothed output, too.
+POST_PROCESSED = ("aided-ins", "underwater")
+
+_TITLES = {
+    "aided-ins": "Aided INS",
+    "no-imu": "Without an IMU",
+    "underwater": "Under water",
+    "post-processing": "Post-processing",
+    "generalisation": "Generalisation",
+    "recorded": "Recorded voyages",
+    "papers": "Scenarios of papers",
+    "other": "Other scenarios",
+}
+
+
+@dataclass(frozen=True)
+class Track:
+    """A track with its scenarios.
+
+    Attributes
+    ----------
+    name, title : str
+    score : str
+        Key of `simnav.scoring.SCORES` that is ranked.
+    scenarios : tuple of str
+        Versioned ids, sorted.
+    """
+
+    name: str
+    title: str
+    score: str
+    scenarios: tuple[str, ...]
+
+
+def catalogued_tracks() -> dict[str, str]:
+    """The track of every scenario of the catalogue, by versioned id."""
+    from simnav.catalogue import headers
+
+    return {h.id: h.track for h in headers()}
+
+
+def tracks_of(scenarios: Iterable[str], track: Mapping[str, str], score: str | None = None) -> list[Track]:
+    """The tracks of some scenarios, in the order in which they are shown.
+
+    Parameters
+    ----------
+    scenarios : iterable of str
+        Versioned ids.
+    track : mapping of str to str
+        Their tracks.
+    score : str, optional
+        Rank all tracks by this score. Default: by the horizontal error, and post-processing by the smoothed one.
+
+    Examples
+    --------
+    >>> [(t.name, t.score) for t in tracks_of(["a-v1", "b-v1"], {"a-v1": "aided-ins", "b-v1": "no-imu"})]
+    [('aided-ins', 'horizontal_rmse'), ('no-imu', 'horizontal_rmse'), ('post-processing', 'smoothed_horizontal_rmse')]
+    """
+    members: dict[str, list[str]] = {}
+    for scenario in sorted(set(scenarios)):
+        members.setdefault(track.get(scenario, "other"), []).append(scenario)
+    found = [Track(n, title(n), score or "horizontal_rmse", tuple(members[n])) for n in members]
+    smoothed = tuple(s for n in POST_PROCESSED for s in members.get(n, ()))
+    if smoothed and score is None:
+        found.append(Track("post-processing", title("post-processing"), "smoothed_horizontal_rmse", smoothed))
+    order = list(_TITLES)
+    return sorted(found, key=lambda t: (order.index(t.name) if t.name in order else len(order), t.name))
+
+
+def title(track: str) -> str:
+    """The title of a track.
+
+    >>> title("aided-ins"), title("my-fjords")
+    ('Aided INS', 'My fjords')
+    """
+    return _TITLES.get(track) or track.replace("-", " ").capitalize()

@@ -1,0 +1,140 @@
+"""What the statistics of a board promise, measured on simulated boards: false separations, coverage, power."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.leaderboard.ranking.statistics import FAILURE, Interval, score, separate, share
+
+__all__ = ["SHAPES", "Board", "coverage", "coverages", "null_boards", "power", "simulated_boards"]
+
+Array = NDArray[np.float64]
+
+SHAPES = ("normal", "skewed", "failing")
+ROWS, SEEDS, SCENARIOS, SCALES = (2, 10, 40, 60), (5, 10, 50), (1, 7), (0.03, 1.0)
+_FAILING = 0.02  # share of runs that fail
+
+
+@dataclass(frozen=True, eq=False)
+class Board:
+    """Log errors of rows that are all equally good: ``values`` is (runs, rows)."""
+
+    values: Array
+    scenarios: NDArray[np.int64]
+    seeds: NDArray[np.int64]
+    shape: str
+    scale: float
+
+
+def noise(rng: np.random.Generator, shape: str, scale: float, size: tuple[int, ...]) -> Array:
+    """Log errors of runs: normal, exponential (skewed), or normal with 2 % of failures."""
+    if shape == "skewed":
+        return np.asarray(scale * (rng.exponential(size=size) - 1.0))
+    x = scale * rng.standard_normal(size)
+    if shape == "failing":
+        x[rng.random(size) < _FAILING] = math.log(FAILURE)
+    return x
+
+
+def simulated_boards(boards: int, shapes: Sequence[str] = SHAPES, seed: int = 0) -> Iterator[Board]:
+    """Boards of equal rows: each draws its numbers of rows, seeds and scenarios, its scale and its shape of errors.
+
+    Runs differ in how hard they are, for all rows alike. Half of the boards have errors of their own in each scenario,
+    the other half share a part of them over the scenarios of a seed.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(boards):
+        rows, seeds, scenarios = (int(rng.choice(options)) for options in (ROWS, SEEDS, SCENARIOS))
+        shape = str(rng.choice(np.array(shapes)))
+        scale = float(np.exp(rng.uniform(*np.log(SCALES))))
+        scenario, run = np.repeat(np.arange(scenarios), seeds), np.tile(np.arange(seeds), scenarios)
+        x = rng.normal(size=(len(run), 1)) + noise(rng, shape, scale, (len(run), rows))
+        if rng.random() < 0.5:
+            x += noise(rng, shape, scale, (seeds, rows))[run]
+        yield Board(np.minimum(x, math.log(FAILURE)), scenario, run, shape, scale)
+
+
+def null_boards(boards: int, shapes: Sequence[str] = SHAPES, seed: int = 0) -> Interval:
+    """Share of boards of equal rows on which any two are separated, with its 95 % interval."""
+    found = sum(separate(b.values, b.scenarios, b.seeds).any for b in simulated_boards(boards, shapes, seed))
+    return share(found, boards)
+
+
+def coverage(
+    *, boards: int, seeds: int, scenarios: int, scale: float, failing: float = 0.0, shared: float = 0.0, seed: int = 0
+) -> Interval:
+    """Share of intervals of a score that hold the truth, for log-normal errors.
+
+    Parameters
+    ----------
+    boards, seeds, scenarios : int
+    scale : float
+        Standard deviation of the log error.
+    failing : float
+        Probability that a run fails. The truth is then the score with the share of failures that was observed.
+    shared : float
+        Correlation of the log errors of a seed between scenarios.
+    seed : int
+    """
+    rng = np.random.default_rng(seed)
+    scenario, run = np.repeat(np.arange(scenarios), seeds), np.tile(np.arange(seeds), scenarios)
+    centre = np.linspace(0.0, 1.0, scenarios)
+    spread = scale * np.linspace(0.5, 1.5, scenarios) if scenarios > 1 else np.array([scale])
+    inside = known = 0
+    for _ in range(boards):
+        z = math.sqrt(shared) * rng.normal(size=seeds)[run] + math.sqrt(1.0 - shared) * rng.normal(size=len(run))
+        failed = rng.random(len(run)) < failing
+        found = score(centre[scenario] + spread[scenario] * z, scenario, run, failed)
+        if math.isnan(found.low):
+            continue
+        lost = np.bincount(scenario, failed) / seeds
+        truth = math.exp(float(np.mean((1.0 - lost) * centre + lost * math.log(FAILURE))))
+        known += 1
+        inside += found.low <= truth <= found.high
+    return share(inside, known)
+
+
+def coverages(boards: int) -> dict[str, Interval]:
+    """`coverage` over seeds, scenarios, scales and failures: what is summed up, and the interval of its share."""
+    cases = {
+        f"{n} seeds, {s} scenario{'s' if s > 1 else ''}, {'2 % fail' if f else 'none fails'}": (n, s, f)
+        for n in (6, 10, 50)
+        for s in (1, 7)
+        for f in (0.0, 0.02)
+    }
+    found = {}
+    for name, (n, s, f) in cases.items():
+        parts = [
+            coverage(boards=boards, seeds=n, scenarios=s, scale=scale, failing=f, shared=shared, seed=k)
+            for k, (scale, shared) in enumerate([(0.03, 0.0), (0.3, 0.5), (1.0, 0.0)])
+        ]
+        total = sum(p.runs for p in parts)
+        found[name] = share(round(sum(p.value * p.runs for p in parts)), total)
+    return found
+
+
+def power(*, boards: int, rows: int, seeds: int, scale: float, difference: float = 0.05, seed: int = 0) -> float:
+    """How often a row is told from one that is better by a share, among other rows as good as either.
+
+    Parameters
+    ----------
+    boards, rows, seeds : int
+        Half of the rows are as good as the first, the others as the last.
+    scale : float
+        Standard deviation of the log error of a row from run to run.
+    difference : float
+        0.05: the worse rows have errors that are 5 % larger.
+    seed : int
+    """
+    rng = np.random.default_rng(seed)
+    offset = np.where(np.arange(rows) < (rows + 1) // 2, 0.0, math.log1p(difference))
+    found = 0
+    for _ in range(boards):
+        x = rng.normal(size=(seeds, 1)) + scale * rng.standard_normal((seeds, rows)) + offset
+        found += bool(separate(x).better[0, rows - 1])
+    return found / boards

@@ -1,0 +1,139 @@
+"""The documentation: the site builds without warnings, and the examples of the tutorials and guides work."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from simnav.scenario import load
+from simnav.testing.contract_check import check
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+
+
+def text(name: str) -> str:
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def blocks(name: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", text(name), re.DOTALL | re.MULTILINE)
+
+
+def commands(name: str) -> list[str]:
+    return [b.strip() for b in re.findall(r"^```\n(simnav .*?)^```", text(name), re.DOTALL | re.MULTILINE)]
+
+
+def simnav(folder: Path, line: str, *more: str) -> str:
+    """Run a command line of a page."""
+    words = shlex.split(line, comments=True)
+    assert words[0] == "simnav"
+    wide = {**os.environ, "COLUMNS": "200"}
+    done = subprocess.run([sys.executable, "-m", *words, *more], cwd=folder, env=wide, capture_output=True, text=True)
+    assert done.returncode == 0, f"{line}\n{done.stderr}"
+    return done.stdout
+
+
+# -- the site ------------------------------------------------------------------------------------------------
+
+
+def test_the_site_builds_without_warnings(tmp_path):
+    """Links, anchors, references in docstrings, and the pages that are made from the code."""
+    pytest.importorskip("mkdocs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    commands = (tmp_path / "reference" / "commands.html").read_text()
+    for name in ("campaign", "evaluate", "leaderboard", "reproduce", "run", "train anfis"):
+        assert f"simnav {name}" in commands
+    rows = (tmp_path / "reference" / "rows.html").read_text()
+    assert "iterate_above_deg" in rows
+    assert "not ranked" in rows
+    assert "horizontal_rmse" in (tmp_path / "reference" / "scores.html").read_text()
+    assert "multipath" in (tmp_path / "reference" / "instruments.html").read_text()
+    assert "until_decided" in (tmp_path / "reference" / "python.html").read_text()
+
+
+def test_every_page_is_in_the_navigation():
+    navigation = (ROOT / "mkdocs.yml").read_text()
+    for page in DOCS.rglob("*.md"):
+        assert str(page.relative_to(DOCS)) in navigation, page
+
+
+# -- tutorials -----------------------------------------------------------------------------------------------
+
+
+def test_the_first_estimator_is_that_of_the_readme():
+    shown = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE)
+    assert blocks("tutorials/first-estimator.md", "python")[0] == shown[0]
+
+
+def test_the_first_estimator(tmp_path):
+    estimator, call = blocks("tutorials/first-estimator.md", "python")
+    (tmp_path / "alpha_beta.py").write_text(estimator)
+    lines = [
+        b.strip() for b in re.findall(r"^```\n(simnav .*?)^```", text("tutorials/first-estimator.md"), re.S | re.M)
+    ]
+    assert [line.split()[1] for line in lines] == ["check", "run", "evaluate"]
+    assert "alpha-beta passes" in simnav(tmp_path, lines[0])
+    assert "ship-ekf" in simnav(tmp_path, lines[1])
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    done = subprocess.run([sys.executable, "-c", call], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"[12] of 2", done.stdout.strip())
+
+
+def test_a_log_becomes_a_scenario(tmp_path, monkeypatch):
+    monkeypatch.delenv("SIMNAV_DATA", raising=False)
+    page = "tutorials/log-to-rank.md"
+    lines = commands(page)
+    assert [line.split()[1] for line in lines] == ["simulate", "run", "evaluate"]
+    simnav(tmp_path, lines[0])
+    assert blocks(page, "")[1].splitlines() == (tmp_path / "data/voyage/gnss.csv").read_text().splitlines()[:2]
+    scenario, outage = blocks(page, "toml")
+    (tmp_path / "voyage.toml").write_text(scenario + outage)
+    assert "ship-ekf" in simnav(tmp_path, lines[1])
+    assert [f.kind for f in load(str(tmp_path / "voyage.toml")).faults] == ["outage"]
+
+
+# -- guides --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("clean_registry")
+@pytest.mark.parametrize(
+    ("page", "number"), [("how-to/combine-pieces.md", 0), ("how-to/combine-pieces.md", 1),
+                         ("how-to/combine-pieces.md", 2), ("how-to/filterpy.md", 0)],
+)  # fmt: skip
+def test_estimators_of_the_guides_keep_the_contract(tmp_path, page, number):
+    path = tmp_path / f"example_{number}.py"
+    path.write_text(blocks(page, "python")[number])
+    report = check(str(path))
+    assert report.passed, str(report)
+
+
+def test_the_environment(capsys):
+    exec(blocks("how-to/use-the-environment.md", "python")[0], {})
+    assert "imu" in capsys.readouterr().out
+
+
+def test_the_scenario_of_the_guide(tmp_path):
+    from simnav.source import record
+
+    path = tmp_path / "channel.toml"
+    path.write_text(blocks("how-to/write-a-scenario.md", "toml")[0])
+    recording = record(load(str(path)), 1)
+    assert set(recording.data.aids) == {"gnss", "gyrocompass", "speed_log"}
+    assert recording.data.aids["gnss"].faults.any()
+
+
+def test_calls_from_python(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    exec(blocks("reference/python.md", "python")[0], {})
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.strip().endswith("of 2")

@@ -1,0 +1,149 @@
+"""Solution separation: its sub-filters, the covariance of their separation, exclusion and protection level."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simnav.estimator import make
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.solution_separation import SolutionSeparation
+from simnav.estimators.solvers.state_difference import difference, displaced
+from simnav.geometry import earth
+from simnav.types import Datasheet, Estimate, Measurements
+
+GNSS = Datasheet("gnss", "gnss_position", 1.0, np.array([1.5, 1.5, 3.0]), lever_arm=np.array([2.0, -1.0, -8.0]))
+DVL = Datasheet("dvl", "dvl", 1.0, np.full(3, 0.02), phase=0.333, lever_arm=np.array([1.0, 0.5, 3.0]))
+COMPASS = Datasheet("compass", "gyrocompass", 2.0, np.full(1, 0.01))
+AIDS = (GNSS, DVL, COMPASS)
+
+
+def off(recording, size: float, first: float, last: float = np.inf, rate: float = 0.0):
+    """The recording with fixes that are off to the north-east: a step, or a ramp [m/s]."""
+    gnss = recording.data.aids["gnss"]
+    since = gnss.time - first
+    error = np.where((since >= 0.0) & (gnss.time < last), size + rate * since, 0.0)[:, None] * np.array([0.7, 0.7, 0.0])
+    moved = replace(gnss, value=earth.displace(gnss.value, error))
+    return replace(recording, data=replace(recording.data, aids={**recording.data.aids, "gnss": moved}))
+
+
+def run(recording, **parameters):
+    """Horizontal error, protection level and excluded instruments by step."""
+    estimator = make("solution-separation", **parameters)
+    estimator.reset(recording.start, recording.instruments)
+    error, level, excluded = [], [], []
+    for k, packet in enumerate(recording.steps()):
+        out = estimator.update(packet)
+        error.append(np.hypot(*earth.relative_position(out.position, recording.data.truth.position[k])[:2]))
+        level.append(out.diagnostics["protection_level"])
+        excluded.append(estimator.excluded)
+    return np.array(error), np.array(level), excluded
+
+
+def test_difference_and_displacement_are_inverse():
+    rng = np.random.default_rng(0)
+    one = Estimate(0.0, np.array([0.9, 0.1, 5.0]), rng.normal(size=3), np.array([0.1, -0.2, 2.0]))
+    error = np.concatenate([10.0 * rng.normal(size=3), rng.normal(size=3), 0.3 * rng.normal(size=3)])
+    other = displaced(one, error, np.eye(9))
+    np.testing.assert_allclose(difference(other, one), error, rtol=1e-5, atol=1e-8)
+    np.testing.assert_array_equal(other.covariance, np.eye(9))
+
+
+@pytest.mark.parametrize("name", ["gnss", "dvl", "compass"])
+def test_a_sub_filter_is_the_filter_that_never_had_the_instrument(recording_of, name: str):
+    recording = recording_of(3, 60.0, aids=AIDS)
+    estimator = SolutionSeparation(InertialModel())
+    estimator.reset(recording.start, recording.instruments)
+    alone = KalmanEstimator(InertialModel())
+    alone.reset(recording.start, recording.instruments)
+    for p in recording.steps():
+        estimator.update(p)
+        expected = alone.update(Measurements(p.start, p.time, p.imu, [m for m in p.aids if m.instrument != name]))
+    sub = estimator._elder(name).estimate
+    np.testing.assert_allclose(difference(sub, expected), 0.0, atol=1e-9)
+    np.testing.assert_allclose(sub.covariance, expected.covariance, rtol=1e-6, atol=1e-12)
+
+
+def test_the_covariance_of_the_separation_is_the_difference_of_the_covariances(recording_of):
+    """Over 40 runs: the squared separation over P_i - P_0 has mean 1, for position and velocity."""
+    squares = {"gnss": [], "dvl": []}
+    for seed in range(40):
+        recording = recording_of(seed, 40.0, aids=AIDS)
+        estimator = SolutionSeparation(InertialModel(), horizon=1e4)
+        estimator.reset(recording.start, recording.instruments)
+        for packet in recording.steps():
+            main = estimator.update(packet)
+        for name, found in squares.items():
+            sub = estimator._elder(name).estimate
+            d, spread = difference(sub, main), sub.covariance - main.covariance
+            found.append(d[[0, 1, 3, 4]] ** 2 / np.diag(spread)[[0, 1, 3, 4]])
+    for name, found in squares.items():
+        mean = np.mean(found, axis=0)
+        assert np.all((mean > 0.42) & (mean < 1.9)), (name, mean)  # 0.1 % of chi-square with 40 degrees
+
+
+def test_where_nothing_is_wrong_it_is_the_ekf(recording_of, run_over):
+    for seed in range(3):
+        recording = recording_of(seed, 150.0, aids=AIDS)
+        expected, P = run_over(make("ekf"), recording)
+        errors, Q = run_over(make("solution-separation", horizon=60.0), recording)
+        np.testing.assert_allclose(errors, expected, atol=1e-7)
+        np.testing.assert_allclose(Q, P, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize(("size", "rate"), [(40.0, 0.0), (0.0, 1.0)], ids=["step", "ramp"])
+def test_a_wrong_gnss_is_excluded_and_used_again(recording_of, size: float, rate: float):
+    recording = off(recording_of(4, 260.0, aids=AIDS), size, 80.0, 160.0, rate)
+    error, level, excluded = run(recording)
+    assert {"gnss"} in [set(e) for e in excluded[80:130]]
+    assert all("dvl" not in e and "compass" not in e for e in excluded)
+    assert not excluded[78]
+    assert not excluded[-1]
+    plain = make("ekf")
+    plain.reset(recording.start, recording.instruments)
+    worst = 0.0
+    for k, packet in enumerate(recording.steps()):
+        at = plain.update(packet).position
+        worst = max(worst, float(np.hypot(*earth.relative_position(at, recording.data.truth.position[k])[:2])))
+    assert error.max() < 0.3 * worst
+    assert np.all(error <= level)
+
+
+def test_a_dvl_that_says_zero_is_excluded(recording_of):
+    recording = recording_of(4, 150.0, aids=AIDS)
+    dvl = recording.data.aids["dvl"]
+    dvl.value[(dvl.time > 60.0) & (dvl.time < 110.0)] = 0.0
+    error, level, excluded = run(recording)
+    assert {"dvl"} in [set(e) for e in excluded[62:90]]
+    assert all("gnss" not in e for e in excluded)
+    assert error.max() < 8.0
+    assert np.all(error <= level)
+
+
+def test_single_gross_errors_are_left_out_and_flagged(recording_of):
+    recording = recording_of(4, 60.0, aids=AIDS)
+    gnss = recording.data.aids["gnss"]
+    gnss.value[[20, 33], 0] += 60.0 / 6.37e6
+    estimator = make("solution-separation")
+    estimator.reset(recording.start, recording.instruments)
+    flagged = [f for packet in recording.steps() for f in estimator.update(packet).flagged]
+    assert flagged == [("gnss", float(gnss.time[k])) for k in (20, 33)]
+
+
+def test_a_larger_risk_is_a_lower_level(recording_of):
+    recording = recording_of(4, 30.0, aids=AIDS)
+    strict, loose = (run(recording, risk=r)[1] for r in (1e-9, 1e-3))
+    assert np.all(strict > loose)
+    assert np.all(np.isfinite(strict))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("false_alarm", 0.0), ("risk", 1.0), ("fault_probability", 2.0), ("horizon", 0.0), ("recovery", -1.0)],
+)
+def test_a_senseless_parameter_is_refused(name: str, value: float):
+    with pytest.raises(ValueError, match=name):
+        SolutionSeparation(InertialModel(), **{name: value})
