@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from simnav.estimator import Estimator
+from simnav.estimator import Estimator, Needs
 from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 if typing.TYPE_CHECKING:
@@ -51,6 +51,14 @@ class Solver(Estimator):
     def label(self) -> str:
         """What messages call it."""
         return self.row or self.name
+
+    @property
+    def needs(self) -> Needs:
+        """What its model needs."""
+        own = vars(self)
+        model = own.get("_choice", own.get("model"))
+        found: Needs = () if model is None else model.needs
+        return found
 
 
 @dataclass(frozen=True)
@@ -185,6 +193,11 @@ class Row(Estimator):
             if flag not in vars(cls):
                 setattr(cls, flag, getattr(solver.make, flag, False))
         _equip(cls)
+
+    @property
+    def needs(self) -> Needs:
+        """What its solver needs."""
+        return self.solver.needs
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.sweep.report import Sweep
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
@@ -69,6 +70,7 @@ __all__ = [
     "run",
     "scenario_of",
     "scenarios_of",
+    "sweep",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -363,6 +365,63 @@ def campaign(
                    keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
+
+
+def sweep(
+    scenario: ScenarioLike,
+    dials: Mapping[str, Sequence[float]] | Sequence[str] | str,
+    estimators: Estimators,
+    *,
+    runs: int = 30,
+    score: str = "horizontal_rmse",
+    limit: float | None = None,
+    output: str | os.PathLike[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    progress: CampaignProgress = None,
+    **options: Any,
+) -> Sweep:
+    """Turn a dial of a scenario, or two: error against the dial, and where each estimator breaks.
+
+    Every value has the same seeds: the same draws and noise, but for the dial. Started again, it goes on where it was.
+
+    Parameters
+    ----------
+    scenario, estimators, parameters : as for `run`
+    dials : mapping of str to sequence of float, or str
+        A dial of the scenario (``[[dial]]``), or a key path in its file, to values in the unit of the key; or as on the
+        command line, ``"multipath=0,1,2,4"``. Without values: seven over the range. The clean value is always added.
+    runs : int
+        Seeds a value.
+    score : str
+        Key of `simnav.scoring.SCORES`, one that is better when lower.
+    limit : float, optional
+        An error that must not be passed, in the unit of the score.
+    output : path, optional
+        Folder of the results; default: ``results/sweep-SCENARIO``.
+    seed, progress, **options
+        As for `evaluate`: ``workers``, ``time_limit``, ``memory_limit``.
+
+    Returns
+    -------
+    Sweep
+    """
+    from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.sweep.settings import checked_score, chosen_dials, parse_dials, settings
+
+    if not estimators:
+        raise RequestError("no estimator was asked for; name those whose error should be seen against the dial")
+    chosen, mine = scenario_of(scenario), requests(estimators, parameters)
+    checked_score(score, limit)
+    turned = chosen_dials(chosen, parse_dials(dials))
+    found, seeds = settings(chosen, turned), range(seed, seed + runs)
+    folder = absolute(output or Path("results") / f"sweep-{chosen.name}")
+    limits = {"workers": 2, "time_limit": None, "memory_limit": 2048.0} | options
+    summary = _run([s.scenario for s in found], mine, seeds, folder, progress=progress, **limits)
+    ids, labels = {s.scenario.id for s in found}, tuple(r.label for r in mine)
+    results = [r for r in results_of(folder) if r.scenario in ids and r.estimator in labels and r.seed in seeds]
+    return Sweep(chosen.id, tuple(d for d, _ in turned), tuple(tuple(v) for _, v in turned), labels, score, limit,
+                 results, tuple(found), summary)  # fmt: skip
 
 
 def rank(

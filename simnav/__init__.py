@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         reproduce,
         rescore,
         run,
+        sweep,
     )
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
@@ -102,6 +103,7 @@ __all__ = [
     "run",
     "run_trial",
     "score",
+    "sweep",
 ]
 
 # Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
@@ -145,6 +147,7 @@ _HOMES = {
         "reproduce",
         "rescore",
         "run",
+        "sweep",
     ),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}

@@ -8,7 +8,6 @@ harms nobody else.
 
 from __future__ import annotations
 
-import contextlib
 import importlib.metadata
 import importlib.util
 import re
@@ -17,9 +16,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-
-from simnav.draws import Template
-from simnav.spec import SpecError
+from typing import Any
 
 __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 
@@ -136,15 +133,14 @@ def _own(point: importlib.metadata.EntryPoint) -> bool:
 
 def _header(path: Path) -> Header | None:
     try:
-        with path.open("rb") as file:
-            table = tomllib.load(file)
+        text = path.read_text(encoding="utf-8")
+        table = _head(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         _warn(f"{path}: left out, not valid TOML: {error}")
         return None
     name, version, duration = table.get("name"), table.get("version"), table.get("duration_s")
     if isinstance(duration, dict):
-        with contextlib.suppress(SpecError):
-            duration = Template(table, str(path)).middle()["duration_s"]
+        duration = _middle(text, str(path))
     if not isinstance(name, str) or not NAME.fullmatch(name):
         _warn(f"{path}: left out, name = {name!r} should be in kebab-case, like 'coastal-voyage'")
         return None
@@ -166,6 +162,28 @@ def _header(path: Path) -> Header | None:
         training=table.get("training") is True,
         path=path,
     )
+
+
+def _head(text: str) -> dict[str, Any]:
+    """What stands in a file before its first table: reading all of forty files would take longer than the import."""
+    lines = text.splitlines(keepends=True)
+    end = next((i for i, line in enumerate(lines) if line.startswith("[")), len(lines))
+    try:
+        return tomllib.loads("".join(lines[:end]))
+    except tomllib.TOMLDecodeError:  # a line of a text may begin like a table
+        return tomllib.loads(text)
+
+
+def _middle(text: str, source: str) -> float | None:
+    """The median duration of a scenario that draws it."""
+    from simnav.draws import Template
+    from simnav.spec import SpecError
+
+    try:
+        duration = Template(tomllib.loads(text), source).middle().get("duration_s")
+    except (SpecError, tomllib.TOMLDecodeError):
+        return None
+    return float(duration) if isinstance(duration, (int, float)) else None
 
 
 def _warn(message: str) -> None:

@@ -145,11 +145,11 @@ def _options(values: Any, weights: Any, where: str) -> tuple[tuple[Any, ...], tu
 
 
 def _is_distribution(value: Any) -> bool:
-    return isinstance(value, Mapping) and not _KINDS_SET.isdisjoint(value)
+    return isinstance(value, dict) and not _KINDS_SET.isdisjoint(value)
 
 
 def _is_reference(value: Any) -> bool:
-    return isinstance(value, Mapping) and isinstance(value.get("draw"), str)
+    return isinstance(value, dict) and isinstance(value.get("draw"), str)
 
 
 _KINDS_SET = frozenset(_KINDS)
@@ -160,13 +160,13 @@ def has_draws(table: Mapping[str, Any]) -> bool:
     """Whether anything in the table of a scenario file is to be drawn."""
 
     def found(value: Any) -> bool:
-        if isinstance(value, Mapping):
+        if isinstance(value, dict):
             return (
                 _is_distribution(value) or _is_reference(value) or "present" in value or any(map(found, value.values()))
             )
         return isinstance(value, list) and any(map(found, value))
 
-    return "draw" in table or found(table)
+    return "draw" in table or found(dict(table))
 
 
 class Template:
@@ -219,7 +219,7 @@ class Template:
             for i, option in enumerate(found.values if found.kind == "choice" else ()):
                 self._collect(option, f"{where}.choice[{i}]")
             self._collect(value.get("present", True), f"{where}.present")
-        elif isinstance(value, Mapping):
+        elif isinstance(value, dict):
             if _is_reference(value):
                 _check_reference(value, where, self._named)
             for key, inner in value.items():
@@ -282,7 +282,7 @@ class Template:
 
     def _resolve(self, pick: Callable[[str, Distribution], Any]) -> tuple[dict[str, Any], Draws]:
         try:
-            return _Resolution(self._named, pick).table(self._body)
+            return _Resolution(self._named, self.distributions, pick).table(self._body)
         except SpecError as error:
             raise SpecError(f"{self.source}: {error}") from None
 
@@ -303,8 +303,13 @@ def _check_reference(value: Mapping[str, Any], where: str, named: Mapping[str, A
 class _Resolution:
     """One way through a template: every distribution picked once."""
 
-    def __init__(self, named: Mapping[str, Any], pick: Callable[[str, Distribution], Any]):
-        self._named, self._pick = named, pick
+    def __init__(
+        self,
+        named: Mapping[str, Any],
+        distributions: Mapping[str, Distribution],
+        pick: Callable[[str, Distribution], Any],
+    ):
+        self._named, self._distributions, self._pick = named, distributions, pick
         self._values: dict[str, Any] = {}
         self._pending: list[str] = []
         self.draws: Draws = {}
@@ -325,13 +330,13 @@ class _Resolution:
         return self._values[name]
 
     def _value(self, value: Any, where: str) -> Any:
-        if isinstance(value, Mapping) and "present" in value and not self._present(value["present"], where):
+        if isinstance(value, dict) and "present" in value and not self._present(value["present"], where):
             return _DROPPED
         if _is_distribution(value):
-            return self._drawn(Distribution.read(value, where), where)
+            return self._drawn(self._distributions[where], where)
         if _is_reference(value):
             return self._reference(value, where)
-        if isinstance(value, Mapping):
+        if isinstance(value, dict):
             inner = {
                 key: self._value(v, f"{where}.{key}" if where else str(key))
                 for key, v in value.items()
@@ -345,9 +350,7 @@ class _Resolution:
 
     def _drawn(self, distribution: Distribution, where: str) -> Any:
         value = self._pick(where, distribution)
-        if isinstance(value, Mapping) or (
-            isinstance(value, list) and any(isinstance(v, (Mapping, list)) for v in value)
-        ):
+        if isinstance(value, dict) or (isinstance(value, list) and any(isinstance(v, (Mapping, list)) for v in value)):
             number = next(i for i, option in enumerate(distribution.values) if option is value)
             self.draws[where] = number
             return self._value(value, f"{where}.choice[{number}]")

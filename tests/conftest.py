@@ -19,6 +19,9 @@ _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 if "SIMNAV_DATA" not in os.environ and _BESIDE.is_dir():
     os.environ["SIMNAV_DATA"] = str(_BESIDE)
 
+# A sandbox for each folder of results costs seconds; tests of the sandbox ask for it.
+os.environ.setdefault("SIMNAV_CONFINEMENT", "process")
+
 # Tables are compared as they are where there is no terminal; a worker of pytest-xdist is told of a narrow one.
 os.environ.pop("COLUMNS", None)
 

@@ -197,8 +197,8 @@ class InnovationBased(EstimatedNoise):
         """An estimate within its bounds, or the nominal noise, if the innovations do not contradict that."""
         nominal = innovation.noise
         low, high = _contradiction(self._length, self.significance)
-        variances = zip(estimate.diagonal().tolist(), nominal.diagonal().tolist(), innovation.predicted.diagonal().tolist())
-        for found, noise, predicted in variances:
+        variances = (m.diagonal().tolist() for m in (estimate, nominal, innovation.predicted))
+        for found, noise, predicted in zip(*variances, strict=True):
             # Variance of what is squared: an innovation, or a residual, which is R S^-1 times it.
             variance = noise + predicted if self.source == "innovation" else noise * noise / (noise + predicted)
             if not low <= 1.0 + (found - noise) / variance <= high:

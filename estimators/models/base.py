@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
 
@@ -62,6 +63,11 @@ class ErrorModel(ABC):
     memory: ClassVar[tuple[str, ...]] = ()
     #: Place of the attitude, a rotation vector, in the error; None for a model without one.
     attitude_at: ClassVar[int | None] = None
+
+    @property
+    def needs(self) -> Needs:
+        """The instruments without which it cannot work, as of `simnav.estimator.Estimator.needs`."""
+        return ()
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """The model for a set of instruments, which is itself.

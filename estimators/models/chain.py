@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
+from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
@@ -222,8 +223,9 @@ class Chain(ABC):
         order of their nodes.
     folds : Columns
         Times between nodes at which there are measurements: ``node`` (number of the node before), ``time``,
-        ``transition`` and ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since, the model's arrays as
-        predicted then, and with ``now_`` before their names as the shifted node leads to; ``jacobian`` (n, n).
+        ``transition`` and ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since, the
+        model's arrays as predicted then, and with ``now_`` before their names as the shifted node leads to;
+        ``jacobian`` (n, n).
     fold_base : int
         Number of the first of them since the start of the run.
     names : tuple of str
@@ -286,6 +288,11 @@ class Chain(ABC):
         self.prior, self.prior_shift = covariance.copy(), shift.copy()
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
+
+    @property
+    def needs(self) -> Needs:
+        """What its model needs."""
+        return self.front.needs
 
     def choose(self, instruments: Instruments, name: str) -> Chain:
         """Itself; UnsuitableScenario where its model lacks an instrument."""

@@ -20,6 +20,7 @@ import numpy as np
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.suitable import Suitable
 from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["CorrelatedFixes", "with_correlated_fixes"]
@@ -73,7 +74,7 @@ class _Ship(ShipModel):
         return super().begin(start, with_correlated_fixes(instruments, self.slow, self.slow_time))
 
 
-class CorrelatedFixes:
+class CorrelatedFixes(Suitable):
     """The inertial model where there is an IMU, else the ship model, with states for the slow error of every fix.
 
     Parameters

@@ -37,11 +37,12 @@ from typing import Literal
 import numpy as np
 
 from simnav.estimator import UnsuitableScenario
+from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import DVL, observe
 from simnav.geometry.earth import ROTATION_RATE, gravity
-from simnav.kinds import BODY_VELOCITY, POSITION, VELOCITY
+from simnav.kinds import BODY_VELOCITY, POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
@@ -82,6 +83,11 @@ class DvlCalibrationModel(InertialModel):
         if preset not in ("default", "paper"):
             raise ValueError(f'preset is {preset!r}; it must be "default" or "paper"')
         self.lever_arm, self.delay, self.preset = lever_arm, delay, preset
+
+    @property
+    def needs(self) -> Needs:
+        """An IMU and a DVL."""
+        return (IMU, tuple(kinds_with(BODY_VELOCITY)))
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU or a DVL."""

@@ -32,6 +32,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
+from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from simnav.estimators.models.measurements import CODES, HEADING, OWN, observe, uncalibrated_noise, white_noise
@@ -125,6 +126,11 @@ class InertialModel(ErrorModel):
 
     def __init__(self, calibrate: bool = True):
         self.calibrate = calibrate
+
+    @property
+    def needs(self) -> Needs:
+        """An IMU, and anything to aid it."""
+        return (IMU, AID)
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """Itself; UnsuitableScenario without an IMU or without anything to aid it."""

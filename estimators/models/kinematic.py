@@ -11,6 +11,7 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 
 from simnav.estimator import UnsuitableScenario
+from simnav.estimator.needs import Needs
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.kinds import POSITION, VELOCITY, kinds_with
@@ -45,6 +46,11 @@ class KinematicModel(ErrorModel):
     def observes(self, instrument: Datasheet) -> bool:
         """Whether it is GNSS."""
         return instrument.equation in (POSITION, VELOCITY)
+
+    @property
+    def needs(self) -> Needs:
+        """GNSS positions."""
+        return (tuple(kinds_with(POSITION)),)
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without GNSS positions."""

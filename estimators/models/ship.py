@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from simnav import kinds
 from simnav.estimator import UnsuitableScenario
+from simnav.estimator.needs import Needs
 from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov
 from simnav.estimators.models.measurements import wrap
 from simnav.estimators.models.ship_kernels import (
@@ -105,6 +106,11 @@ class ShipModel(ErrorModel):
     def observes(self, instrument: Datasheet) -> bool:
         """Whether it is a position, velocity, speed or heading."""
         return instrument.equation in OBSERVED
+
+    @property
+    def needs(self) -> Needs:
+        """A heading, and a position or a speed."""
+        return (tuple(kinds.kinds_with(kinds.HEADING)), tuple(kinds.kinds_with(*POSITIONS, *VELOCITIES)))
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """Itself; UnsuitableScenario without a heading, or without a position and a speed."""

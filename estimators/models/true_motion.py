@@ -17,8 +17,8 @@ from math import radians
 import numpy as np
 
 from simnav.geometry.earth import relative_position
-from simnav.recording import Recording
 from simnav.geometry.rotation import wrap_angle
+from simnav.recording import Recording
 from simnav.strapdown import increments
 from simnav.streams import stream
 from simnav.types import ImuDatasheet, ImuSamples, InitialState, Instruments, TriadDatasheet

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from simnav.estimator import UnsuitableScenario
+from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.types import Datasheet, Instruments
@@ -15,6 +16,11 @@ class UnaidedModel(InertialModel):
 
     def __init__(self) -> None:
         super().__init__()
+
+    @property
+    def needs(self) -> Needs:
+        """An IMU."""
+        return (IMU,)
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """Itself; UnsuitableScenario without an IMU."""

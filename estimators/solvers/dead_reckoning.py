@@ -24,12 +24,13 @@ from math import hypot
 import numpy as np
 
 from simnav.estimator import UnsuitableScenario
+from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import triad_bias
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.geometry.earth import gravity
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
-from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED
+from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED, kinds_with
 from simnav.strapdown import mechanize
 from simnav.types import KINDS, Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurements
 
@@ -59,6 +60,11 @@ class DeadReckoningEstimator(Solver):
 
     def __init__(self, current: float = 0.3):
         self.current = current
+
+    @property
+    def needs(self) -> Needs:
+        """A speed, and a heading or the gyroscopes of an IMU."""
+        return (tuple(kinds_with(BODY_VELOCITY, WATER_SPEED)), (IMU, *kinds_with(HEADING)))
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs a DVL or a speed log, and an IMU or a compass."""

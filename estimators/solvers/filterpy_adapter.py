@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimator import Estimator, UnsuitableScenario, lacking
 from simnav.estimators.solvers.admission import Admission
 from simnav.geometry.earth import displace, relative_position
 from simnav.types import (
@@ -36,20 +36,19 @@ __all__ = ["FilterpyEstimator"]
 class FilterpyEstimator(Estimator):
     """Base class of estimators whose filter is filterpy's.
 
+    What it needs is said by ``needs``, as of `simnav.estimator.Estimator.needs`; these instruments it uses.
+
     Attributes
     ----------
     components : tuple of str
         What the first states of the filter are, by their names in `simnav.types.COMPONENTS`; positions in metres from
         the initial position, ``attitude_down`` the heading. States after these are the filter's own.
-    needs : tuple of str
-        Kinds of instruments without which the scenario is unsuitable.
     uses : tuple of str
         Kinds of instruments that it uses besides, or measurement equations (`simnav.kinds.EQUATIONS`), which stand for
         all kinds that have them.
     """
 
     components: ClassVar[tuple[str, ...]] = ()
-    needs: ClassVar[tuple[str, ...]] = ()
     uses: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
@@ -66,11 +65,11 @@ class FilterpyEstimator(Estimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
-        for kind in self.needs:
-            if not instruments.of_kind(kind):
-                raise UnsuitableScenario(f"{self.name} needs an instrument of kind {kind}; there is none")
+        lack = lacking(self.needs, instruments)
+        if lack:
+            raise UnsuitableScenario(f"{self.name}: {lack}")
         self.origin = np.array(start.position, dtype=np.float64)
-        used = (*self.needs, *self.uses)
+        used = {*self.uses, *(k for n in self.needs for k in ((n,) if isinstance(n, str) else n))}
         self.sheets = {s.name: s for s in instruments.values() if s.kind in used or s.equation in self.uses}
         self.kf = self.build(start, instruments)
         self._time = start.time

@@ -29,6 +29,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.admission import LATE, Admission
@@ -71,6 +72,11 @@ class GtsamEstimator(Solver):
     )
     #: Whether every end of a step is a node.
     every_step = False
+
+    @property
+    def needs(self) -> Needs:
+        """An IMU, and anything to aid it."""
+        return (IMU, AID)
 
     def __init__(self, threshold: float = 1.0, iterations: int = 5):
         if not threshold >= 0.0:

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from simnav.estimator import UnsuitableScenario
+from simnav.estimator import Needs, UnsuitableScenario
+from simnav.estimator.needs import AID
 from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_faults
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
@@ -58,6 +59,11 @@ class OracleEstimator(KalmanEstimator):
         self._imu_faults: tuple[Array, Array] | None = None
         self._motion: ImuSamples | None = None
         self._recording: Recording | None = None
+
+    @property
+    def needs(self) -> Needs:
+        """An instrument beside the IMU."""
+        return (AID,)
 
     def reveal(self, recording: Recording) -> None:
         """Take the labels, and the true datasheets where those that are given are wrong."""

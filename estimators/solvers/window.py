@@ -422,8 +422,8 @@ class WindowEstimator(Solver):
         sizes: tuple[float, float] = solve_chain(
             chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
             motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
-            aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
-            aids["weight"], damping, first,
+            aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"],
+            aids["noise"], aids["weight"], damping, first,
             nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
             aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"], nodes["size"],
         )  # fmt: skip

@@ -13,22 +13,33 @@ import importlib
 import importlib.util
 import os
 import re
+import sys
 import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from simnav.estimator import EstimatorError, find
-from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
+from simnav.estimator.registry import is_own_reference, point_of
+from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement, describe, prepare
+from simnav.leaderboard.campaign.confinement.session import Limits
+from simnav.leaderboard.campaign.entrant import Entrant
+from simnav.leaderboard.campaign.fingerprint import (
+    estimator_source,
+    named_files,
+    recording_digest,
+    simulator_version,
+    variant,
+)
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.session_class import carry, is_session
-from simnav.leaderboard.campaign.worker import Entrant, Unit, run_unit
+from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -132,6 +143,7 @@ def run_campaign(
     progress: Callable[[Progress], None] | None = None,
     backend: str = "loky",
     scheduler: str | None = None,
+    confinement: str = "auto",
 ) -> Summary:
     """Run estimators on scenarios and seeds, and store the results.
 
@@ -164,6 +176,8 @@ def run_campaign(
         the folder under the same path.
     scheduler : str, optional
         Address of the Dask scheduler; default: a cluster on this machine.
+    confinement : {"auto", "bubblewrap", "process", "none"}
+        How estimators are kept apart from the recording, see docs/security.md; ``auto`` is the strongest that works.
 
     Returns
     -------
@@ -201,10 +215,12 @@ def run_campaign(
     if backend == "dask" and importlib.util.find_spec("distributed") is None:
         raise RequestError("backend = 'dask' needs the extra 'distributed': pip install 'simnav[distributed]'")
 
+    with mistakes():
+        chosen = chosen_confinement(confinement)
     path = store.create(Path(folder).resolve())
     endings = store.keys(path)
     simulator = simulator_version()
-    entrants = [_resolve(request) for request in estimators]
+    entrants = [_resolve(request, chosen, path, workers == 1 and backend == "loky") for request in estimators]
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     variants = {
         s.id: {e.label: _variant(e, recordings[s.id]) for e in entrants} for s in scenarios
@@ -252,6 +268,7 @@ def run_campaign(
                         scoring,
                         keep_trials,
                         covariance_interval,
+                        chosen,
                     )
                 )
     total = len(seeds) * len(scenarios) * len(entrants)
@@ -310,33 +327,64 @@ def _variant(entrant: Entrant, recording: str) -> str:
 # --- before the run -----------------------------------------------------------------------------------
 
 
-def _resolve(request: EstimatorRequest) -> Entrant:
-    """Find an estimator and look at it, in isolation: importing a file runs it."""
-    name, code = request.name, b""
+def _resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bool) -> Entrant:
+    """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
+    name, source = request.name, ""
     file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
+    parameters = {key: _absolute(value) for key, value in request.parameters.items()}
     if file:
         name = f"{Path(file[1]).resolve()}{file[2] or ''}"
+        entrant = Entrant(name, parameters, request.label, False, "")
     else:
         _import_estimators()
         with mistakes(EstimatorError):
             cls = request.cls or find(name)
-        with contextlib.suppress(Exception):  # the isolated process says what is wrong
-            estimator_source(cls)  # files that are parsed here need not be parsed in every process
+        entrant = Entrant(name, parameters, request.label, False, "", point=point_of(cls.name))
+        if _is_ours(cls):
+            with mistakes(EstimatorError):
+                request.make()
+            return replace(entrant, reference=is_own_reference(cls.name), source=estimator_source(cls))
+        with contextlib.suppress(Exception):  # the other process says what is wrong
+            source = estimator_source(cls)  # here, where the text of a session is known
         if request.cls is not None or is_session(cls.__module__):
-            code = carry(cls)
-    entrant = Entrant(name, dict(request.parameters), request.label, False, "", code)
-    outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=MEMORY)
-    if outcome.status != "ok":
-        reason = re.sub(r"^(Estimator|Request)Error: ", "", outcome.reason)
+            entrant = replace(entrant, code=carry(cls))
+    if confinement == "none":
+        outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=MEMORY)
+        found, why = outcome.value, outcome.reason
+    else:
+        try:
+            server = prepare(confinement, folder, loaded=alone)
+            found, why = describe(server, entrant, Limits(_IMPORT_TIME, MEMORY)), ""
+        except ValueError as error:
+            found, why = None, str(error)
+    if found is None:
+        reason = re.sub(r"^(Estimator|Request)Error: ", "", why)
         raise RequestError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
-    reference, source = outcome.value
-    return replace(entrant, reference=reference, source=source)
+    if found["reference"]:
+        raise RequestError(
+            f"estimator {request.name!r} declares itself a reference; in a campaign only simnav's own references are "
+            "told the truth"
+        )
+    return replace(entrant, source=source or found["source"])
 
 
-def _describe(entrant: Entrant) -> tuple[bool, str]:
-    """In the isolated process: whether it is a reference, and the digest of its sources."""
+def _is_ours(cls: type) -> bool:
+    """Whether a class comes with simnav."""
+    module = sys.modules.get(cls.__module__)
+    return cls.__module__.startswith("simnav.estimators.") and getattr(module, cls.__qualname__, None) is cls
+
+
+def _absolute(value: Any) -> Any:
+    """A parameter; the name of a file as an absolute path, for estimators run in another folder."""
+    if isinstance(value, (str, Path)) and re.search(r"[/.\\]", str(value)) and named_files([value]):
+        return str(Path(value).expanduser().resolve())
+    return value
+
+
+def _describe(entrant: Entrant) -> dict[str, Any]:
+    """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
     cls = type(entrant.make())
-    return cls.reference, estimator_source(cls)
+    return {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
 
 
 def _import_estimators() -> None:

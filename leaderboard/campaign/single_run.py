@@ -81,6 +81,7 @@ class RunReport:
             "seed": self.recording.seed,
             "duration": self.recording.duration,
             "note": self.recording.note,
+            "draws": dict(self.recording.draws),
             "simulation_seconds": self.simulation_seconds,
             "estimators": [{name: getattr(e, name) for name in fields} for e in self.estimators],
             "scores": {name: {"title": s.title, "unit": s.unit, "better": s.better} for name, s in SCORES.items()},

@@ -3,71 +3,34 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import os
 import random
 import signal
-import sys
+import threading
+import time
 import warnings
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.isolation import Outcome, isolate
+from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, close_server, prepare, seed_words
+from simnav.leaderboard.campaign.confinement.session import Limits
+from simnav.leaderboard.campaign.entrant import Entrant
+from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import OwnScores
-from simnav.leaderboard.campaign.request import enlist
-from simnav.leaderboard.campaign.session_class import receive
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 
 if TYPE_CHECKING:
-    from simnav.estimator import Estimator
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.trial import Trial
 
-__all__ = ["Entrant", "Unit", "run_unit"]
-
-#: What estimators import late; a worker that has it already starts the next one sooner.
-_LIBRARIES = ("gtsam", "scipy", "filterpy", "numba", "pandas")
+__all__ = ["Unit", "run_unit"]
 
 _prepared = False
-
-
-@dataclass(frozen=True)
-class Entrant:
-    """An estimator that takes part, resolved: it can be imported in any folder, and is known by its sources.
-
-    Attributes
-    ----------
-    name : str
-        Registered name or absolute path.
-    parameters : mapping
-    label : str
-    reference : bool
-    source : str
-        Digest.
-    code : bytes
-        The class itself, where no other process can import it.
-    """
-
-    name: str
-    parameters: Mapping[str, Any]
-    label: str
-    reference: bool
-    source: str
-    code: bytes = b""
-
-    def make(self) -> Estimator:
-        """An instance, in the isolated process."""
-        from simnav.estimator import make
-
-        if self.code:
-            enlist(receive(self.code))
-        return make(self.name, **self.parameters)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +60,8 @@ class Unit:
         Keep what the estimators gave (`simnav.leaderboard.results.trials`).
     covariance_interval : float
         Least time between two covariances that are kept [s].
+    confinement : str
+        ``process``, ``bubblewrap`` or ``none``.
     """
 
     scenario: Scenario
@@ -112,13 +77,14 @@ class Unit:
     scoring: str = ""
     keep_trials: bool = False
     covariance_interval: float = 0.0
+    confinement: str = "process"
 
     @property
     def weight(self) -> float:
         """About how much work it is."""
         return self.scenario.duration * len(self.entrants)
 
-    def result(self, entrant: Entrant, key: str, status: str, reason: str) -> Result:
+    def result(self, entrant: Entrant, key: str, status: str, reason: str, confinement: str = "") -> Result:
         """A result without scores."""
         return Result(
             scenario=self.scenario.id,
@@ -137,33 +103,46 @@ class Unit:
             scoring="{}",  # nothing is scored yet
             scenario_digest=self.scenario.content_hash(),
             estimator_digest=entrant.source,
-            provenance=here(),
+            provenance=here(confinement),
         )
 
 
-def _prepare_worker(parent: int) -> None:
-    """Once a worker: Ctrl-C is the parent's business, and kernels are loaded before the first fork."""
+def _prepare_worker(unit: Unit) -> None:
+    """Once a worker: Ctrl-C is the parent's business, and it ends when the parent is gone."""
     global _prepared
+    if unit.confinement != "none":
+        prepare(unit.confinement, unit.folder)  # loads its kernels while the first recording is made
     if _prepared:
         return
     _prepared = True
-    if os.getpid() != parent:
+    if os.getpid() != unit.parent:
         with contextlib.suppress(ValueError):  # not in the main thread of a Dask worker
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from simnav.estimator import names
+        if os.getppid() == unit.parent:
+            threading.Thread(target=_end_with, args=(unit.parent,), daemon=True).start()
+    from simnav.estimator.registry import discover_own
     from simnav.warmup import warmup
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a broken plug-in the parent has warned
-        warmup(load=True)
-        names()
+        warnings.simplefilter("ignore")
+        if unit.confinement == "none":  # estimators are forked from here
+            warmup(load=True)
+        discover_own()
+
+
+def _end_with(parent: int) -> None:
+    """End this worker within seconds of the campaign's process, whatever killed that."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    close_server()
+    os._exit(1)
 
 
 def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     """Record a run and try everyone on it; return how many ended how."""
     from simnav.source import record
 
-    _prepare_worker(unit.parent)
+    _prepare_worker(unit)
     unit.scores.register()
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
@@ -188,26 +167,21 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
 
     from simnav.scoring import score, series
 
-    outcome: Outcome = isolate(
-        _attempt,
-        entrant,
-        recording,
-        timeout=unit.timeout,
-        memory=unit.memory,
-    )
+    if unit.confinement == "none" or entrant.reference:
+        made = _in_a_fork(unit, entrant, recording)
+    else:
+        limits = Limits(unit.timeout, unit.memory)
+        made = attempt(prepare(unit.confinement, unit.folder), entrant, recording, limits)
+    trial = made.trial
     blank = replace(
-        unit.result(entrant, key, outcome.status, outcome.reason),
+        unit.result(entrant, key, made.status, made.reason, made.confinement),
         note=recording.note,
         draws=recording.draws,
-        seconds=outcome.seconds,
-        peak_memory=outcome.peak_memory,
+        seconds=made.seconds,
+        peak_memory=made.peak_memory,
     )
-    if outcome.status != "ok":
+    if trial is None:
         return blank
-    trial, libraries = outcome.value
-    for name in libraries:  # the next one need not import them again
-        with contextlib.suppress(Exception):
-            importlib.import_module(name)
     try:
         scores = score(trial, recording) if len(trial) else {}
         curves = series(trial, recording) if len(trial) else {}
@@ -217,24 +191,27 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
         trials.write(unit.folder, key, trial, recording, covariance_interval=unit.covariance_interval)
     return replace(
         blank,
-        status=trial.status,
-        reason=trial.reason,
         scores=scores,
         scoring=unit.scoring if scores else blank.scoring,
         series={name: np.asarray(values, dtype=np.float32) for name, values in curves.items()},
     )
 
 
-def _attempt(entrant: Entrant, recording: Recording) -> tuple[Trial, list[str]]:
+def _in_a_fork(unit: Unit, entrant: Entrant, recording: Recording) -> Attempt:
+    """Run an estimator in a process that has the recording: simnav's own references, or any where asked for."""
+    outcome = isolate(_attempt, entrant, recording, timeout=unit.timeout, memory=unit.memory)
+    trial: Trial | None = outcome.value if outcome.status == "ok" else None
+    status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
+    return Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
+
+
+def _attempt(entrant: Entrant, recording: Recording) -> Trial:
     """In the isolated process: make the estimator and run it."""
     import numpy as np
 
     from simnav.trial import run_trial
 
-    before = set(sys.modules)
-    # Whoever draws from a global generator gets the same numbers in every campaign.
-    random.seed(recording.seed)
-    np.random.seed(recording.seed % 2**32)  # noqa: NPY002
-    trial = run_trial(entrant.make(), recording)
-    new = [m for m in sorted(set(sys.modules) - before) if m.partition(".")[0] in _LIBRARIES]
-    return trial, new
+    words = seed_words(recording, entrant)
+    random.seed(sum(word << 32 * k for k, word in enumerate(words)))
+    np.random.seed(words)  # noqa: NPY002
+    return run_trial(entrant.make(), recording)

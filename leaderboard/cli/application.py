@@ -27,6 +27,7 @@ from simnav.leaderboard.cli import (
     rescore,
     run,
     simulate,
+    sweep,
     train,
     warmup,
 )
@@ -82,6 +83,7 @@ for _module in (
     new_estimator,
     evaluate,
     campaign,
+    sweep,
     leaderboard,
     warmup,
     bound,

@@ -17,6 +17,10 @@ def command(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the site.")] = Path("site"),
     papers: Annotated[Path, typer.Option(help="What 'simnav reproduce' wrote; gets pages.")] = Path("reproduced"),
+    runs_shown: Annotated[
+        int, typer.Option(min=1, help="Runs of each scenario of which the site has track and errors.")
+    ] = 2,
+    figures: Annotated[bool, typer.Option("--print", help="Write the charts as SVG and PNG, too.")] = False,
     workers: Workers = 2,
     json: Json = False,
     debug: Debug = False,
@@ -32,6 +36,9 @@ def command(
         found = interface.results_of(results, series=True)
         ranking = interface.rank(found)
         with out.progress("site") as progress:
-            index = build(found, ranking, output, progress=progress, workers=workers, papers=find(papers))
+            index = build(
+                found, ranking, output, progress=progress, workers=workers, papers=find(papers), runs_shown=runs_shown,
+                figures=figures,
+            )  # fmt: skip
         out.document({"site": str(index), "runs": len(found), "failed": failures(found), "ranking": ranking.to_dict()})
         out.print(*ranking_tables(ranking), *failure_table(found), f"site: {index}")

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.ranking_table import between, ratio
-
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
 
 __all__ = ["STATIC", "TEMPLATES", "environment"]
 
 TEMPLATES = Path(__file__).parent / "templates"
-#: Files that every page needs beside it.
-STATIC = ("style.css", "tables.js")
+#: Files that every page needs beside it, those of papers too.
+STATIC = ("style.css",)
 
 
 def environment() -> Environment:
@@ -30,12 +28,14 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    found.filters |= {
-        "duration": tables.duration,
-        "percent": tables.percent,
-        "size": lambda count: tables.size(count or None),
-        "ratio": ratio,
-        "to_ratio": lambda low, high: between(low, high, ratio),
-        "sortable": lambda value: "" if math.isnan(value) else repr(float(value)),
-    }
+    found.filters["prose"] = _prose
     return found
+
+
+def _prose(text: str) -> Markup:
+    """A text of a docstring: ``*title*`` and code in two backticks become HTML, all else is escaped."""
+    from markupsafe import Markup, escape
+
+    safe = re.sub(r"``(.+?)``", r"<code>\1</code>", str(escape(text)))
+    # Nothing but the text that was escaped above.
+    return Markup(re.sub(r"(?<!\*)\*([^*]+)\*(?!\*)", r"<em>\1</em>", safe))

@@ -1,16 +1,14 @@
 """The site: one static folder, opened from disk or served, that needs nothing from elsewhere.
 
-``index.html`` holds the ranking, and there is a page for each scenario and each estimator; the figures are SVG and
-PNG, the data JSON, CSV and Parquet. The folder is built beside its place and swapped in at the end: a run that is
-killed leaves the old site.
+``index.html`` holds a table a track; there is a page for each scenario and each estimator, one to compare two rows, and
+one on where the results come from. Charts are drawn by one copy of Vega (``vega.js``) from the files in ``data/``. The
+folder is built beside its place and swapped in at the end: a run that is killed leaves the old site.
 """
 
 from __future__ import annotations
 
-import hashlib
-import math
+import json
 import os
-import re
 import shutil
 import tempfile
 import time
@@ -19,49 +17,31 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from simnav.leaderboard.figures.plots import Style
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.ranking_figure import ranking_figure
-from simnav.leaderboard.ranking.ranking_table import ratio, score_caption, score_title, tier_starts
 from simnav.leaderboard.ranking.runs import Runs, group
+from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
-from simnav.leaderboard.site.content import (
-    Cell,
-    EstimatorEntry,
-    EstimatorPage,
-    EstimatorRow,
-    ExtraPage,
-    Fact,
-    Failure,
-    Image,
-    IndexRow,
-    IndexTrack,
-    MatrixRow,
-    ScenarioEntry,
-    ScenarioPage,
-    ScenarioPageRow,
-    SiteFacts,
-    bars,
-    score_cells,
-)
+from simnav.leaderboard.results.provenance import benchmark_of, distinct
+from simnav.leaderboard.site.columns import glossary
+from simnav.leaderboard.site.content import EstimatorEntry, ExtraPage, Fact, ScenarioEntry, SiteFacts, slug
+from simnav.leaderboard.site.estimator_page import estimator_data, facts_of, runs_data
+from simnav.leaderboard.site.facts import catalogued, estimator_facts, name_of, toml_of
+from simnav.leaderboard.site.library import bundle
+from simnav.leaderboard.site.overview import BOARD_COLUMNS, overview
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
-from simnav.leaderboard.site.scenario_figures import catalogued, scenario_figures, write_figure
-from simnav.scoring import badge
+from simnav.leaderboard.site.scenario_page import RUNS_SHOWN, ScenarioData, scenario_data
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Ranking, ScenarioRanking, TrackRanking
+    from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["build"]
 
 _WORTH_PROCESSES = 3  # scenarios
 _STALE = 3600.0  # a build of this age runs no more [s]
-_NAME_OF_LABEL = re.compile(r"[(\[ ]")  # a label is a name, and its parameters in brackets
-_STATIC = (*STATIC, "results.schema.json")
+_STATIC = (*STATIC, "core.js", "table.js", "charts.js", "compare.js", "page.js", "results.schema.json")
 
 
 def build(
@@ -73,12 +53,15 @@ def build(
     progress: Callable[..., None] | None = None,
     workers: int = 1,
     papers: Sequence[ExtraPage] = (),
+    runs_shown: int = RUNS_SHOWN,
+    figures: bool = False,
 ) -> Path:
     """Write the site.
 
     Parameters
     ----------
     results : sequence of Result
+        With their series.
     ranking : Ranking
         Of the same results.
     output : Path
@@ -88,9 +71,13 @@ def build(
     progress : callable, optional
         Called with (done, total, note=...).
     workers : int
-        Processes that draw the figures.
+        Processes that prepare the scenarios.
     papers : sequence of ExtraPage, optional
         Reproductions of papers (`simnav.leaderboard.papers.page.find`).
+    runs_shown : int
+        Runs of each scenario of which track and errors are on the site.
+    figures : bool
+        Write the charts as SVG and PNG, too, for print.
 
     Returns
     -------
@@ -100,7 +87,8 @@ def build(
     Raises
     ------
     RequestError
-        If there are no results, or the folder holds something that is no site.
+        If there are no results, if they belong to different versions of the benchmark, or if the folder holds something
+        that is no site.
     """
     if not results:
         raise RequestError("there are no results to show")
@@ -112,7 +100,8 @@ def build(
     try:
         draft.chmod(0o755)
         report = progress or (lambda *_, **__: None)
-        _Site(results, ranking, draft, command or reproduce(results), report, workers, papers).write()
+        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers)
+        site.write(runs_shown, figures)
         _swap(draft, output)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -167,21 +156,12 @@ def _request(result: Result) -> str:
     """An estimator as it is asked for; one that is not registered came from a file."""
     from simnav.estimator import names
 
-    name, _, class_name = _NAME_OF_LABEL.split(result.estimator, maxsplit=1)[0].partition(":")
+    name, _, class_name = name_of(result.estimator).partition(":")
     if name not in names():
         name += f".py:{class_name}" if class_name else ".py"
     if not result.parameters:
         return name
     return name + ":" + ",".join(f"{k}={v}" for k, v in result.parameters.items())
-
-
-def slug(text: str, taken: set[str]) -> str:
-    """A file name for a label: plain characters only, and none twice."""
-    plain = re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:60] or "unnamed"
-    if plain in taken or plain != text:
-        plain += "-" + hashlib.blake2b(text.encode(), digest_size=3).hexdigest()
-    taken.add(plain)
-    return plain
 
 
 class _Site:
@@ -197,79 +177,81 @@ class _Site:
         workers: int,
         papers: Sequence[ExtraPage],
     ):
+        from importlib.metadata import version
+
+        catalogued.cache_clear()
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
         self.runs = group(self.results)
-        labels = list(
-            dict.fromkeys(
-                [
-                    *(row.estimator for track in ranking.tracks for row in track.rows),
-                    *sorted({r.estimator for r in self.results}),
-                ]
-            )
-        )
+        ranked = [row.estimator for track in ranking.tracks for row in track.rows]
+        labels = list(dict.fromkeys([*ranked, *sorted({r.estimator for r in self.results})]))
         references = {r.estimator for r in self.results if r.reference}
-        self.style = Style(labels, references)
-        taken = {"index"}
-        self.estimators = {
-            label: EstimatorEntry(
-                label,
-                f"estimator-{slug(label, taken)}.html",
-                self.style.colour(label),
-                self.style.colour(label, dark=True),
-                label in references,
+        taken = {"index", "compare", "about"}
+        self.estimators: dict[str, EstimatorEntry] = {}
+        for label in labels:
+            stem = slug(label, taken)
+            self.estimators[label] = EstimatorEntry(
+                label, f"estimator-{stem}.html", f"row-{stem}", label in references, estimator_facts(label)
             )
-            for label in labels
-        }
-        self.scenarios = [_describe(s, by, f"{slug(s, taken)}.html") for s, by in self.runs.items()]
-        versions = _versions()
-        generated = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+        described = [_describe(s, by, f"{slug(s, taken)}.html") for s, by in self.runs.items()]
+        self.scenarios = {s.id: s for s in described}
+        provenances = [r.provenance for r in self.results]
         self.facts = SiteFacts(
-            versions["simnav"], generated, len(self.results), self.scenarios, papers, command, versions
+            version=version("simnav"),
+            generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+            total=len(self.results),
+            scenarios=described,
+            estimators=list(self.estimators.values()),
+            papers=papers,
+            command=command,
+            benchmark=benchmark_of(provenances),
+            provenance=distinct(provenances),
+            citation=citation(provenances),
         )
 
-    def write(self) -> None:
-        """Write all pages, figures and data."""
+    def write(self, runs_shown: int, figures: bool) -> None:
+        """Write all pages and data."""
         pages = environment()
-        (self.folder / "figures").mkdir()
+        (self.folder / "data").mkdir()
         steps = len(self.scenarios) + 1
         self.progress(0, steps)
-        for k, (scenario, figures) in enumerate(zip(self.scenarios, self._draw(), strict=True)):
-            self._page(pages, "scenario.html", scenario.page, scenario=self._scenario(scenario, figures))
+        for k, (scenario, found) in enumerate(zip(self.scenarios.values(), self._prepared(runs_shown), strict=True)):
+            for name, content in found.files.items():
+                self._data(name, content)
+            if figures:
+                self._print(scenario, found)
+            self._page(pages, "scenario.html", scenario.page, found.page, scenario=scenario)
             self.progress(k + 1, steps, note=scenario.name)
-        for label, estimator in self.estimators.items():
-            self._page(pages, "estimator.html", estimator.page, estimator=self._estimator(label))
-        self._page(pages, "index.html", "index.html", **self._index())
+        for label, entry in self.estimators.items():
+            self._data(entry.data, runs_data(label, self.ranking, self.runs, self.scenarios))
+            data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators)
+            parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
+            self._page(pages, "estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
+                       data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
+        tracks = overview(self.ranking, self.estimators, self.scenarios, self.runs)
+        self._page(
+            pages, "index.html", "index.html", {"kind": "index", "tracks": tracks}, tracks=tracks, facts=self._counts()
+        )
+        rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
+        self._page(pages, "compare.html", "compare.html", {"kind": "compare", "rows": rows})
+        self._page(pages, "about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
         for extra in self.facts.papers:
             extra.install(self.folder, self.facts)
         for name in _STATIC:
             shutil.copyfile(TEMPLATES / name, self.folder / name)
+        (self.folder / "vega.js").write_text(bundle(), encoding="utf-8")
         self._export()
         self.progress(steps, steps)
 
-    def _export(self) -> None:
-        known = ("id", "name", "title", "description", "source", "seeds")
-        document = Document(
-            self.results,
-            self.ranking.to_dict(),
-            [{key: getattr(s, key) for key in known} for s in self.scenarios],
-            self.facts.command,
-            self.facts.generated,
-        )
-        for name in formats("results"):
-            write("results", name, document, self.folder / f"results.{name}")
-
-    def _ranking_of(self, scenario: ScenarioEntry) -> ScenarioRanking:
-        return next(s for s in self.ranking.scenarios if s.scenario == scenario.id)
-
-    def _draw(self) -> Iterator[list[Image]]:
-        """The figures of one scenario after the other; several processes where it is worth their start."""
-        tasks = [
-            (self.folder, s, [self.runs[s.id][row.estimator] for row in self._ranking_of(s).rows], self.style)
-            for s in self.scenarios
-        ]
+    def _prepared(self, runs_shown: int) -> Iterator[ScenarioData]:
+        """The data of one scenario after the other; several processes where it is worth their start."""
+        tasks = []
+        for identity, entry in self.scenarios.items():
+            table, runs = self.ranking.scenario(identity), self.runs[identity]
+            mine = {n: self.estimators[n] for n in runs}
+            tasks.append((entry, table, runs, mine, runs_shown))
         if self.workers < 2 or len(tasks) < _WORTH_PROCESSES:
-            yield from (scenario_figures(*task) for task in tasks)
+            yield from (scenario_data(*task) for task in tasks)
             return
         from joblib import Parallel, delayed
 
@@ -277,124 +259,56 @@ class _Site:
         os.environ["PYTHONSAFEPATH"] = "1"  # a folder of ours where the user stands must not be imported
         try:
             parallel = Parallel(n_jobs=min(self.workers, len(tasks)), return_as="generator", pre_dispatch="2*n_jobs")
-            yield from parallel(delayed(scenario_figures)(*task) for task in tasks)
+            yield from parallel(delayed(scenario_data)(*task) for task in tasks)
         finally:
             os.environ.pop("PYTHONSAFEPATH") if before is None else os.environ.update(PYTHONSAFEPATH=before)
 
-    def _page(self, pages: Any, template: str, name: str, **values: Any) -> None:
-        page = "index" if name == "index.html" else name
-        text = pages.get_template(template).render(page=page, site=self.facts, **values)
-        (self.folder / name).write_text(text, encoding="utf-8")
-
-    # -- index -----------------------------------------------------------------------------------
-
-    def _index(self) -> dict[str, object]:
-        facts = [
+    def _counts(self) -> list[Fact]:
+        tried = [r for r in self.results if r.tried]
+        return [
             Fact("Scenarios", len(self.scenarios)),
             Fact("Estimators", len(self.estimators)),
-            Fact("Seeds a scenario", max(len(s.seeds) for s in self.scenarios)),
-            Fact("Runs", sum(r.tried for r in self.results)),
-            Fact("Failed", sum(runs.failed for by in self.runs.values() for runs in by.values())),
+            Fact("Seeds a scenario", max(len(s.seeds) for s in self.scenarios.values())),
+            Fact("Runs", len(tried)),
+            Fact("Failed runs", sum(r.status != "ok" for r in tried)),
         ]
-        return {"facts": facts, "tracks": [self._track(t) for t in self.ranking.tracks], "matrix": self._matrix()}
 
-    def _track(self, track: TrackRanking) -> IndexTrack:
-        starts = tier_starts([r.tier for r in track.rows])
-        rows = tuple(
-            IndexRow(row, self.estimators[row.estimator], first, bar)
-            for row, first, bar in zip(track.rows, starts, bars(track.rows), strict=True)
+    def _export(self) -> None:
+        known = ("id", "name", "title", "description", "source", "seeds")
+        document = Document(
+            self.results,
+            self.ranking.to_dict(),
+            [{key: getattr(s, key) for key in known} for s in self.scenarios.values()],
+            self.facts.command,
+            self.facts.generated,
         )
-        figure = None
-        if any(math.isfinite(row.score) for row in track.rows):
-            figure = write_figure(
-                self.folder,
-                ranking_figure(track, self.style),
-                f"ranking-{track.track}",
-                f"{track.title}: the ranking with its intervals; hollow: reference.",
-                "Score of every estimator with its interval, as in the table above",
-            )
-        barred = [r for r in track.rows if r.why]
-        notes = (*track.remarks, *(f"{r.estimator} is not ranked ({r.standing}): {r.why}." for r in barred))
-        title = score_title(track).replace(" ", "\u00a0")
-        return IndexTrack(track.track, track.title, score_caption(track), title, track.provisional, rows, notes, figure)
+        for name in formats("results"):
+            write("results", name, document, self.folder / f"results.{name}")
 
-    def _matrix(self) -> list[MatrixRow]:
-        medians = {
-            (label, s.id): self.runs[s.id][label].score("horizontal_rmse").value
-            for label in self.estimators
-            for s in self.scenarios
-            if label in self.runs[s.id]
-        }
-        best: dict[str, float] = {}
-        for (label, scenario), value in medians.items():
-            if not self.estimators[label].reference and not math.isnan(value):
-                best[scenario] = min(value, best.get(scenario, math.inf))
+    def _data(self, name: str, content: Mapping[str, Any]) -> None:
+        text = f"simnav.data[{json.dumps(name)}] = {_json(content)};\n"
+        (self.folder / "data" / f"{name}.js").write_text(text, encoding="utf-8")
 
-        def cell(entry: EstimatorEntry, s: ScenarioEntry) -> Cell:
-            value = medians.get((entry.label, s.id), math.nan)
-            text = "" if math.isnan(value) else tables.number(value)
-            return Cell(text, value, best=value == best.get(s.id) and not entry.reference, page=s.page)
+    def _print(self, scenario: ScenarioEntry, found: ScenarioData) -> None:
+        from simnav.leaderboard.site.print_figures import filled, write_figure
 
-        return [MatrixRow(e, tuple(cell(e, s) for s in self.scenarios)) for e in self.estimators.values()]
+        (self.folder / "figures").mkdir(exist_ok=True)
+        for chart in found.charts:
+            write_figure(filled(chart, found.first), self.folder / "figures" / f"{scenario.data}-{chart.name}")
 
-    # -- scenario --------------------------------------------------------------------------------
-
-    def _scenario(self, entry: ScenarioEntry, figures: Sequence[Image]) -> ScenarioPage:
-        by, ranking = self.runs[entry.id], self._ranking_of(entry)
-        columns, cells = score_cells([(by[row.estimator], row.reference) for row in ranking.rows])
-        return ScenarioPage(
-            entry=entry,
-            baseline=ranking.reference.text,
-            remarks=ranking.remarks,
-            columns=columns,
-            rows=tuple(
-                ScenarioPageRow(row, self.estimators[row.estimator], c, starts)
-                for row, c, starts in zip(ranking.rows, cells, tier_starts([r.tier for r in ranking.rows]), strict=True)
-            ),
-            unsuitable=_by_reason(ranking.unsuitable),
-            failures=tuple(
-                Failure(row.estimator, status, count, _reason(by[row.estimator], status))
-                for row in ranking.rows
-                for status, count in row.statuses.items()
-                if status != "ok"
-            ),
-            figures=tuple(figures),
+    def _page(self, pages: Any, template: str, name: str, content: Mapping[str, Any], **values: Any) -> None:
+        cited = self.facts.citation.text if self.facts.citation is not None else ""
+        values.setdefault("data", content)
+        text = pages.get_template(template).render(
+            page=name, site=self.facts, page_data=_json({**content, "citation": cited}), **values
         )
-
-    # -- estimator -------------------------------------------------------------------------------
-
-    def _estimator(self, label: str) -> EstimatorPage:
-        mine = [(s, self.runs[s.id][label]) for s in self.scenarios if label in self.runs[s.id]]
-        suited = [(s, r) for s, r in mine if r.tried]
-        columns, cells = score_cells([(r, True) for _, r in suited])
-        facts = tuple(
-            Fact(track.title, f"{row.ranks or '–'} of {sum(r.ranked for r in track.rows)}, {ratio(row.score)}")
-            for track in self.ranking.tracks
-            for row in track.rows
-            if row.estimator == label and math.isfinite(row.score)
-        )
-        return EstimatorPage(
-            entry=self.estimators[label],
-            summary=_summary(label),
-            facts=facts,
-            columns=columns,
-            rows=tuple(
-                EstimatorRow(s, len(r.tried), r.failed, c, badge(np.array(r.scores("nees_horizontal"))))
-                for (s, r), c in zip(suited, cells, strict=True)
-            ),
-            unsuitable=_by_reason({s.name: r.results[0].reason for s, r in mine if not r.tried}),
-            parameters=tables.parameters(mine[0][1].results[0].parameters) if mine else "",
-        )
+        (self.folder / name).write_text(text, encoding="utf-8")
 
 
-# ------------------------------------------------------------------------------------------------
-
-
-def _versions() -> dict[str, str]:
-    import platform
-    from importlib.metadata import version
-
-    return {"simnav": version("simnav"), "python": platform.python_version(), "numpy": version("numpy")}
+def _json(content: Mapping[str, Any]) -> str:
+    """JSON that can stand in a page: nothing in it closes an element."""
+    text = json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def _describe(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry:
@@ -410,30 +324,7 @@ def _describe(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry
         facts.append(Fact("Instruments", len(scenario.instruments)))
     if scenario.faults:
         facts.append(Fact("Faults", len(scenario.faults)))
-    texts = (scenario.title, scenario.description, scenario.source)
-    return ScenarioEntry(identity, name or identity, page, seeds, _argument(identity), tuple(facts), *texts)
-
-
-def _summary(label: str) -> str:
-    """First line of an estimator's docstring, where it is installed."""
-    from simnav.estimator import describe
-
-    try:
-        return describe(_NAME_OF_LABEL.split(label, maxsplit=1)[0]).summary
-    except (ValueError, ImportError):
-        return ""
-
-
-def _by_reason(reasons: Mapping[str, str]) -> dict[str, list[str]]:
-    """Reason -> those that share it."""
-    found: dict[str, list[str]] = {}
-    for name, why in reasons.items():
-        found.setdefault(why, []).append(name)
-    return found
-
-
-def _reason(runs: Runs, status: str) -> str:
-    """Why the first run with a status ended so."""
-    if status == "incomplete":
-        return "it ended well, but gave a position at too few of the epochs"
-    return next((r.reason for r in runs.results if r.status == status), "")
+    return ScenarioEntry(
+        identity, name or identity, page, seeds, _argument(identity), tuple(facts), scenario.title,
+        scenario.description, scenario.source, toml_of(identity), scenario.group,
+    )  # fmt: skip

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from simnav.estimator.contract import Estimator, EstimatorError, UnsuitableScenario
 from simnav.estimator.lookup import Description, describe, find, make
+from simnav.estimator.needs import Needs, NeedsError, checked_needs, lacking
 from simnav.estimator.parameters import Parameter
 from simnav.estimator.registry import GROUP, names, register
 
@@ -19,10 +20,14 @@ __all__ = [
     "Description",
     "Estimator",
     "EstimatorError",
+    "Needs",
+    "NeedsError",
     "Parameter",
     "UnsuitableScenario",
+    "checked_needs",
     "describe",
     "find",
+    "lacking",
     "make",
     "names",
     "register",

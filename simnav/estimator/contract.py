@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
+from simnav.estimator.needs import Needs
 from simnav.plugins import PluginError
 from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
 
@@ -36,6 +37,16 @@ class Estimator(ABC):
     reference: ClassVar[bool] = False
     slow: ClassVar[bool] = False
 
+    @property
+    def needs(self) -> Needs:
+        """The instruments without which it cannot work; a class may simply say ``needs = ("imu", "gnss_position")``.
+
+        Each entry is a kind of instrument, ``"imu"``, ``"aid"`` (any instrument beside the IMU), or a tuple of these of
+        which one is enough. The harness gives it no scenario that lacks one of them. To refuse a scenario that has them
+        all is a failure. By default nothing is needed.
+        """
+        return ()
+
     @abstractmethod
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run.
@@ -50,7 +61,7 @@ class Estimator(ABC):
         Raises
         ------
         UnsuitableScenario
-            If the estimator cannot work with these instruments; say what it needs.
+            If an instrument is lacking that `needs` names, where the estimator is used without the harness.
         """
 
     @abstractmethod
@@ -66,7 +77,7 @@ class Estimator(ABC):
 
 
 class UnsuitableScenario(Exception):  # noqa: N818 (not an error of the estimator's)
-    """Raised by `Estimator.reset`: the instruments that this estimator needs are not there."""
+    """Raised by `Estimator.reset`: an instrument that `Estimator.needs` names is not there."""
 
 
 class EstimatorError(PluginError):

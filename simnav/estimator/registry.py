@@ -6,9 +6,10 @@ Entry points are loaded when a name is first asked for; one that fails is named 
 from __future__ import annotations
 
 import re
+import sys
 import warnings
 from collections.abc import Callable, Sequence
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +17,20 @@ from simnav.estimator.contract import Estimator, EstimatorError
 from simnav.plugins import place_of
 from simnav.spec import closest
 
-__all__ = ["GROUP", "aliases_of", "discover", "forget", "kebab", "names", "register", "registered"]
+__all__ = [
+    "GROUP",
+    "aliases_of",
+    "discover",
+    "discover_own",
+    "discover_point",
+    "forget",
+    "is_own_reference",
+    "kebab",
+    "names",
+    "point_of",
+    "register",
+    "registered",
+]
 
 GROUP = "simnav.estimators"
 
@@ -24,7 +38,10 @@ E = TypeVar("E", bound=type[Estimator])
 
 _classes: dict[str, type[Estimator]] = {}  # by name
 _aliases: dict[str, str] = {}  # alias -> name
-_discovered = False
+_points: dict[str, str] = {}  # entry points of other packages, by the names that they registered
+_own = False  # simnav's own are loaded
+_discovered = False  # those of all packages are
+_partly = False  # some were left out
 
 
 def register(name: str, aliases: Sequence[str] = ()) -> Callable[[E], E]:
@@ -79,8 +96,13 @@ def registered(name: str) -> type[Estimator]:
     EstimatorError
         If there is none; the message names the nearest.
     """
+    global _discovered, _partly
     discover()
     known = _aliases.get(name, name)
+    if known not in _classes and _partly:
+        _discovered = _partly = False
+        discover()
+        known = _aliases.get(name, name)
     if known not in _classes:
         raise EstimatorError(f"unknown estimator {name!r}{closest(name, [*_classes, *_aliases])}")
     return _classes[known]
@@ -96,23 +118,68 @@ def discover() -> None:
     global _discovered
     if _discovered:
         return
+    discover_own()
     _discovered = True
-    found = entry_points(group=GROUP)
-    for point in sorted(found, key=lambda p: (p.dist is None or p.dist.name != "simnav", p.name)):
-        before = dict(_classes), dict(_aliases)
-        try:
-            loaded = point.load()
-            if isinstance(loaded, type) and "name" not in vars(loaded):
-                register(point.name)(loaded)
-        except (Exception, SystemExit) as error:
-            _classes.clear()
-            _aliases.clear()
-            _classes.update(before[0]), _aliases.update(before[1])
-            owner = f" of package {point.dist.name!r}" if point.dist is not None else ""
-            warnings.warn(
-                f"estimator plug-in {point.name!r} ({point.value}){owner} is left out: {type(error).__name__}: {error}",
-                stacklevel=3,
-            )
+    for point in sorted(entry_points(group=GROUP), key=lambda p: p.name):
+        if not _is_ours(point):
+            _load(point)
+
+
+def discover_own() -> None:
+    """Load simnav's own estimators only: what another package registers is loaded when an unknown name is asked for."""
+    global _own
+    if _own:
+        return
+    _own = True
+    for point in entry_points(group=GROUP):
+        if _is_ours(point):
+            _load(point)
+
+
+def discover_point(value: str) -> None:
+    """Load one entry point of another package, as `point_of` names it (or none), and no other until one is needed."""
+    global _discovered, _partly
+    discover_own()
+    _discovered = _partly = True
+    for point in entry_points(group=GROUP):
+        if point.value == value and not _is_ours(point):
+            _load(point)
+
+
+def point_of(name: str) -> str:
+    """The entry point of another package that registered a name; empty where none did."""
+    return _points.get(name, "")
+
+
+def is_own_reference(name: str) -> bool:
+    """Whether a name is that of a reference that comes with simnav: it alone is told the truth in a campaign."""
+    discover_own()
+    cls = _classes.get(_aliases.get(name, name))
+    if cls is None or not cls.reference or not cls.__module__.startswith("simnav.estimators."):
+        return False
+    return getattr(sys.modules.get(cls.__module__), cls.__qualname__, None) is cls
+
+
+def _is_ours(point: EntryPoint) -> bool:
+    return point.dist is not None and point.dist.name == "simnav"
+
+
+def _load(point: EntryPoint) -> None:
+    before = dict(_classes), dict(_aliases)
+    try:
+        loaded = point.load()
+        if isinstance(loaded, type) and "name" not in vars(loaded):
+            register(point.name)(loaded)
+    except (Exception, SystemExit) as error:
+        _classes.clear()
+        _aliases.clear()
+        _classes.update(before[0]), _aliases.update(before[1])
+        owner = f" of package {point.dist.name!r}" if point.dist is not None else ""
+        warnings.warn(
+            f"estimator plug-in {point.name!r} ({point.value}){owner} is left out: {type(error).__name__}: {error}",
+            stacklevel=4,
+        )
+    _points.update(dict.fromkeys(set(_classes) - set(before[0]), "" if _is_ours(point) else point.value))
 
 
 def forget(path: Path) -> None:

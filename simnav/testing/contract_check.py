@@ -276,8 +276,7 @@ def _output(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """Every step returns a valid `Estimate`: right time and shapes, finite values, a valid covariance."""
     trial = candidate.trial
     if trial.status == "unsuitable":
-        said = f"it said: {trial.reason}" if trial.reason else "it did not say why"
-        return False, f"it is not suited even where every kind of instrument is there; {said}"
+        return False, f"its needs are not met even where every kind of instrument is there: {trial.reason}"
     if trial.status != "ok":
         return False, f"{trial.status}: {trial.reason}"
     vectors = [v for v in ("position", "velocity", "attitude") if np.isfinite(getattr(trial, v)).any()]
@@ -385,7 +384,7 @@ def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
 @_demand("missing instruments")
 def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """Without an instrument the estimator works, or raises `UnsuitableScenario` and says what it needs."""
+    """Without an instrument the estimator works, or its `needs` name the instrument; it refuses no other scenario."""
     names = list(recording.instruments)
     needed: list[str] = []
     for absent in (["imu"], *([n] for n in names), names, [*names, "imu"]):
@@ -393,11 +392,9 @@ def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
         label = absent[0] if len(absent) == 1 else "all" if "imu" in absent else "all but the IMU"
         if trial.status not in ("ok", "unsuitable"):
             return False, f"without {label}: {trial.status}: {trial.reason}"
-        if trial.status == "unsuitable" and not trial.reason:
-            return False, f"without {label}: UnsuitableScenario does not say what is needed"
         if trial.status == "unsuitable":
             needed.append(label)
-    sentence = f"without {', '.join(needed)} it says what it needs" if needed else "it works without any of them"
+    sentence = f"it declares that it needs {', '.join(needed)}" if needed else "it works without any of them"
     return True, sentence
 
 

@@ -25,7 +25,7 @@ from typing import ClassVar, TypeAlias
 
 import numpy as np
 
-from simnav.estimator import Estimator, UnsuitableScenario
+from simnav.estimator import Estimator, UnsuitableScenario, lacking
 from simnav.recording import Recording
 from simnav.types import Array, Measurements
 
@@ -170,6 +170,9 @@ def _time_a_round(
 
 
 def _begun(estimator: Estimator, recording: Recording) -> Estimator:
+    lack = lacking(estimator.needs, recording.instruments)
+    if lack:
+        raise UnsuitableScenario(lack)
     if estimator.reference:
         estimator.reveal(recording)
     estimator.reset(copy.deepcopy(recording.start), copy.deepcopy(recording.instruments))

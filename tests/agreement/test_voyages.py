@@ -8,7 +8,7 @@ import pytest
 import simnav
 from simnav.geometry.rotation import wrap_angle
 from simnav.scenario import parse
-from tests.agreement.voyages import turned, voyage
+from tests.agreement.voyages import turned, voyage, voyage_of
 
 
 def test_a_number_is_a_voyage():
@@ -33,3 +33,11 @@ def test_a_turned_start_is_off_by_the_angle_and_knows_it(off: float):
     assert np.degrees(np.sqrt(start.covariance[8, 8])) == pytest.approx(abs(off))
     np.testing.assert_array_equal(start.position, recording.start.position)
     np.testing.assert_array_equal(start.covariance[:8, :8], recording.start.covariance[:8, :8])
+
+
+def test_a_family_gives_the_same_voyages_as_a_campaign():
+    recording, row = voyage_of("clean-voyages", 3, (2.0, 3.0))
+    assert row["draws"] == simnav.load("clean-voyages").drawn(3).draws | {"draw.heading": row["heading_deg"]}
+    assert 2.0 <= row["heading_deg"] <= 3.0
+    assert recording.faults == ()
+    assert recording.actual is None

@@ -5,10 +5,12 @@ navigation grade), how well the initial heading is known, the rates of DVL (1 to
 arms, sea and latitude. ::
 
     python -m tests.agreement.voyages run RESULTS.jsonl --count 200 --first 31000 --estimators ekf,ukf,sw-fgo
+    python -m tests.agreement.voyages run RESULTS.jsonl --family clean-voyages --count 200 --first 0
     python -m tests.agreement.voyages run RESULTS.jsonl --count 40 --first 32000 --heading-off 90
     python -m tests.agreement.voyages table RESULTS.jsonl
 
-A second call of ``run`` goes on where the first one was stopped. The table gives, for each estimator, the horizontal
+With ``--family`` voyage k is run k of a family of scenarios, such as ``scenarios/families/clean-voyages.toml``. A
+second call of ``run`` goes on where the first one was stopped. The table gives, for each estimator, the horizontal
 RMSE over the best of the estimators in `BEST_OF` on the same voyage: median, 90th percentile and maximum; how often
 the mean horizontal NEES by degree of freedom is above 5; and the processor time of an epoch.
 """
@@ -29,9 +31,9 @@ import simnav
 from simnav.estimator import make
 from simnav.geometry.rotation import wrap_angle
 from simnav.recording import Recording
-from simnav.scenario import parse
+from simnav.scenario import load, parse
 
-__all__ = ["BEST_OF", "run", "turned", "voyage"]
+__all__ = ["BEST_OF", "run", "turned", "voyage", "voyage_of"]
 
 DURATION = 240.0
 #: The error of an estimator is divided by the least one among these.
@@ -140,6 +142,16 @@ def voyage(number: int, lowest_heading: float = 0.1, highest_heading: float = 45
     return "\n".join(lines), drawn
 
 
+def voyage_of(family: str, number: int, heading: tuple[float, float] | None = None) -> tuple[Recording, dict[str, Any]]:
+    """A voyage of a family of scenarios, and what was drawn for it; ``heading`` is another range of its sigma [deg]."""
+    scenario = load(family)
+    if heading is not None:
+        scenario = scenario.with_values({"draw.heading": {"log_uniform": list(heading)}})
+    recording = simnav.record(scenario, number)
+    heading_deg = float(np.degrees(np.sqrt(recording.start.covariance[8, 8])))
+    return recording, {"number": number, "heading_deg": heading_deg, "draws": dict(recording.draws)}
+
+
 def turned(recording: Recording, off_deg: float) -> Recording:
     """The recording with an initial heading that is off by an angle, of which its sigma tells."""
     start, off = recording.start, np.radians(off_deg)
@@ -169,9 +181,12 @@ def _run_all(arguments: argparse.Namespace) -> None:
     for number in range(arguments.first, arguments.first + arguments.count):
         if number in done:
             continue
-        toml, row = voyage(number, *arguments.heading)
+        if arguments.family:
+            recording, row = voyage_of(arguments.family, number, arguments.heading)
+        else:
+            toml, row = voyage(number, *(arguments.heading or (0.1, 45.0)))
+            recording = simnav.record(parse(toml), number)
         row["heading_off_deg"] = arguments.heading_off
-        recording = simnav.record(parse(toml), number)
         if arguments.heading_off:
             recording = turned(recording, arguments.heading_off)
         row["errors"] = {e: run(recording, e) for e in arguments.estimators.split(",")}
@@ -216,7 +231,8 @@ def main() -> None:
     runs.add_argument("results", type=Path)
     runs.add_argument("--first", type=int, default=31000, help="seed of the first voyage")
     runs.add_argument("--count", type=int, default=200)
-    runs.add_argument("--heading", type=float, nargs=2, default=(0.1, 45.0), help="range of its initial sigma [deg]")
+    runs.add_argument("--family", default="", help="draw voyages from this family, like clean-voyages")
+    runs.add_argument("--heading", type=float, nargs=2, help="range of its initial sigma [deg], 0.1 to 45")
     runs.add_argument("--heading-off", type=float, default=0.0, help="start off by this angle, and know it [deg]")
     runs.add_argument("--estimators", default=",".join(BEST_OF))
     runs.set_defaults(call=_run_all)

@@ -233,7 +233,7 @@ def test_filterpy_filters_pass_the_contract_test():
     for cls in (Linear, Unscented):
         report = check(cls)
         assert report.passed, str(report)
-    assert "needs an instrument of kind gnss_position" in _reason(Linear())
+    assert "needs gnss_position; there is none" in _reason(Linear())
 
 
 def _reason(estimator: FilterpyEstimator) -> str:

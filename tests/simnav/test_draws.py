@@ -249,3 +249,16 @@ def test_a_bad_distribution_gets_a_sentence(old: str, new: str, sentence: str):
     assert sentence in str(error.value)
     assert str(error.value).startswith("f.toml: ")
     assert "\n" not in str(error.value)
+
+
+def test_the_head_of_a_file_with_a_drawn_duration(tmp_path):
+    from simnav.catalogue import _header
+
+    text = TOML.replace("duration_s = 40.0", "duration_s = { integers = [40, 60] }")
+    (tmp_path / "drawn-run.toml").write_text(
+        text.replace('title = "A test"', 'title = "A"\ndescription = """\n[x]\n"""')
+    )
+    header = _header(tmp_path / "drawn-run.toml")
+    assert header is not None
+    assert (header.duration, header.title) == (50.0, "A")
+    assert {parse(text).drawn(k).duration for k in range(30)} <= set(range(40, 61))

@@ -255,14 +255,40 @@ def test_the_keyboard_interrupts(recording: Recording) -> None:
         run_trial(failing(interrupt), recording)
 
 
-def test_unsuitable_in_reset_is_no_failure(recording: Recording) -> None:
+def test_needs_that_are_not_met_are_no_failure(recording: Recording) -> None:
     class NeedsDvl(Good):
-        def reset(self, start: InitialState, instruments: Instruments) -> None:
-            if not instruments.of_kind("dvl"):
-                raise UnsuitableScenario("needs a DVL")
+        needs = ("imu", ("dvl", "terrain_fix"))
 
     trial = run_trial(NeedsDvl(), recording)
-    assert (trial.status, trial.reason, trial.failed, len(trial)) == ("unsuitable", "needs a DVL", False, 0)
+    reason = "it needs dvl or terrain_fix; there is none"
+    assert (trial.status, trial.reason, trial.failed, len(trial)) == ("unsuitable", reason, False, 0)
+
+
+def test_to_refuse_a_scenario_that_has_what_is_needed_is_a_failure(recording: Recording) -> None:
+    class Refuses(Good):
+        needs = ("imu",)
+
+        def reset(self, start: InitialState, instruments: Instruments) -> None:
+            raise UnsuitableScenario("too hard")
+
+    trial = run_trial(Refuses(), recording)
+    reason = "reset(): it refuses a scenario that has all instruments that its needs name (too hard)"
+    assert (trial.status, trial.reason, trial.failed) == ("error", reason, True)
+
+
+@pytest.mark.parametrize(
+    ("needs", "message"),
+    [
+        ("imu", "needs should be a tuple of names"),
+        (("imu", 3), "one entry is 3"),
+        (("imu", ()), "one entry is ()"),
+        (("gnss_positon",), "needs names 'gnss_positon', no kind of instrument; did you mean 'gnss_position'?"),
+    ],
+)
+def test_needs_that_make_no_sense_are_named(recording: Recording, needs: Any, message: str) -> None:
+    trial = run_trial(type("Odd", (Good,), {"needs": needs})(), recording)
+    assert trial.status == "error"
+    assert message in trial.reason
 
 
 def test_unsuitable_in_update_comes_too_late(recording: Recording) -> None:
@@ -417,7 +443,7 @@ def test_an_earlier_bad_covariance_outranks_a_later_exception(recording: Recordi
 
 
 def test_many_epochs_are_checked_in_chunks(recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simnav.trial._CHUNK", 4)
+    monkeypatch.setattr("simnav.trial_log._CHUNK", 4)
     trial = run_trial(failing(with_(covariance=2.0 * np.eye(9))), recording)
     assert trial.status == "ok"
     assert trial.covariance is not None

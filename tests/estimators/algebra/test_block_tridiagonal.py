@@ -115,7 +115,7 @@ def test_what_is_predicted_is_the_schur_complement_of_all_older_nodes(node: int)
 
 
 def test_measurements_of_one_instrument_on_one_node_are_their_mean():
-    """With one Jacobian and proportional noise nothing is lost; others on the node, and other weights, do not mix in."""
+    """With one Jacobian and proportional noise nothing is lost; others on the node do not mix in."""
     p = Problem(1)
     order = [0, 0, 1, 0, 2, 3, 4, 5, 6]
     for name in ("node", "m", "H", "r", "R", "v"):

@@ -47,12 +47,16 @@ class Mine(Estimator):
     def __init__(self, gain: float = 1.0, choice: str = ""):
         self.gain, self.choice = gain, choice
 
+    @property
+    def needs(self):
+        return ("terrain_fix",) if self.choice == "unsuitable" else ("gnss_position",)
+
     def reset(self, start, instruments):
         print("noise on standard output")
         if self.choice == "raise":
             raise RuntimeError("broken on purpose")
-        if self.choice == "unsuitable":
-            raise UnsuitableScenario("needs a lighthouse")
+        if self.choice == "refuse":
+            raise UnsuitableScenario("too hard")
         self.position = start.position.copy()
 
     def update(self, measurements):
@@ -200,7 +204,7 @@ def test_an_estimator_that_fails_is_a_failure(here):
 
 def test_an_estimator_that_does_not_suit_is_a_mistake_if_it_is_alone(here):
     result = call("run", "pond.toml", "-e", "mine.py:choice=unsuitable", code=2)
-    assert "needs a lighthouse" in result.stderr
+    assert "it needs terrain_fix; there is none" in result.stderr
     call("run", "pond.toml", "-e", "mine.py:choice=unsuitable,gnss-only")
 
 
@@ -328,7 +332,8 @@ def test_evaluate_of_a_broken_estimator_is_a_failure(here):
     words = ["evaluate", "mine.py", "-s", "pond.toml", "-n", "2", "--against", "gnss-only", "--workers", "1"]
     result = call(*words, "--set", "choice=raise", code=1)
     assert "broken on purpose" in result.stdout
-    assert "lighthouse" in complaint_of(call(*words, "--set", "choice=unsuitable", code=2))
+    assert "it needs terrain_fix" in complaint_of(call(*words, "--set", "choice=unsuitable", code=2))
+    assert "it refuses a scenario" in call(*words, "--set", "choice=refuse", code=1).stdout
 
 
 def complaint_of(result) -> str:

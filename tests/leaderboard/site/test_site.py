@@ -1,80 +1,41 @@
-"""The site, from a small set of made-up results."""
+"""The site: its files, its pages as HTML, and its data."""
 
 from __future__ import annotations
 
 import csv
 import json
-import math
+import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlparse
 
-import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
-from simnav.leaderboard.ranking import ranking
+from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
-from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.site import site
+from simnav.leaderboard.site import charts, site
+from simnav.leaderboard.site.scenario_page import ScenarioData
 from simnav.scoring import SCORES
 
-HOSTILE = '"><script>alert(1)</script> & {{ 7 * 7 }}/../x'
-SIZES = {"oracle": 1.0, "ekf": 1.2, HOSTILE: 3.0, "inertial": 500.0}
 SCENARIOS = ("made-up-one-v1", "made-up-two-v3")
-SEEDS = range(6)
-
-
-def result(scenario: str, seed: int, estimator: str, status: str = "ok") -> Result:
-    rng = np.random.default_rng([seed, len(scenario), len(estimator)])
-    time = np.linspace(1.0, 300.0, 60)
-    error = SIZES[estimator] * rng.rayleigh(size=60)
-    scores = dict.fromkeys(SCORES, math.nan)
-    series = {}
-    if status == "ok":
-        scores |= {
-            "horizontal_rmse": float(np.sqrt(np.mean(error**2))),
-            "heading_rmse": math.radians(2.0),
-            "availability": 1.0,
-            "nees_horizontal": 1.0,
-            "nees_horizontal_clean": 1.0,
-            "coverage_95": 0.95,
-            "update_median": 1e-4,
-        }
-        track = {"truth_north": time, "truth_east": 0.5 * time}
-        track |= {"estimate_north": time + error, "estimate_east": 0.5 * time}
-        series = {"time": time, "horizontal": error, "heading": error, "quantiles": np.quantile(error, [0.0, 0.5, 1.0])}
-        series = {k: v.astype(np.float32) for k, v in (series | track).items()}
-    reason = "" if status == "ok" else f"<b>{status}</b> of {estimator}"
-    return Result(scenario, seed, estimator, {"gain": 0.5} if estimator == "ekf" else {}, estimator == "oracle",
-                  status, reason, scores, series, "run <i>7</i>", 1.5, 2**20)  # fmt: skip
-
-
-def rank(results):
-    return ranking.rank(results)
+LARGEST = 500_000  # bytes of a page or of a file that it reads, Vega aside
 
 
 @pytest.fixture
-def no_figures(monkeypatch):
-    monkeypatch.setattr(site, "scenario_figures", lambda *_: [])
+def no_charts(monkeypatch):
+    """Building is quick where nobody looks at a page."""
 
+    def nothing(entry, ranking, *_):
+        page = {"kind": "scenario", "reference": "", "remarks": [], "unsuitable": [], "failures": [], "instruments": [],
+                "provisional": False}  # fmt: skip
+        return ScenarioData(page, {}, (), ())
 
-@pytest.fixture(scope="module")
-def results() -> list[Result]:
-    def status(scenario: str, seed: int, estimator: str) -> str:
-        if estimator == "inertial" and scenario == SCENARIOS[1]:
-            return "unsuitable"
-        return "timeout" if estimator == HOSTILE and seed == 2 else "ok"
-
-    return [result(s, k, e, status(s, k, e)) for s in SCENARIOS for e in SIZES for k in SEEDS]
-
-
-@pytest.fixture(scope="module")
-def folder(results, tmp_path_factory) -> Path:
-    output = tmp_path_factory.mktemp("board") / "site"
-    index = site.build(results, rank(results), output)
-    assert index == output / "index.html"
-    return output
+    monkeypatch.setattr(site, "scenario_data", nothing)
+    monkeypatch.setattr(site, "bundle", lambda: "")
 
 
 class Page(HTMLParser):
@@ -117,9 +78,17 @@ def pages(folder: Path) -> dict[str, Page]:
     return {p.name: Page(p) for p in folder.glob("*.html")}
 
 
-def test_there_is_a_page_for_the_ranking_each_scenario_and_each_estimator(folder):
-    assert len(pages(folder)) == 1 + len(SCENARIOS) + len(SIZES)
-    assert {f"{s}.html" for s in SCENARIOS} <= set(pages(folder))
+def data_of(path: Path) -> dict[str, Any]:
+    """The data that are embedded in a page."""
+    found = re.search(r'<script type="application/json" id="page-data">(.*?)</script>', path.read_text(), re.DOTALL)
+    assert found is not None
+    return json.loads(found[1])
+
+
+def test_there_is_a_page_for_the_board_each_scenario_and_each_estimator(folder, results):
+    scenarios, estimators = {r.scenario for r in results}, {r.estimator for r in results}
+    assert len(pages(folder)) == 3 + len(scenarios) + len(estimators)
+    assert {f"{s}.html" for s in scenarios} <= set(pages(folder))
 
 
 def test_every_link_leads_to_a_file_of_the_folder(folder):
@@ -135,53 +104,105 @@ def test_every_link_leads_to_a_file_of_the_folder(folder):
             assert target.is_relative_to(folder.resolve())
 
 
-def test_nothing_is_loaded_from_elsewhere(folder):
-    for path in [*folder.glob("*.css"), *folder.glob("*.js"), *folder.glob("figures/*.svg")]:
+def test_pages_and_data_are_small_and_need_nothing_from_elsewhere(folder):
+    for path in [*folder.glob("*.html"), *folder.glob("data/*.js")]:
+        assert path.stat().st_size < LARGEST, path.name
+    for path in [*folder.glob("*.css"), *(p for p in folder.glob("*.js") if p.name != "vega.js")]:
         text = path.read_text()
         assert "@import" not in text
         assert "url(http" not in text
-        assert 'href="http' not in text
+        assert not set(re.findall(r"https?://[^\"' ]+", text)) - {"https://vega.github.io/schema/vega-lite/v6.json"}
+    assert "University of Washington" in (folder / "vega.js").read_text()[:500]
 
 
-def test_hostile_names_are_shown_and_do_nothing(folder):
-    found = pages(folder)
-    index = found["index.html"]
-    for page in found.values():
-        assert page.tags.count("script") == 1  # our own
-        assert "i" not in page.tags or page is index  # only the bars of the ranking use it
-    assert HOSTILE in index.text  # braces and all: names are no templates
+def test_hostile_names_are_shown_and_do_nothing(folder, hostile):
+    for name, page in pages(folder).items():
+        assert page.tags.count("script") == 6, name  # our own, and the data
+        assert "i" not in page.tags
+    assert hostile in {row["name"]["text"] for row in data_of(folder / "index.html")["tracks"][0]["table"]["rows"]}
     scenario = (folder / f"{SCENARIOS[0]}.html").read_text()
     assert "<script>alert" not in scenario
     assert "&lt;b&gt;timeout&lt;/b&gt;" in scenario
-    assert all(p.parent in (folder, folder / "figures") for p in folder.rglob("*") if p.is_file())
+    assert all(p.parent in (folder, folder / "data") for p in folder.rglob("*") if p.is_file())
 
 
-def test_tables_and_images_are_accessible(folder):
+def test_static_tables_and_images_are_accessible(folder):
     for page in pages(folder).values():
-        assert page.headings
         assert all(h.get("scope") in ("col", "row") for h in page.headings)
         assert all(i.get("alt") and i.get("width") for i in page.images)
 
 
-def test_the_ranking_is_on_the_first_page(folder):
-    text = (folder / "index.html").read_text()
-    assert text.index(">ekf<") < text.index("&lt;script&gt;") < text.index(">inertial<") < text.index(">oracle<")
+def test_the_board_has_a_table_a_track_and_shows_identical_oracles_once(folder, catalogued, hostile):
+    tracks = {t["key"]: t for t in data_of(folder / "index.html")["tracks"]}
+    assert len(tracks) == 2
+    rows = {row["name"]["text"]: row for row in tracks["other"]["table"]["rows"]}
+    assert list(rows)[:3] == ["sw-fgo", "ekf", hostile]
+    assert "oracle-mixture" not in rows
+    assert rows["oracle"]["name"]["note"] == "reference, same result: oracle-mixture"
+    assert rows[hostile]["failed"] == {"text": "2 of 24", "value": 2}
+    assert rows["inertial"]["mark"] == "unsuitable"
+    assert rows["ekf"]["rank"] in (1, 2)
     shown = Page(folder / "index.html").text
-    assert "2 of 12" in shown  # failures of the hostile one
-    assert "simnav campaign --scenario made-up-one.toml,made-up-two.toml" in shown
-    assert "ekf:gain=0.5" in shown
-    assert "consistent" in shown
+    assert f"--scenario made-up-one.toml,made-up-two.toml,{catalogued}" in shown
+    assert "ekf:gate=3.5" in shown
 
 
-def test_scenario_page_has_figures_failures_and_who_does_not_suit(folder):
-    page = pages(folder)[f"{SCENARIOS[1]}.html"]
-    assert len(page.images) == 4
+def test_the_results_are_said_to_come_from_where_they_were_computed(folder):
+    text = Page(folder / "about.html").text
+    assert "simnav-bench 1.0" in text
+    assert "c0ffeec0ffee with changes" in " ".join(text.split())
+    assert "A processor, 2 cores" in text
+    assert "@software{simnav-bench-1.0" in text
+    assert "Rank interval" in text  # the glossary
+
+
+def test_a_scenario_of_the_catalogue_says_what_happens_with_which_instruments(folder, catalogued):
+    page, data = Page(folder / f"{catalogued}.html"), data_of(folder / f"{catalogued}.html")
+    assert "gyroscope" in page.text
+    assert f'name = "{catalogued.rpartition("-v")[0]}"' in page.text  # the TOML file
+    names = [c["name"] for c in data["charts"]]
+    assert names[:2] == ["timeline", "horizontal"]
+    assert {"cdf", "rmse", "nees"} <= set(names)
+    horizontal = (folder / "data" / f"{catalogued}-horizontal.js").read_text()
+    assert '"bound":[' in horizontal
+    assert data["runs"]["seeds"][0] == 0
+    assert (folder / "data" / f"{catalogued}-run-0.js").is_file()
+
+
+def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):
+    page, data = Page(folder / f"{SCENARIOS[1]}.html"), data_of(folder / f"{SCENARIOS[1]}.html")
     assert "timeout" in page.text
-    assert "Not suited: inertial" in page.text
-    assert "2.00" in page.text  # the heading error, in degrees
-    for kind in ("trajectory", "error", "cdf", "rmse"):
-        for suffix in ("svg", "png"):
-            assert (folder / "figures" / f"{SCENARIOS[1]}-{kind}.{suffix}").stat().st_size > 2000
+    assert [u["name"] for u in data["unsuitable"]] == ["inertial"]
+    row = next(r for r in data["table"]["rows"] if r["name"]["text"] == "ekf")
+    assert row["heading_rmse"]["value"] == pytest.approx(2.0)  # in degrees
+    assert all(c["name"] != "timeline" for c in data["charts"])
+
+
+def test_the_page_of_an_estimator_says_what_it_is(folder):
+    page, data = Page(folder / "estimator-sw-fgo.html"), data_of(folder / "estimator-sw-fgo.html")
+    assert "Factor graph" in page.text
+    assert "estimators/rows/windows.py, line" in page.text
+    assert {p["name"] for p in data["parameters"]} >= {"window", "iterations"}
+    assert data["plain"]["label"] == "ekf"
+    assert data["worst"]["command"].startswith("simnav run ")
+    assert len(data["worst"]["charts"]) == 3
+
+
+def test_every_chart_is_drawn_for_print(folder, results, tmp_path, catalogued):
+    """By the library itself, without a browser."""
+    from simnav.leaderboard.site.print_figures import filled, write_figure
+
+    some = ("timeline", "horizontal", "cdf", "rmse")
+    for chart in (c for c in data_of(folder / f"{catalogued}.html")["charts"] if c["name"] in some):
+        if chart["data"] is None:
+            text = (folder / "data" / f"{chart.pop('file')}.js").read_text()
+            chart["data"] = json.loads(text.partition(" = ")[2].rstrip(";\n"))
+        made = charts.Chart(**chart)
+        svg, png = write_figure(filled(made, ["ekf", "sw-fgo"]), tmp_path / made.name)
+        drawn = svg.read_text()
+        assert drawn.startswith("<svg")
+        assert "ekf" in drawn or not made.byrow, made.name
+        assert png.read_bytes().startswith(b"\x89PNG")
 
 
 def test_json_keeps_to_its_schema(folder, results):
@@ -194,12 +215,7 @@ def test_json_keeps_to_its_schema(folder, results):
     mine = next(r for r in results if r.estimator == "ekf" and r.seed == 3 and r.scenario == first["scenario"])
     assert first["scores"]["horizontal_rmse"] == mine.scores["horizontal_rmse"]
     assert first["scores"]["vertical_rmse"] is None
-    assert [row["estimator"] for row in document["ranking"]["tracks"][0]["rows"]] == [
-        "ekf",
-        HOSTILE,
-        "inertial",
-        "oracle",
-    ]
+    assert [t["track"] for t in document["ranking"]["tracks"]] == ["papers", "other"]
 
 
 def conforms(value, schema, where):
@@ -234,19 +250,17 @@ def test_csv_has_a_row_a_run_and_units_in_its_names(folder, results):
             assert float(row["heading_rmse_deg"]) == pytest.approx(2.0)
         else:
             assert row["horizontal_rmse_m"] == ""
-    assert json.loads(key[SCENARIOS[0], 0, "ekf"]["parameters"]) == {"gain": 0.5}
+    assert json.loads(key[SCENARIOS[0], 0, "ekf"]["parameters"]) == {"gate": 3.5}
 
 
 def test_parquet_holds_the_same_rows(folder, results):
-    import pyarrow.parquet as pq
-
     table = pq.read_table(folder / "results.parquet")
     assert len(table) == len(results)
     assert set(SCORES) <= set(table.column_names)
     assert table.column("horizontal_rmse").null_count == sum(r.status != "ok" for r in results)
 
 
-@pytest.mark.usefixtures("no_figures")
+@pytest.mark.usefixtures("no_charts")
 def test_a_new_site_takes_the_place_of_the_old_one(results, tmp_path):
     output = tmp_path / "site"
     few = [r for r in results if r.scenario == SCENARIOS[0]]
@@ -257,7 +271,7 @@ def test_a_new_site_takes_the_place_of_the_old_one(results, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["site"]
 
 
-@pytest.mark.usefixtures("no_figures")
+@pytest.mark.usefixtures("no_charts")
 def test_a_failure_leaves_the_old_site_and_nothing_else(results, tmp_path, monkeypatch):
     output = tmp_path / "site"
     few = [r for r in results if r.scenario == SCENARIOS[0]]
@@ -287,8 +301,10 @@ def test_without_results_there_is_no_site(tmp_path):
     assert not (tmp_path / "site").exists()
 
 
-def test_where_everything_failed_there_is_still_a_site(tmp_path):
-    few = [result(SCENARIOS[0], k, "ekf", "timeout") for k in range(3)]
-    page = Page(site.build(few, rank(few), tmp_path / "site"))
-    assert "3 of 3" in page.text
-    assert "failed" in page.text
+def test_where_everything_failed_there_is_still_a_site(results, tmp_path):
+    lost = {"status": "timeout", "reason": "too slow", "scores": {}, "series": {}}
+    few = [replace(r, **lost) for r in results if r.scenario == SCENARIOS[0] and r.estimator == "ekf"]
+    index = site.build(few, rank(few), tmp_path / "site")
+    (row,) = data_of(index)["tracks"][0]["table"]["rows"]
+    assert row["failed"]["text"] == "12 of 12"
+    assert "too slow" in Page(tmp_path / "site" / f"{SCENARIOS[0]}.html").text

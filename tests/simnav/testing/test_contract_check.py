@@ -13,11 +13,11 @@ from simnav.types import KINDS, Estimate
 class Good(Estimator):
     """The initial velocity, carried on."""
 
+    needs = ("gnss_position",)
+
     def reset(self, start, instruments):
         self.start = start
         self.gnss = instruments.of_kind("gnss_position")
-        if not self.gnss:
-            raise UnsuitableScenario("it needs GNSS")
         self.position = start.position.copy()
 
     def update(self, measurements):
@@ -114,10 +114,10 @@ class NeedsDvl(Good):
         self.dvl = instruments["dvl"]
 
 
-class Mute(Good):
+class Picky(Good):
     def reset(self, start, instruments):
         if "dvl" not in instruments:
-            raise UnsuitableScenario
+            raise UnsuitableScenario("it wants a DVL")
         super().reset(start, instruments)
 
 
@@ -129,7 +129,7 @@ def test_a_good_one_passes():
         "output", "units", "determinism", "reset", "causality", "input", "estimates", "silence", "missing instruments",
     ]  # fmt: skip
     assert str(report).endswith("Good passes the contract test")
-    assert "without gnss_position" in report.findings[-1].sentence
+    assert report.findings[-1].sentence == "it declares that it needs gnss_position, all but the IMU, all"
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_a_good_one_passes():
         (Aliasing, "estimates", "copy it"),
         (NeedsData, "silence", "every aiding instrument falls silent: error"),
         (NeedsDvl, "missing instruments", "without dvl: error"),
-        (Mute, "missing instruments", "without dvl: UnsuitableScenario does not say what is needed"),
+        (Picky, "missing instruments", "without dvl: error: reset(): it refuses a scenario that has all instruments"),
     ],
 )
 def test_each_breach_is_found(cls: type[Estimator], finding: str, words: str):

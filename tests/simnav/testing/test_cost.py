@@ -9,7 +9,7 @@ from time import process_time
 import numpy as np
 import pytest
 
-from simnav.estimator import Estimator, UnsuitableScenario, make
+from simnav.estimator import Estimator, make
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
@@ -67,8 +67,7 @@ class Vandal(Idle):
 class Unsuited(Idle):
     """Needs what is not there."""
 
-    def reset(self, start, instruments):
-        raise UnsuitableScenario("it needs a sextant")
+    needs = ("terrain_fix",)
 
 
 class Broken(Idle):
@@ -118,7 +117,7 @@ def test_what_fails_is_named(recording: Recording):
     unsuited, broken, idle = measure(
         rows, recording, rounds=2, progress=lambda done, total, note="": told.append((done, total, note))
     )
-    assert (unsuited.status, unsuited.reason) == ("unsuitable", "it needs a sextant")
+    assert (unsuited.status, unsuited.reason) == ("unsuitable", "it needs terrain_fix; there is none")
     assert (broken.status, broken.reason) == ("error", "RuntimeError: no")
     assert np.isnan([unsuited.update_median, unsuited.peak_memory, broken.peak_memory]).all()
     assert idle.status == "ok"

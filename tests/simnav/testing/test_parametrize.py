@@ -16,19 +16,19 @@ from simnav.testing.given import given
 
 MODULE = '''
 import numpy as np
-from simnav import Estimate, Estimator, UnsuitableScenario
+from simnav import Estimate, Estimator
 from simnav.testing import parametrize_with_checks, parametrize_with_rows
 
 pytest_plugins = ["simnav.testing.fixtures"]
 
 
 class Good(Estimator):
+    needs = ("gnss_position",)
+
     def __init__(self, gain=1.0):
         self.gain = gain
 
     def reset(self, start, instruments):
-        if not instruments.of_kind("gnss_position"):
-            raise UnsuitableScenario("it needs GNSS")
         self.position = start.position
 
     def update(self, measurements):

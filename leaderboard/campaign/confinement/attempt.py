@@ -1,0 +1,193 @@
+"""One estimator on one recording, in an estimator process."""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.leaderboard.campaign.confinement import bubblewrap
+from simnav.leaderboard.campaign.confinement.cores import own_core
+from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, StoppedError
+from simnav.trial import FailureError, Trial, run_session
+from simnav.trial_log import TrialLog
+from simnav.wire import InvalidOutputError
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.entrant import Entrant
+    from simnav.recording import Recording
+
+__all__ = [
+    "CONFINEMENTS",
+    "Attempt",
+    "attempt",
+    "chosen_confinement",
+    "close_server",
+    "describe",
+    "prepare",
+    "seed_words",
+]
+
+#: What can be asked for; ``auto`` is the strongest that works here.
+CONFINEMENTS = ("auto", "bubblewrap", "process", "none")
+
+_server: EstimatorServer | None = None
+_owner = 0  # process of the server's worker
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """What became of an estimator on a recording.
+
+    Attributes
+    ----------
+    status, reason : str
+        As of a trial, and what ended the process.
+    trial : Trial or None
+        None where the process ended before the trial did.
+    seconds : float
+        Wall-clock time, with the start of the process [s].
+    peak_memory : int
+        Beyond what the process started with [bytes].
+    confinement : str
+        What was in force.
+    """
+
+    status: str
+    reason: str
+    trial: Trial | None
+    seconds: float
+    peak_memory: int
+    confinement: str
+
+
+def chosen_confinement(asked: str = "auto") -> str:
+    """Which confinement a campaign uses: ``bubblewrap``, ``process`` or ``none``.
+
+    ``$SIMNAV_CONFINEMENT`` stands for ``auto``.
+
+    Raises
+    ------
+    ValueError
+        If it is unknown, or does not work here: one sentence.
+    """
+    if asked == "auto":
+        asked = os.environ.get("SIMNAV_CONFINEMENT", "") or "auto"
+    if asked not in CONFINEMENTS:
+        raise ValueError(f"confinement = {asked!r} is unknown; there are {', '.join(CONFINEMENTS)}")
+    if os.name != "posix":
+        if asked in ("bubblewrap", "process"):
+            raise ValueError(f"confinement = {asked!r} needs a POSIX system")
+        return "none"
+    why_not = bubblewrap.available() if asked in ("auto", "bubblewrap") else ""
+    if asked == "bubblewrap" and why_not:
+        raise ValueError(f"confinement = 'bubblewrap': {why_not}")
+    return "bubblewrap" if asked == "bubblewrap" or (asked == "auto" and not why_not) else (
+        "process" if asked == "auto" else asked)  # fmt: skip
+
+
+def prepare(confinement: str, hidden: Path, *, loaded: bool = True) -> EstimatorServer:
+    """The server of this process: the one that is there, or a new one that begins to load its kernels.
+
+    Parameters
+    ----------
+    confinement : {"process", "bubblewrap"}
+    hidden : Path
+        Folder of the results.
+    loaded : bool
+        With kernels; False will do for looking at estimators.
+    """
+    global _server, _owner
+    if _server is not None and _owner != os.getpid():
+        _server = None  # this is a fork of the worker
+    if _server is not None and not _server.fits(confinement, hidden, loaded):
+        _server.close()
+        _server = None
+    if _server is None:
+        _server, _owner = EstimatorServer(confinement, hidden, loaded=loaded), os.getpid()
+    return _server
+
+
+def close_server() -> None:
+    """End the server of this process, if there is one."""
+    global _server
+    if _server is not None and _owner == os.getpid():
+        _server.close()
+    _server = None
+
+
+atexit.register(close_server)
+
+
+def seed_words(recording: Recording, entrant: Entrant) -> list[int]:
+    """The seed of global generators: a keyed hash of the estimator's name, keyed by the truth of the run.
+
+    The same in every campaign and on every worker. An estimator that knows it learns nothing of the run's seed but by
+    simulating all of the run.
+    """
+    truth = hashlib.blake2b(str(recording.seed).encode(), digest_size=32)
+    for array in (recording.data.truth.position, recording.data.truth.attitude):
+        truth.update(array.tobytes())
+    h = hashlib.blake2b(entrant.label.encode(errors="surrogatepass"), digest_size=32, key=truth.digest())
+    return [int(word) for word in np.frombuffer(h.digest(), dtype="<u4")]
+
+
+def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, limits: Limits) -> Attempt:
+    """Run an estimator over a recording; nothing that it does raises here.
+
+    Raises
+    ------
+    ServerError
+        If the server does not start.
+    """
+    server.wait_until_ready()
+    begun, trial = time.monotonic(), None
+    session: Any = None
+    try:
+        with own_core() as core, server.session(entrant, limits, core) as session:
+            session.make(entrant, seed_words(recording, entrant))
+            log = TrialLog(len(recording.data.truth.time), True, limits.memory)
+            trial = run_session(session, recording, log)
+            session.end()
+        status, reason = trial.status, trial.reason
+    except StoppedError as error:
+        status, reason, trial = error.status, error.reason, None
+    except FailureError as error:  # of the constructor
+        status, reason, trial = error.status, error.reason, None
+    except InvalidOutputError as error:
+        status, reason, trial = "invalid-output", str(error), None
+    seconds = time.monotonic() - begun
+    if status == "out-of-memory" and trial is None and "memory" not in reason:
+        reason = f"more than {limits.memory >> 20} MiB of memory was wanted"
+    return Attempt(status, reason, trial, seconds, session.peak_memory if session else 0, server.confinement)
+
+
+def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[str, Any]:
+    """Look at an estimator where it can do no harm.
+
+    Returns
+    -------
+    dict
+        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty).
+
+    Raises
+    ------
+    ValueError
+        If it cannot be found, imported or asked for like this: one sentence.
+    """
+    try:
+        with server.session(entrant, limits) as session:
+            told = session.describe_estimator(entrant)
+            session.end()
+    except (StoppedError, FailureError, InvalidOutputError) as error:
+        raise ValueError(str(error)) from None
+    source, failure = told.get("source"), told.get("failure")
+    if not isinstance(source, str) or not isinstance(failure, str) or len(source) > 200:
+        raise ValueError("it says nothing of itself that can be read")
+    return {"reference": told.get("reference") is True, "source": source, "failure": failure[:1000]}

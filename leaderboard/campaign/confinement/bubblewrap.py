@@ -1,0 +1,69 @@
+"""Bubblewrap: a read-only file system without the results, no network, process numbers of its own (Linux).
+
+See the manual page of ``bwrap``. The package is called ``bubblewrap``; it needs user namespaces, which some systems
+forbid to ordinary users.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from simnav.leaderboard.campaign.confinement.server import COPY_FROM
+
+__all__ = ["available", "wrapped"]
+
+_PRIVATE = "/dev/shm"  # in memory, empty at first, for this sandbox only
+_BASE = (
+    "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL", "--ro-bind", "/", "/", "--dev", "/dev",
+    "--proc", "/proc", "--tmpfs", _PRIVATE,
+)  # fmt: skip
+
+
+@functools.cache
+def available() -> str:
+    """Why it cannot be used here; empty where it can."""
+    program = shutil.which("bwrap")
+    if program is None:
+        return "bubblewrap is not installed (the command bwrap)"
+    try:
+        done = subprocess.run([program, *_BASE, "true"], capture_output=True, text=True, timeout=20.0, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"bwrap does not work here: {type(error).__name__}"
+    if done.returncode:
+        return f"bwrap does not work here: {(done.stderr.strip().splitlines() or ['it fails'])[-1][:200]}"
+    return ""
+
+
+def wrapped(
+    command: Sequence[str], environment: dict[str, str], hidden: Path | None, writable: Path | None
+) -> list[str]:
+    """A command line that runs a command in a sandbox.
+
+    Parameters
+    ----------
+    command : sequence of str
+    environment : dict
+        That the command is started with; what the sandbox needs is set in it.
+    hidden : Path or None
+        Folder that is shown empty.
+    writable : Path or None
+        Folder that stays as it is: for the kernels that estimators compile.
+    """
+    from simnav.compiled import cache_directory
+
+    kernels = cache_directory()
+    if kernels is not None:
+        environment[COPY_FROM] = str(kernels)
+    environment["SIMNAV_CACHE_DIR"] = f"{_PRIVATE}/simnav"
+    environment["TMPDIR"] = _PRIVATE
+    options = list(_BASE)
+    if writable is not None:
+        options += ["--bind", str(writable), str(writable)]
+    if hidden is not None and os.path.isdir(hidden):
+        options += ["--tmpfs", str(hidden)]
+    return [shutil.which("bwrap") or "bwrap", *options, "--chdir", "/", "--as-pid-1", "--", *command]

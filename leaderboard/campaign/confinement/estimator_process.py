@@ -1,0 +1,182 @@
+"""The life of an estimator process: made, reset, fed step by step, gone. It never holds a recording."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import pickle
+import random
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
+from simnav.kinds import INSTRUMENTS
+from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, command_of, read_message, write_all
+from simnav.leaderboard.campaign.fingerprint import estimator_source
+from simnav.plugins import load_plugin
+from simnav.trial import describe_failure
+from simnav.types import NavigationStates
+from simnav.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.confinement.kinds import Home
+
+__all__ = ["LIBRARIES", "live"]
+
+#: What estimators import late; a server that has it already starts the next one sooner.
+LIBRARIES = frozenset({
+    "filterpy", "filterpy.kalman", "gtsam", "pandas", "scipy.interpolate", "scipy.linalg", "scipy.optimize",
+    "scipy.signal", "scipy.sparse", "scipy.sparse.linalg", "scipy.spatial", "scipy.special", "scipy.stats",
+})  # fmt: skip
+
+
+def live(down: int, up: int) -> None:
+    """Answer all messages until the end.
+
+    Parameters
+    ----------
+    down, up : int
+        Descriptors of the pipe from the worker and of that to it.
+    """
+    session = _Session()
+    while True:
+        message = read_message(down)
+        if message is None:
+            return
+        kind = command_of(message)
+        if not kind:
+            reply = session.step(message)
+        elif kind == Down.MAKE:
+            reply = session.make(bytes(message[PacketDecoder.HEADER :]))
+        elif kind == Down.RESET:
+            reply = session.reset(bytes(message[PacketDecoder.HEADER :]))
+        elif kind == Down.SMOOTH:
+            reply = session.smooth()
+        elif kind == Down.DESCRIBE:
+            reply = session.describe(bytes(message[PacketDecoder.HEADER :]))
+        else:
+            write_all(up, session.end())
+            return
+        write_all(up, reply)
+
+
+class _Session:
+    """The estimator and what is said of it. Each method has the same depth of calls, for `describe_failure`."""
+
+    def __init__(self) -> None:
+        self._estimator: Any = None
+        self._encode = EstimateEncoder()
+        self._decode = PacketDecoder(())
+        self._before = set(sys.modules)
+
+    def make(self, body: bytes) -> bytes:
+        """Import and construct the estimator; of a file or a session that is the first time that its code runs."""
+        try:
+            entrant, path, words = pickle.loads(body)
+            sys.path[:] = path
+            _seed(words)
+            self._estimator = entrant.make()
+            cls = type(self._estimator)
+            told = {"name": cls.name or cls.__name__, "needs": self._estimator.needs}
+        except MemoryError:
+            return _failure("out-of-memory", "more memory was wanted")
+        except BaseException as error:  # SystemExit and KeyboardInterrupt, too: it is not the user who asks
+            return _failure("error", _described(error))
+        return answer(Up.DONE, json.dumps(told, default=repr).encode())
+
+    def describe(self, body: bytes) -> bytes:
+        """What the estimator is, and why it cannot be made: by a wrong request, or in its constructor."""
+        try:
+            entrant, path, words = pickle.loads(body)
+            sys.path[:] = path
+            _seed(words)
+            cls = entrant.find()
+            told = {"reference": bool(cls.reference), "source": estimator_source(cls), "failure": ""}
+            try:
+                entrant.make()
+            except EstimatorError as error:
+                if error.__cause__ is None or entrant.parameters:  # what was asked for does not fit
+                    raise
+                told["failure"] = str(error)
+            except Exception as error:
+                told["failure"] = _described(error)
+        except BaseException as error:
+            return _failure("error", _described(error))
+        return answer(Up.DONE, json.dumps(told).encode())
+
+    def reset(self, body: bytes) -> bytes:
+        try:
+            start, instruments, streams, homes = pickle.loads(body)
+        except BaseException as error:
+            return _failure("error", _described(error))
+        self._decode = PacketDecoder(streams)
+        try:
+            _load_kinds(homes)
+            self._estimator.reset(start, instruments)
+        except BaseException as error:
+            return self._raised(error)
+        return answer(Up.DONE)
+
+    def step(self, packet: bytearray) -> bytes:
+        try:
+            return self._encode(self._estimator.update(self._decode(packet)))
+        except BaseException as error:
+            return self._raised(error)
+
+    def smooth(self) -> bytes:
+        try:
+            states = self._estimator.smooth()
+            if states is None:
+                return answer(Up.DONE)
+            if not isinstance(states, NavigationStates):
+                raise InvalidOutputError(f"expected NavigationStates or None, got {type(states).__name__}")
+            arrays = [real_array(getattr(states, name), name, None) for name in ("time", *VECTORS)]
+        except BaseException as error:
+            return self._raised(error)
+        shapes = json.dumps([a.shape for a in arrays]).encode()
+        return answer(Up.TRAJECTORY, b"".join([len(shapes).to_bytes(8), shapes, *(a.tobytes() for a in arrays)]))
+
+    def end(self) -> bytes:
+        """What should be imported before the next one is forked."""
+        new = (set(sys.modules) - self._before) & LIBRARIES
+        return answer(Up.DONE, json.dumps({"libraries": sorted(new)}).encode())
+
+    def _raised(self, error: BaseException) -> bytes:
+        if isinstance(error, InvalidOutputError):
+            return _failure("invalid-output", str(error))
+        if isinstance(error, UnsuitableScenario):
+            return _failure("unsuitable", str(error))
+        status = "out-of-memory" if isinstance(error, MemoryError) else "error"
+        estimator: Estimator = self._estimator
+        return _failure(status, describe_failure(error, estimator, skip=1))
+
+
+def _failure(status: str, reason: str) -> bytes:
+    return answer(Up.FAILURE, json.dumps([status, reason[:2000]]).encode())
+
+
+def _described(error: BaseException) -> str:
+    try:
+        text = " ".join(str(error).split())
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _seed(words: list[int]) -> None:
+    """Whoever draws from a global generator gets the same numbers in every campaign, and learns nothing from them."""
+    random.seed(sum(word << 32 * k for k, word in enumerate(words)))
+    np.random.seed(words)  # noqa: NPY002
+
+
+def _load_kinds(homes: list[Home]) -> None:
+    """Import what registers the kinds of the instruments: modules, files of plug-ins, classes of a session."""
+    for kind, module, file, code in homes:
+        if code:
+            INSTRUMENTS.add(kind, pickle.loads(code))
+        elif file:
+            load_plugin(file)
+        else:
+            importlib.import_module(module)

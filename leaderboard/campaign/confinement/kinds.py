@@ -1,0 +1,33 @@
+"""Where the kinds of instruments come from, so that another process can know them, too."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from simnav.kinds import INSTRUMENTS
+from simnav.leaderboard.campaign.session_class import carry, is_session
+from simnav.plugins import is_file_module
+
+if TYPE_CHECKING:
+    from simnav.types import Instruments
+
+__all__ = ["Home", "homes_of_kinds"]
+
+#: Name of the kind, module that registers it, its file where it is a single one, the class where none can be imported.
+Home = tuple[str, str, str, bytes]
+
+
+def homes_of_kinds(instruments: Instruments) -> list[Home]:
+    """What to import for the kinds of these instruments that do not come with simnav."""
+    found = []
+    for kind in dict.fromkeys(sheet.kind for sheet in instruments.values()):
+        cls = INSTRUMENTS.get(kind)
+        module = getattr(cls, "__module__", "")
+        if cls is None or module.startswith("simnav."):
+            continue
+        if is_file_module(module):
+            found.append((kind, module, str(sys.modules[module].__file__), b""))
+        else:
+            found.append((kind, module, "", carry(cls) if is_session(module) else b""))
+    return found

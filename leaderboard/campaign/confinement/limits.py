@@ -1,0 +1,126 @@
+"""Limits of a process of its own, and what is known of it: memory, descendants, how it ended."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+__all__ = [
+    "become_reaper",
+    "death_of",
+    "die_with_parent",
+    "kill_descendants",
+    "limit",
+    "out_of_memory_kills",
+    "resident",
+]
+
+_LINUX = sys.platform == "linux"
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+
+
+def limit(seconds: float, memory: int) -> None:
+    """Limit this process: no core files, CPU time (if everyone who could kill it is dead), private memory.
+
+    Parameters
+    ----------
+    seconds : float
+        Wall-clock limit of which the CPU time allows four times as much, and a minute [s].
+    memory : int
+        That it may take beyond what it has now [bytes].
+    """
+    import resource
+
+    def lower(which: int, value: int) -> None:
+        hard = resource.getrlimit(which)[1]
+        wanted = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(which, (wanted, wanted))
+
+    lower(resource.RLIMIT_CORE, 0)
+    lower(resource.RLIMIT_CPU, int(4.0 * seconds) + 61)
+    if _LINUX:
+        with open("/proc/self/statm") as file:
+            data = int(file.read().split()[5]) * resource.getpagesize()
+        lower(resource.RLIMIT_DATA, data + memory)
+
+
+def die_with_parent(parent: int) -> None:
+    """A process that is killed takes this one with it (Linux; elsewhere the limit of CPU time ends it)."""
+    if _LINUX:
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def become_reaper() -> None:
+    """Descendants whose parents are gone become children of this process (Linux)."""
+    if _LINUX:
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def kill_descendants(patience: float = 5.0) -> None:
+    """Kill all children of this process, and theirs once they have become its own."""
+    deadline = time.monotonic() + patience
+    while time.monotonic() < deadline:
+        for child in _children():
+            with contextlib.suppress(OSError):
+                os.kill(child, signal.SIGKILL)
+        try:
+            if os.waitpid(-1, os.WNOHANG)[0] == 0:
+                time.sleep(0.001)
+        except ChildProcessError:
+            return
+
+
+def _children() -> list[int]:
+    own = os.getpid()
+    with contextlib.suppress(OSError, ValueError):
+        return [int(child) for child in Path(f"/proc/{own}/task/{own}/children").read_text().split()]
+    found = []
+    with contextlib.suppress(OSError):
+        for entry in os.listdir("/proc"):
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                if (
+                    entry.isdigit()
+                    and int(Path(f"/proc/{entry}/stat").read_text().rpartition(")")[2].split()[1]) == own
+                ):
+                    found.append(int(entry))
+    return found
+
+
+def resident(process: int) -> int:
+    """Resident memory of a process [bytes]; 0 if it cannot be told."""
+    try:
+        with open(f"/proc/{process}/statm") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        return 0
+
+
+def out_of_memory_kills() -> int:
+    """How many processes the kernel has killed for want of memory since it started; 0 where it does not tell."""
+    with contextlib.suppress(OSError, ValueError):
+        for line in Path("/proc/vmstat").read_text().splitlines():
+            name, _, value = line.partition(" ")
+            if name == "oom_kill":
+                return int(value)
+    return 0
+
+
+def death_of(status: int) -> str:
+    """How a process ended, in words, from what ``waitpid`` gave."""
+    code = os.waitstatus_to_exitcode(status)
+    if code >= 0:
+        return f"exit code {code}"
+    try:
+        return signal.Signals(-code).name
+    except ValueError:
+        return f"signal {-code}"

@@ -1,0 +1,185 @@
+"""The server of a worker: kernels loaded, nothing secret, forks an estimator process for each run.
+
+It is started as ``python -m simnav.leaderboard.campaign.confinement.server DESCRIPTOR [kernels]``, where the descriptor
+is a Unix socket to the worker. It is asked, in JSON, to fork (two descriptors come with it), to finish with the process
+that it forked, and to import libraries before the next fork. It watches the memory of the process, kills all that is
+left of it, and is gone when the worker is.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import fcntl
+import gc
+import importlib
+import json
+import os
+import select
+import shutil
+import signal
+import socket
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES, live
+from simnav.leaderboard.campaign.confinement.landlock import restrict
+from simnav.leaderboard.campaign.confinement.limits import (
+    become_reaper,
+    death_of,
+    die_with_parent,
+    kill_descendants,
+    limit,
+    out_of_memory_kills,
+    resident,
+)
+
+__all__ = ["COPY_FROM", "main"]
+
+#: Environment variable: folder of compiled kernels that are copied before they are loaded, for it cannot be written to.
+COPY_FROM = "SIMNAV_KERNELS_FROM"
+
+_WATCH = 0.02  # between two looks at the memory of the process [s]
+_GRACE = 1.0  # for a process that has closed its pipe to end [s]
+_LONGEST = 1 << 16  # of a request [bytes]
+
+
+def main() -> None:
+    """Serve until the worker is gone."""
+    control = socket.socket(fileno=int(sys.argv[1]))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    become_reaper()
+    _load()
+    own = Path(tempfile.mkdtemp(prefix="simnav-estimator-"))
+    try:
+        control.sendall(json.dumps({"ready": True}).encode())
+        while True:
+            request, descriptors = _receive(control)
+            if request is None:
+                return
+            if "fork" in request:
+                _fork(control, request["fork"], descriptors, own)
+            for name in request.get("import", ()):
+                if name in LIBRARIES:
+                    with contextlib.suppress(Exception):
+                        importlib.import_module(name)
+    finally:
+        shutil.rmtree(own, ignore_errors=True)
+
+
+def _load() -> None:
+    """simnav's own estimators and all their kernels; plug-ins of others are loaded in their own processes only."""
+    from simnav.compiled import cache_directory, kernels
+    from simnav.estimator.registry import discover_own
+
+    discover_own()
+    source, target = os.environ.pop(COPY_FROM, ""), cache_directory()
+    if source and target is not None and "kernels" in sys.argv[2:]:
+        for part in {k.fingerprint() for kernel in kernels() for k in kernel.tree()}:
+            with contextlib.suppress(OSError):
+                shutil.copytree(Path(source) / part, target / part)
+    for kernel in kernels() if "kernels" in sys.argv[2:] else ():
+        kernel.compile()
+    if source and target is not None:
+        shutil.rmtree(target, ignore_errors=True)
+    gc.collect()
+    gc.freeze()  # so that a collection in a forked process does not copy all of this
+
+
+def _receive(control: socket.socket) -> tuple[dict[str, Any] | None, list[int]]:
+    data, descriptors, _, _ = socket.recv_fds(control, _LONGEST, 2)
+    return (json.loads(data) if data else None), descriptors
+
+
+def _fork(control: socket.socket, asked: dict[str, Any], descriptors: list[int], own: Path) -> None:
+    """Fork an estimator process and look after it until the worker has done with it."""
+    temporary = own / "run"
+    temporary.mkdir()
+    before, parent = out_of_memory_kills(), os.getpid()
+    child = os.fork()
+    if child == 0:
+        try:
+            control.close()
+            _become_estimator(parent, asked, descriptors, temporary)
+        finally:
+            os._exit(70)
+    for descriptor in descriptors:
+        os.close(descriptor)
+    start, verdict, ended, peak = resident(child), "", None, 0
+    control.sendall(json.dumps({"forked": child}).encode())
+    try:
+        while not select.select([control], [], [], _WATCH)[0]:
+            if ended is None and not verdict and resident(child) - start > asked["memory"]:
+                verdict = "out-of-memory"
+                os.kill(child, signal.SIGKILL)  # the worker sees its pipe closed
+        request, _ = _receive(control)
+        if request is None:
+            return
+        deadline = time.monotonic() + (_GRACE if request.get("gone") else 0.0)
+        while True:
+            pid, status, usage = os.wait4(child, os.WNOHANG)
+            if pid == child:
+                ended, peak = death_of(status), usage.ru_maxrss * 1024 - start
+                break
+            if time.monotonic() >= deadline:
+                os.kill(child, signal.SIGKILL)
+                _, status, usage = os.wait4(child, 0)
+                peak = usage.ru_maxrss * 1024 - start
+                break
+            time.sleep(0.001)
+        killed = ended == "SIGKILL" and out_of_memory_kills() > before
+        told = {"ended": ended, "peak": max(0, peak), "verdict": verdict or ("killed" if killed else "")}
+    finally:
+        with contextlib.suppress(OSError):
+            os.kill(child, signal.SIGKILL)
+        kill_descendants()
+        shutil.rmtree(temporary, ignore_errors=True)
+    control.sendall(json.dumps(told).encode())
+
+
+def _become_estimator(parent: int, asked: dict[str, Any], descriptors: list[int], temporary: Path) -> None:
+    """The forked process until it ends."""
+    os.setsid()  # Ctrl-C in the terminal is not for it
+    die_with_parent(parent)
+    faulthandler.disable()
+    for which in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
+        signal.signal(which, signal.SIG_DFL)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, 16) for descriptor in descriptors]
+    for number, descriptor in enumerate((nothing, nothing, nothing, *moved)):
+        os.dup2(descriptor, number)
+    down, up = 3, 4
+    os.closerange(5, _most_descriptors())
+    sys.stdin = open(os.devnull)  # noqa: SIM115
+    sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    if asked.get("core") is not None and hasattr(os, "sched_setaffinity"):
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(0, {asked["core"]})
+    writable: list[str | Path] = [temporary, os.devnull]
+    os.environ["TMPDIR"] = tempfile.tempdir = str(temporary)
+    if asked.get("cache"):
+        os.environ["SIMNAV_CACHE_DIR"] = asked["cache"]
+        with contextlib.suppress(OSError):
+            os.makedirs(asked["cache"], mode=0o700, exist_ok=True)
+        writable.append(asked["cache"])
+    with contextlib.suppress(OSError):
+        os.chdir(asked["folder"])
+    if asked["landlock"]:
+        restrict(writable)
+    limit(asked["timeout"], asked["memory"])
+    live(down, up)
+    os._exit(0)
+
+
+def _most_descriptors() -> int:
+    import resource
+
+    soft = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return soft if 0 < soft < 1 << 20 else 1 << 20
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,461 @@
+"""The worker's side: a server of its own, and sessions with the estimator processes that it forks."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import pickle
+import select
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.leaderboard.campaign.confinement import bubblewrap, landlock
+from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES
+from simnav.leaderboard.campaign.confinement.kinds import homes_of_kinds
+from simnav.leaderboard.campaign.confinement.messages import LARGEST, Down, Up, command
+from simnav.trial import FailureError
+from simnav.types import NavigationStates
+from simnav.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.entrant import Entrant
+    from simnav.recording import Recording
+
+__all__ = ["EstimatorServer", "Limits", "RemoteSession", "ServerError", "StoppedError"]
+
+#: Environment variables that an estimator process inherits; all others are left out.
+_ENVIRONMENT = (
+    "PATH", "HOME", "USER", "LANG", "LC_ALL", "LC_CTYPE", "TZ", "PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV",
+    "CONDA_PREFIX", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "XDG_CACHE_HOME", "SIMNAV_CACHE_DIR", "TMPDIR",
+    "CUDA_VISIBLE_DEVICES",
+)  # fmt: skip
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "NUMBA_NUM_THREADS")
+_START = 180.0  # for a server to be ready, compiling included [s]
+_END = 20.0  # for a server to look after what is left of an estimator process [s]
+_PIECE = 1 << 16
+_TICK = 1000.0  # the longest wait between two looks at the clock [ms]
+
+
+class ServerError(Exception):
+    """The server cannot be started."""
+
+
+class StoppedError(Exception):
+    """The estimator process is no more there.
+
+    Parameters
+    ----------
+    status : str
+        As of `simnav.leaderboard.campaign.isolation.Outcome`.
+    reason : str
+    """
+
+    def __init__(self, status: str, reason: str):
+        super().__init__(reason)
+        self.status, self.reason = status, reason
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an estimator process may take.
+
+    Attributes
+    ----------
+    timeout : float
+        Wall-clock time [s].
+    memory : int
+        Beyond what it starts with [bytes].
+    """
+
+    timeout: float
+    memory: int
+
+
+class EstimatorServer:
+    """A prepared process that forks estimator processes (see `server`).
+
+    Parameters
+    ----------
+    confinement : {"process", "bubblewrap"}
+    hidden : Path
+        Folder that a sandbox does not show: that of the results.
+    loaded : bool
+        Load all kernels.
+
+    Attributes
+    ----------
+    confinement : str
+        What is in force: ``process``, ``landlock`` or ``bubblewrap``.
+
+    Raises
+    ------
+    ServerError
+        If it does not start.
+    """
+
+    def __init__(self, confinement: str, hidden: Path | None = None, *, loaded: bool = True):
+        self._landlock = landlock.available()
+        self.confinement = confinement if confinement != "process" or not self._landlock else "landlock"
+        self._hidden = hidden
+        self._loaded = loaded
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
+        environment |= dict.fromkeys(_THREADS, "1")
+        environment["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)  # as this process finds simnav
+        command_line = [sys.executable, "-P", "-m", f"{__package__}.server", str(theirs.fileno())]
+        command_line += ["kernels"] if loaded else []
+        if confinement == "bubblewrap":
+            command_line = bubblewrap.wrapped(command_line, environment, hidden, writable=self._caches())
+        try:
+            self._process = subprocess.Popen(
+                command_line, env=environment, cwd="/", pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
+            )  # fmt: skip
+        except OSError as error:
+            raise ServerError(f"{command_line[0]} cannot be started: {error.strerror}") from None
+        finally:
+            theirs.close()
+        self._control = ours
+        self._ready = False
+
+    def _caches(self) -> Path | None:
+        """Folder of the kernels that estimators of files compile, each in one of its own."""
+        from simnav.compiled import cache_directory
+
+        root = cache_directory()
+        if root is None or not self._landlock:
+            return None
+        folder = root.parent / "estimators"
+        with contextlib.suppress(OSError):
+            folder.mkdir(mode=0o700, exist_ok=True)
+            return folder
+        return None
+
+    def fits(self, confinement: str, hidden: Path | None, loaded: bool) -> bool:
+        """Whether it serves what is asked for, and is there."""
+        if loaded and not self._loaded:
+            return False
+        same = self.confinement == confinement or (confinement == "process" and self.confinement == "landlock")
+        return same and (confinement != "bubblewrap" or hidden == self._hidden) and self._process.poll() is None
+
+    def wait_until_ready(self) -> None:
+        """Wait until kernels are loaded.
+
+        Raises
+        ------
+        ServerError
+        """
+        if not self._ready:
+            told = self._receive(_START)
+            if told is None or not told.get("ready"):
+                self._process.kill()
+                words = (self._process.stderr.read() if self._process.stderr else b"").decode(errors="replace")
+                last = words.strip().splitlines()[-1:] or ["it ended without a word"]
+                self.close()
+                raise ServerError(f"the process for estimators does not start: {last[0][:300]}")
+            self._ready = True
+
+    def close(self) -> None:
+        """End it, and all that it started."""
+        self._control.close()  # it ends by itself, and kills what it forked
+        try:
+            self._process.wait(2.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stderr is not None:
+            self._process.stderr.close()
+
+    def _receive(self, seconds: float) -> dict[str, Any] | None:
+        with contextlib.suppress(OSError, ValueError):
+            if select.select([self._control], [], [], seconds)[0]:
+                data = self._control.recv(_PIECE)
+                return dict(json.loads(data)) if data else None
+        return None
+
+    @contextlib.contextmanager
+    def session(self, entrant: Entrant, limits: Limits, core: int | None = None) -> Iterator[RemoteSession]:
+        """An estimator process, until the end of the block.
+
+        Parameters
+        ----------
+        entrant : Entrant
+        limits : Limits
+        core : int, optional
+            On which it runs.
+
+        Raises
+        ------
+        StoppedError
+            If the process is no more there; also where it ended after its last answer.
+        """
+        self.wait_until_ready()
+        down, write = os.pipe()
+        read, up = os.pipe()
+        file = entrant.name.partition(".py")[0] + ".py" if ".py" in entrant.name else ""
+        caches = self._caches() if file else None
+        asked = {
+            "timeout": limits.timeout,
+            "memory": limits.memory,
+            "landlock": self._landlock,
+            "core": core,
+            "folder": os.path.dirname(file) or "/",
+            "cache": str(caches / hashlib.blake2b(file.encode(), digest_size=8).hexdigest()) if caches else "",
+        }
+        try:
+            try:
+                socket.send_fds(self._control, [json.dumps({"fork": asked}).encode()], [down, up])
+                told = self._receive(_END)
+            except OSError:
+                told = None
+            finally:
+                os.close(down)
+                os.close(up)
+            if told is None or "forked" not in told:
+                raise StoppedError("error", "the process for estimators did not answer")
+            session = RemoteSession(write, read, limits)
+            try:
+                yield session
+            except _GoneError:
+                raise self._finish(session, gone=True) from None
+            except BaseException:
+                self._finish(session, gone=False)
+                raise
+            self._finish(session, gone=False)
+            if session.libraries:
+                self._control.sendall(json.dumps({"import": session.libraries}).encode())
+        finally:
+            os.close(write)
+            os.close(read)
+
+    def _finish(self, session: RemoteSession, *, gone: bool) -> StoppedError:
+        """Have the process killed with all that it started; how it ended."""
+        told = None
+        with contextlib.suppress(OSError):
+            self._control.sendall(json.dumps({"finish": True, "gone": gone}).encode())
+            told = self._receive(_END)
+        if told is None:
+            self._process.kill()
+            return StoppedError("error", "it ended the process that had started it")
+        session.peak_memory = max(0, int(told.get("peak", 0)))
+        ended, verdict = str(told.get("ended") or "it closed its pipe"), told.get("verdict")
+        mebibytes = session.limits.memory >> 20
+        if verdict == "out-of-memory":
+            return StoppedError("out-of-memory", f"stopped when it had taken more than {mebibytes} MiB of memory")
+        starved = ended.startswith("SIG") and ended != "SIGKILL" and session.peak_memory > 0.9 * session.limits.memory
+        if verdict == "killed" or starved:
+            return StoppedError("out-of-memory", f"killed ({ended}) for want of memory")
+        return StoppedError("error", f"the process died ({ended}) without an answer")
+
+
+class _GoneError(Exception):
+    """The estimator process has closed its pipe."""
+
+
+class RemoteSession:
+    """An estimator in a process of its own; a `simnav.trial.Session`.
+
+    Parameters
+    ----------
+    write, read : int
+        Descriptors of the pipes.
+    limits : Limits
+
+    Attributes
+    ----------
+    needs : object
+        As it declared them before it knew the instruments.
+    libraries : list of str
+        What it imported, and the server may import, too.
+    peak_memory : int
+        Known when the process is gone [bytes].
+    """
+
+    def __init__(self, write: int, read: int, limits: Limits):
+        self.name = ""
+        self.needs: Any = ()
+        self.limits = limits
+        self.libraries: list[str] = []
+        self.peak_memory = 0
+        self._write, self._read = write, read
+        self._deadline = time.monotonic() + limits.timeout
+        os.set_blocking(write, False)
+        self._readable, self._writable = select.poll(), select.poll()
+        self._readable.register(read, select.POLLIN)
+        self._writable.register(write, select.POLLOUT)
+
+    # -- the steps of a run ------------------------------------------------------------------------
+
+    def make(self, entrant: Entrant, words: list[int]) -> None:
+        """Make the estimator, with these words as the seed of global generators.
+
+        Raises
+        ------
+        simnav.trial.FailureError
+            If that fails.
+        """
+        told = _told(self._ask(Down.MAKE, (entrant, sys.path, words)))
+        name, needs = told.get("name"), told.get("needs")
+        self.needs = tuple(tuple(n) if isinstance(n, list) else n for n in needs) if isinstance(needs, list) else needs
+        self.name = name[:200] if isinstance(name, str) else ""
+
+    def describe_estimator(self, entrant: Entrant) -> dict[str, Any]:
+        """What `estimator_process` says of an estimator.
+
+        Raises
+        ------
+        simnav.trial.FailureError
+            If it cannot be found.
+        """
+        return _told(self._ask(Down.DESCRIBE, (entrant, sys.path, [0])))
+
+    def begin(self, recording: Recording, packets: PacketEncoder) -> None:
+        """Hand over start and datasheets."""
+        homes = homes_of_kinds(recording.instruments)
+        self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes))
+
+    def step(self, packet: list[Any]) -> tuple[bytes, float]:
+        """Hand over a packet; the answer, and how long it took until it was here [s]."""
+        begun = time.perf_counter()
+        self._send(packet)
+        reply = self._receive(LARGEST)
+        seconds = time.perf_counter() - begun
+        if reply[0] != ESTIMATE:
+            self._refuse(reply)
+        return reply, seconds
+
+    def smooth(self) -> NavigationStates | None:
+        """The smoothed trajectory, or None."""
+        self._send([command(Down.SMOOTH)])
+        reply = self._receive(max(LARGEST, self.limits.memory))
+        if reply[0] == Up.DONE:
+            return None
+        if reply[0] != Up.TRAJECTORY:
+            self._refuse(reply)
+        return _trajectory(reply[ANSWER.size :])
+
+    def describe(self, error: BaseException) -> str:
+        """What an exception says that was raised here."""
+        return f"{type(error).__name__}: {error}"[:500]
+
+    def end(self) -> None:
+        """Say that this was all."""
+        try:
+            names = _told(self._ask(Down.END, None)).get("libraries", [])
+        except (FailureError, InvalidOutputError):
+            return
+        if isinstance(names, list):
+            self.libraries = [name for name in names if isinstance(name, str) and name in LIBRARIES]
+
+    # -- the pipe ----------------------------------------------------------------------------------
+
+    def _ask(self, kind: Down, body: Any) -> bytes:
+        self._send([command(kind, pickle.dumps(body, protocol=pickle.HIGHEST_PROTOCOL))])
+        reply = self._receive(LARGEST)
+        if reply[0] != Up.DONE:
+            self._refuse(reply)
+        return reply
+
+    def _refuse(self, reply: bytes) -> None:
+        """Raise what an answer says that is not the one that was wanted."""
+        if reply[0] == Up.FAILURE:
+            with contextlib.suppress(ValueError, TypeError, RecursionError):
+                status, reason = json.loads(reply[ANSWER.size :])
+                if status in ("error", "invalid-output", "out-of-memory", "unsuitable") and isinstance(reason, str):
+                    raise FailureError(status, " ".join(reason.split())[:1000])
+        raise InvalidOutputError("the answer is not in the form of an estimate")
+
+    def _send(self, buffers: list[Any]) -> None:
+        wanted = sum(memoryview(b).nbytes for b in buffers) if len(buffers) > 1 else len(buffers[0])
+        try:
+            sent = os.writev(self._write, buffers)
+            if sent == wanted:
+                return
+        except BlockingIOError:
+            sent = 0
+        except OSError:
+            raise _GoneError from None
+        rest = memoryview(b"".join(bytes(b) for b in buffers))[sent:]
+        while rest:
+            self._wait(self._writable)
+            try:
+                rest = rest[os.write(self._write, rest) :]
+            except BlockingIOError:
+                continue
+            except OSError:
+                raise _GoneError from None
+
+    def _receive(self, most: int) -> bytes:
+        """One whole answer of at most so many bytes."""
+        self._wait(self._readable)
+        reply = os.read(self._read, _PIECE)
+        if len(reply) >= ANSWER.size and len(reply) == ANSWER.size + ANSWER.unpack_from(reply)[5]:
+            return reply
+        pieces = bytearray(reply)
+        while reply:
+            if len(pieces) >= ANSWER.size:
+                size = ANSWER.size + ANSWER.unpack_from(pieces)[5]
+                if size > most:
+                    raise InvalidOutputError(f"an answer of {size >> 20} MiB, more than {most >> 20} MiB")
+                if len(pieces) > size:
+                    raise InvalidOutputError("more than one answer to one step")
+                if len(pieces) == size:
+                    return bytes(pieces)
+            self._wait(self._readable)
+            reply = os.read(self._read, _PIECE)
+            pieces += reply
+        raise _GoneError
+
+    def _wait(self, poll: Any) -> None:
+        if poll.poll(_TICK):
+            if time.monotonic() > self._deadline:
+                raise self._late()
+            return
+        while True:
+            left = self._deadline - time.monotonic()
+            if left <= 0.0:
+                raise self._late()
+            if poll.poll(min(1000.0 * left + 1.0, _TICK)):
+                return
+
+    def _late(self) -> StoppedError:
+        return StoppedError("timeout", f"stopped after {self.limits.timeout:g} s")
+
+
+def _told(reply: bytes) -> dict[str, Any]:
+    """The JSON object in an answer."""
+    try:
+        told = json.loads(reply[ANSWER.size :] or b"{}")
+    except (ValueError, RecursionError):
+        told = None
+    if not isinstance(told, dict):
+        raise InvalidOutputError("the answer is not in the form of an estimate")
+    return told
+
+
+def _trajectory(body: bytes) -> NavigationStates:
+    """Four arrays: their shapes in JSON, then their numbers."""
+    try:
+        begin = 8 + int.from_bytes(body[:8])
+        shapes = [tuple(map(int, shape)) for shape in json.loads(body[8:begin])]
+        arrays = []
+        for shape in shapes:
+            if any(s < 0 for s in shape):
+                raise ValueError
+            count = int(np.prod(shape, dtype=object)) if shape else 1
+            arrays.append(np.frombuffer(body, np.float64, count, begin).reshape(shape))
+            begin += 8 * count
+        time_, position, velocity, attitude = arrays
+    except (ValueError, TypeError, RecursionError, OverflowError):
+        raise InvalidOutputError("the trajectory is not in the form of arrays") from None
+    return NavigationStates(time_, position, velocity, attitude)

@@ -1,0 +1,61 @@
+"""An estimator that takes part in a campaign, resolved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.campaign.request import enlist
+from simnav.leaderboard.campaign.session_class import receive
+
+if TYPE_CHECKING:
+    from simnav.estimator import Estimator
+
+__all__ = ["Entrant"]
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """An estimator that takes part: it can be imported in any folder, and is known by its sources.
+
+    Attributes
+    ----------
+    name : str
+        Registered name or absolute path.
+    parameters : mapping
+    label : str
+    reference : bool
+        One of simnav's own references: it is told the truth.
+    source : str
+        Digest.
+    code : bytes
+        The class itself, where no other process can import it.
+    point : str
+        Entry point of another package that registers it; empty where there is none.
+    """
+
+    name: str
+    parameters: Mapping[str, Any]
+    label: str
+    reference: bool
+    source: str
+    code: bytes = b""
+    point: str = ""
+
+    def find(self) -> type[Estimator]:
+        """Its class, in the process in which it is run."""
+        from simnav.estimator import find
+        from simnav.estimator.registry import discover_point
+
+        discover_point(self.point)
+        if self.code:
+            enlist(receive(self.code))
+        return find(self.name)
+
+    def make(self) -> Estimator:
+        """An instance, likewise."""
+        from simnav.estimator import make
+
+        self.find()
+        return make(self.name, **self.parameters)

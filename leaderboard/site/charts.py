@@ -1,0 +1,407 @@
+"""The charts of the site as Vega-Lite specifications: from plain columns to JSON.
+
+A specification holds no data and no colours. Data are columns, or curves by row, which the page expands
+(``charts.js``); ``$colours`` and ``$dashes`` stand for the scales of the rows that are shown, ``$ink`` and the like for
+colours of the theme, which the page or `simnav.leaderboard.site.print_figures` puts in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+__all__ = [
+    "Chart",
+    "accuracy_and_cost",
+    "columns",
+    "detection",
+    "distribution",
+    "over_time",
+    "ratios_by_group",
+    "short",
+    "spread",
+    "timeline",
+    "track",
+]
+
+Spec = dict[str, Any]
+
+
+#: Zoom by the wheel with Shift, so that the page still scrolls; a double click shows all again.
+_ZOOM = {
+    "name": "zoom",
+    "select": {"type": "interval", "zoom": "wheel![event.shiftKey]"},
+    "bind": "scales",
+}
+_ZOOM_HELP = "Drag to move, Shift and wheel to zoom, double click to see all again."
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart of a page.
+
+    Attributes
+    ----------
+    name : str
+        Unique on its page.
+    title, caption : str
+    spec : dict
+        Vega-Lite, with placeholders.
+    data : mapping
+        By name: columns, or ``{"axis", "name", "rows"}``: curves by row over a common axis.
+    byrow : bool
+        Whether it shows the rows that the reader chose.
+    equal : bool
+        Whether both axes have one scale; ``data["frame"]`` holds what must be seen.
+    """
+
+    name: str
+    title: str
+    caption: str
+    spec: Spec
+    data: Mapping[str, Any] = field(default_factory=dict)
+    byrow: bool = False
+    equal: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the page."""
+        return {name: getattr(self, name) for name in ("name", "title", "caption", "spec", "data", "byrow", "equal")}
+
+
+def short(value: Any, digits: int = 4) -> float | None:
+    """A figure with a few digits, so that pages stay small; None where there is none."""
+    x = math.nan if value is None else float(value)
+    return float(f"{x:.{digits}g}") if math.isfinite(x) else None
+
+
+def columns(**values: Iterable[Any]) -> dict[str, list[Any]]:
+    """Columns of a data set: arrays become short lists."""
+    return {name: [short(x) for x in v] if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
+
+
+def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
+    scale = {"type": "log", "nice": False} if log else {"zero": False, "nice": False}
+    return {"field": name, "type": "quantitative", "title": title, "scale": scale, **more}
+
+
+def _roomy(axis: Spec) -> Spec:
+    """With room for the marks at the ends."""
+    return {**axis, "scale": {**axis["scale"], "padding": 14}}
+
+
+def _row(name: str = "row") -> Spec:
+    return {
+        "color": {"field": name, "type": "nominal", "scale": "$colours", "legend": None},
+        "strokeDash": {"field": name, "type": "nominal", "scale": "$dashes", "legend": None},
+    }
+
+
+def _tip(**fields: str) -> list[Spec]:
+    """Fields that are shown on hover, with their headings; figures have three digits."""
+    return [
+        {"field": name, "title": title} if name in _TEXTS else {"field": name, "title": title, "format": ".3~g"}
+        for name, title in fields.items()
+    ]
+
+
+_TEXTS = {"row", "name", "run", "family", "scenario", "group", "status", "words", "seed"}
+
+
+def _hover(points: Spec, tooltip: list[Spec]) -> Spec:
+    """Points that appear on hover, nearest first."""
+    return {
+        **points,
+        "params": [
+            {"name": "near", "select": {"type": "point", "on": "pointerover", "nearest": True, "clear": "pointerout"}}
+        ],
+        "mark": {"type": "point", "size": 45, "filled": True},
+        "encoding": {
+            **points["encoding"],
+            "opacity": {"condition": {"param": "near", "empty": False, "value": 1}, "value": 0},
+            "tooltip": tooltip,
+        },
+    }
+
+
+def over_time(name: str, title: str, unit: str, data: Mapping[str, Any], caption: str, *, spread: bool = True) -> Chart:
+    """An error over time: median with band (or one run), faults shaded, bound dashed.
+
+    Parameters
+    ----------
+    data : mapping
+        ``curves``: curves by row over ``time`` with ``middle`` (and ``low``, ``high``); ``faults``: columns ``start``,
+        ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
+    """
+    x = _axis("time", "Time [s]")
+    y = _axis("middle", f"{title} [{unit}]", log=True)
+    curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.middle > 0"}]}
+    layers: list[Spec] = [
+        {
+            "data": {"name": "faults"},
+            "mark": {"type": "rect", "color": "$shade", "opacity": 0.22},
+            "encoding": {
+                "x": {"field": "start", "type": "quantitative"},
+                "x2": {"field": "end"},
+                "tooltip": _tip(name="Fault", start="From [s]", end="To [s]"),
+            },
+        },
+    ]
+    if spread:
+        layers.append(
+            {
+                **curves,
+                "mark": {"type": "area", "opacity": 0.13},
+                "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
+            }
+        )
+    layers.append(
+        {
+            **curves,
+            "params": [_ZOOM],
+            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
+            "encoding": {"x": x, "y": y, **_row()},
+        }
+    )
+    layers.append(
+        {
+            "data": {"name": "bound"},
+            "mark": {"type": "line", "clip": True, "color": "$ink", "strokeDash": [3, 3], "strokeWidth": 1.4},
+            "encoding": {"x": x, "y": {**y, "field": "bound"}},
+        }
+    )
+    layers.append(
+        _hover(
+            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            _tip(row="Estimator", time="Time [s]", middle=f"{title} [{unit}]"),
+        )
+    )
+    return Chart(
+        name, f"{title} over time", f"{caption} {_ZOOM_HELP}", {"height": 300, "layer": layers}, data, byrow=True
+    )
+
+
+def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], caption: str) -> Chart:
+    """Share of the epochs whose error is below a value; ``curves``: ``error`` by row over ``share``."""
+    x, y = _axis("error", f"{title} [{unit}]", log=True), _axis("share", "Share of the epochs [%]")
+    curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.error > 0"}]}
+    layers: list[Spec] = [
+        {
+            **curves,
+            "params": [_ZOOM],
+            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
+            "encoding": {"x": x, "y": y, "order": {"field": "share"}, **_row()},
+        },
+        {
+            "data": {"values": [{"level": 50}, {"level": 95}]},
+            "mark": {"type": "rule", "color": "$grey", "strokeDash": [2, 2]},
+            "encoding": {"y": {"field": "level", "type": "quantitative"}},
+        },
+        _hover(
+            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            _tip(row="Estimator", error=f"{title} [{unit}]", share="Share of the epochs [%]"),
+        ),
+    ]
+    return Chart(
+        name,
+        f"Distribution of the {title.lower()}",
+        f"{caption} {_ZOOM_HELP}",
+        {"height": 280, "layer": layers},
+        data,
+        byrow=True,
+    )
+
+
+def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart:
+    """A horizontal track: truth (``truth``), fixes, where faults act, estimates (``curves``)."""
+    x, y = _axis("east", "East [m]"), _axis("north", "North [m]")
+    order = {"order": {"field": "time"}}
+    layers: list[Spec] = [
+        {
+            "data": {"name": "fixes"},
+            "mark": {"type": "point", "color": "$grey", "opacity": 0.5, "size": 8, "filled": True},
+            "encoding": {"tooltip": _tip(name="Fix", time="Time [s]")},
+        },
+        {
+            "data": {"name": "faulty"},
+            "mark": {"type": "line", "color": "$second", "opacity": 0.35, "strokeWidth": 9, "strokeCap": "round"},
+            "encoding": {"detail": {"field": "part"}, "tooltip": _tip(name="Fault"), **order},
+        },
+        {"data": {"name": "truth"}, "mark": {"type": "line", "color": "$ink", "strokeWidth": 2.4}, "encoding": order},
+        {
+            "data": {"name": "curves"},
+            "params": [_ZOOM],
+            "mark": {"type": "line", "clip": True, "strokeWidth": 1.4},
+            "encoding": {**_row(), **order},
+        },
+        {
+            "data": {"name": "ends"},
+            "mark": {"type": "point", "filled": True, "size": 60, "color": "$ink", "opacity": 1},
+            "encoding": {
+                "shape": {
+                    "field": "name",
+                    "legend": None,
+                    "scale": {"domain": ["start", "end"], "range": ["circle", "square"]},
+                },
+                "tooltip": _tip(name="Truth"),
+            },
+        },
+        _hover(
+            {"data": {"name": "curves"}, "encoding": {"color": _row()["color"]}}, _tip(row="Estimator", time="Time [s]")
+        ),
+    ]
+    return Chart(
+        name,
+        title,
+        f"{caption} {_ZOOM_HELP}",
+        {"encoding": {"x": x, "y": y}, "layer": layers},
+        data,
+        byrow=True,
+        equal=True,
+    )
+
+
+def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart:
+    """Error against time per epoch, with the rows that no other row beats in both.
+
+    Parameters
+    ----------
+    data : mapping
+        ``rows``: columns ``row``, ``cost`` [ms], ``error``, ``family``, ``front`` (bool).
+    """
+    x, y = _roomy(_axis("cost", "Time per epoch [ms]", log=True)), _roomy(_axis("error", y_title, log=True))
+    rows = {"data": {"name": "rows"}}
+    layers: list[Spec] = [
+        {
+            **rows,
+            "transform": [{"filter": "datum.front"}],
+            "mark": {"type": "line", "interpolate": "step-after", "color": "$grey", "strokeDash": [4, 3]},
+            "encoding": {"x": x, "y": y},
+        },
+        {
+            **rows,
+            "params": [_ZOOM],
+            "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
+            "encoding": {
+                "x": x,
+                "y": y,
+                "color": {"condition": {"test": "datum.front", "value": "$second"}, "value": "$strong"},
+                "opacity": {"condition": {"test": "datum.front", "value": 1}, "value": 0.55},
+                "tooltip": _tip(row="Estimator", family="Family", cost="Time per epoch [ms]", error=y_title),
+            },
+        },
+        {
+            **rows,
+            "transform": [{"filter": "datum.front"}],
+            "mark": {"type": "text", "align": "left", "dx": 7, "dy": -6, "fontSize": 11, "color": "$ink"},
+            "encoding": {"x": x, "y": y, "text": {"field": "row"}},
+        },
+    ]
+    caption = (
+        "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more "
+        f"accurate and quicker. {_ZOOM_HELP}"
+    )
+    return Chart(name, "Accuracy against cost", caption, {"height": 340, "layer": layers}, data)
+
+
+def detection(name: str, data: Mapping[str, Any]) -> Chart:
+    """Share of faults that are detected against that of false alarms [%]; columns ``row``, ``found``, ``false``."""
+    spec = {
+        "height": 300,
+        "data": {"name": "rows"},
+        "params": [_ZOOM],
+        "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
+        "encoding": {
+            "x": _roomy(_axis("false", "False alarms [%]")),
+            "y": _roomy(_axis("found", "Faults detected [%]")),
+            "color": {"value": "$strong"},
+            "tooltip": _tip(row="Estimator", found="Faults detected [%]", false="False alarms [%]"),
+        },
+    }
+    caption = f"An estimator at the upper left detects every fault and raises no false alarm. {_ZOOM_HELP}"
+    return Chart(name, "Detection against false alarms", caption, spec, data)
+
+
+def spread(
+    name: str, title: str, x_title: str, data: Mapping[str, Any], caption: str, *, ideal: Sequence[float] = ()
+) -> Chart:
+    """A figure of every run (``runs``: ``row``, ``value``, ``run``), with the middle of each row (``middles``).
+
+    ``ideal`` are one or two values that are best: a line, or a band.
+    """
+    order = list(data["middles"]["row"])
+    y = {"field": "row", "type": "nominal", "title": None, "sort": order}
+    x = _roomy(_axis("value", x_title, log=True))
+    layers: list[Spec] = []
+    if len(ideal) == 2:
+        layers.append(
+            {
+                "data": {"values": [{"low": ideal[0], "high": ideal[1]}]},
+                "mark": {"type": "rect", "color": "$shade", "opacity": 0.25},
+                "encoding": {"x": {"field": "low", "type": "quantitative"}, "x2": {"field": "high"}},
+            }
+        )
+    layers += [
+        {
+            "data": {"name": "runs"},
+            "mark": {"type": "tick", "opacity": 0.4, "thickness": 1.2, "color": "$strong"},
+            "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", run="Run", value=x_title)},
+        },
+        {
+            "data": {"name": "middles"},
+            "mark": {"type": "rule", "strokeWidth": 2.2, "color": "$ink"},
+            "encoding": {"x": {**x, "field": "low"}, "x2": {"field": "high"}, "y": y},
+        },
+        {
+            "data": {"name": "middles"},
+            "mark": {"type": "point", "filled": True, "size": 55, "opacity": 1, "color": "$ink"},
+            "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", value=x_title, low="Low", high="High")},
+        },
+    ]
+    return Chart(name, title, caption, {"height": {"step": 17}, "layer": layers}, data)
+
+
+def timeline(name: str, data: Mapping[str, Any], caption: str) -> Chart:
+    """What happens when: columns ``group``, ``name``, ``start``, ``end``, ``words``."""
+    spec = {
+        "height": {"step": 26},
+        "data": {"name": "events"},
+        "mark": {"type": "bar", "height": 16, "cornerRadius": 3},
+        "encoding": {
+            "x": {**_axis("start", "Time [s]"), "scale": {"zero": True, "nice": False}},
+            "x2": {"field": "end"},
+            "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
+            "color": {"condition": {"test": "datum.group == 'manoeuvres'", "value": "$shade"}, "value": "$second"},
+            "stroke": {"value": "$ink"},
+            "strokeWidth": {"value": 0.5},
+            "tooltip": _tip(name="What", start="From [s]", end="To [s]", words="How"),
+        },
+    }
+    return Chart(name, "What happens when", caption, spec, data)
+
+
+def ratios_by_group(name: str, data: Mapping[str, Any], caption: str) -> Chart:
+    """How an estimator does under each kind of difficulty: columns ``group``, ``row``, ``value``, ``scenario``."""
+    layers: list[Spec] = [
+        {
+            "mark": {"type": "rule", "color": "$grey"},
+            "data": {"values": [{"one": 1}]},
+            "encoding": {"x": {"field": "one", "type": "quantitative"}},
+        },
+        {
+            "mark": {"type": "point", "filled": True, "size": 60, "opacity": 0.9},
+            "encoding": {
+                "x": _roomy(_axis("value", "Error, as a multiple of the reference figure", log=True)),
+                "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
+                "yOffset": {"field": "row", "type": "nominal"},
+                "color": {"condition": {"test": "datum.plain", "value": "$grey"}, "value": "$second"},
+                "shape": {"condition": {"test": "datum.plain", "value": "diamond"}, "value": "circle"},
+                "tooltip": _tip(row="Estimator", scenario="Scenario", value="Multiple of the reference"),
+            },
+        },
+    ]
+    spec = {"height": {"step": 30}, "data": {"name": "points"}, "layer": layers}
+    return Chart(name, "Robustness profile", caption, spec, data)

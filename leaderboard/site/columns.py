@@ -1,0 +1,169 @@
+"""The columns of the site's tables, with what each means: shown on hover, and in the glossary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["SCORES_SHOWN", "Column", "glossary", "plain"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes
+    ----------
+    key, title, help : str
+        ``help`` is shown on hover.
+    kind : str
+        How a value is written, as ``write`` in ``core.js`` has it; or ``name``, ``bar``, ``badge``, ``interval``.
+    hidden : bool
+        Shown when the reader chooses it.
+    fixed : bool
+        Cannot be hidden.
+    filter : bool
+        The reader can choose one of its values.
+    descending : bool
+        The first click sorts the largest to the top.
+    wide : bool
+        Hidden at first on a phone.
+    scale : tuple of float, optional
+        Ends of the logarithmic scale of a bar.
+    """
+
+    key: str
+    title: str
+    help: str
+    kind: str = "number"
+    hidden: bool = False
+    fixed: bool = False
+    filter: bool = False
+    descending: bool = False
+    wide: bool = False
+    scale: tuple[float, float] | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the page; what is not set is left out."""
+        found: dict[str, Any] = {"key": self.key, "title": self.title, "help": self.help, "kind": self.kind}
+        found |= {n: True for n in ("hidden", "fixed", "filter", "descending", "wide") if getattr(self, n)}
+        if self.scale:
+            found["scale"] = {"low": self.scale[0], "high": self.scale[1]}
+        return found
+
+
+def plain(columns: Iterable[Column]) -> list[dict[str, Any]]:
+    """Columns for the page."""
+    return [c.to_dict() for c in columns]
+
+
+#: Scores that pages show, as columns: the median over the runs that ended well. With the factor from SI.
+SCORES_SHOWN: tuple[tuple[Column, float], ...] = (
+    (
+        Column("horizontal_rmse", "Horizontal RMSE [m]", "Root mean square of the horizontal position error of a run."),
+        1.0,
+    ),
+    (Column("r95", "R95 [m]", "Radius that 95 % of the horizontal errors of a run do not exceed."), 1.0),
+    (
+        Column(
+            "vertical_rmse",
+            "Vertical RMSE [m]",
+            "Root mean square of the vertical position error of a run.",
+            hidden=True,
+        ),
+        1.0,
+    ),
+    (
+        Column(
+            "velocity_horizontal_rmse",
+            "Velocity RMSE [m/s]",
+            "Root mean square of the error of the horizontal velocity.",
+        ),
+        1.0,
+    ),
+    (Column("heading_rmse", "Heading RMSE [°]", "Root mean square of the error of the heading."), 57.29577951308232),
+    (Column("outage_end_error", "At outage end [m]", "Horizontal error at the end of the outages."), 1.0),
+    (Column("recovery_time", "Recovery [s]", "Time after an outage until the error is small again.", hidden=True), 1.0),
+    (
+        Column(
+            "nees_horizontal",
+            "NEES / dof",
+            "Normalised estimation error squared of the horizontal position, by degree of freedom. 1: the covariance "
+            "agrees with the errors. More: the estimator is optimistic.",
+        ),
+        1.0,
+    ),
+    (
+        Column(
+            "coverage_95",
+            "95 % coverage",
+            "Share of the epochs at which the truth lies in the stated 95 % ellipse. 95 % is ideal.",
+            "percent",
+        ),
+        1.0,
+    ),
+    (
+        Column(
+            "detection_rate",
+            "Faults detected",
+            "Share of the faulty measurements that the estimator flags or gives little weight.",
+            "percent",
+            descending=True,
+        ),
+        1.0,
+    ),
+    (
+        Column(
+            "false_alarm_rate",
+            "False alarms",
+            "Share of the measurements without a fault that the estimator flags or gives little weight.",
+            "percent",
+        ),
+        1.0,
+    ),
+    (
+        Column(
+            "smoothed_horizontal_rmse",
+            "Smoothed RMSE [m]",
+            "Horizontal RMSE of the smoothed trajectory, which knows all measurements of the run.",
+        ),
+        1.0,
+    ),
+    (Column("update_median", "Time per epoch", "Median wall-clock time of one epoch.", "duration"), 1.0),
+)
+
+#: Terms of the pages, besides the columns.
+_GLOSSARY: tuple[tuple[str, str], ...] = (
+    ("Estimator", "A method that turns measurements into position, velocity and attitude. Each has a row."),
+    ("Scenario", "A simulated or recorded voyage with its instruments and faults."),
+    ("Seed", "The number that fixes everything random of a run. All estimators run on the same seeds."),
+    ("Track", "Scenarios that the same estimators can do. There are ranks within a track only."),
+    ("Reference figure", "The fixed error of a scenario that the errors of all estimators are divided by."),
+    (
+        "Oracle",
+        "An estimator that is told the true noise and every fault. It is shown for comparison and is not ranked.",
+    ),
+    (
+        "Rank interval",
+        "The ranks that an estimator may have. The intervals of all rows hold together with 95 % probability.",
+    ),
+    ("Tier", "Rows of one tier cannot be told apart by these runs."),
+    ("Provisional", "Fewer than ten seeds or recordings: the rank may still change much."),
+    (
+        "Failed run",
+        "A run with an exception, an invalid output, a timeout, too much memory or divergence. It counts as the worst.",
+    ),
+    ("Cramer-Rao bound", "A lower limit of the error that no estimator with the same model can beat on average."),
+    ("Pareto front", "The estimators that no other estimator beats in both accuracy and time."),
+    ("p-value", "How often a difference at least as large would be seen if the two rows did not differ."),
+)
+
+
+def glossary(columns: Iterable[Column]) -> list[tuple[str, str]]:
+    """All terms with what they mean, in alphabetical order: those of the pages, and the columns."""
+    terms = dict(_GLOSSARY)
+    for column in (*columns, *(c for c, _ in SCORES_SHOWN)):
+        if column.help:
+            terms.setdefault(column.title, column.help)
+    return sorted(terms.items(), key=lambda item: item[0].lower().lstrip("× "))

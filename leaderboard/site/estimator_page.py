@@ -1,0 +1,233 @@
+"""The page of an estimator: what it is, where it stands, its robustness, its worst run; and the data of its runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.site import charts, curves
+from simnav.leaderboard.site.charts import short
+from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
+from simnav.leaderboard.site.content import Fact
+from simnav.leaderboard.site.scenario_page import chart_of
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.ranking.board import Ranking, ScenarioRow
+    from simnav.leaderboard.ranking.runs import Runs
+    from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
+
+__all__ = ["PLAIN", "estimator_data", "facts_of", "runs_data"]
+
+#: The row that every estimator is compared with.
+PLAIN = "ekf"
+
+_COLUMNS = (
+    Column("name", "Scenario", "The name leads to the page of the scenario.", "name", fixed=True),
+    Column("track", "Track", "Scenarios of one track are ranked together.", "text", filter=True),
+    Column("group", "Difficulty", "What makes the scenario difficult.", "text", filter=True),
+    Column("rank", "Rank", "On this scenario.", "integer"),
+    Column(
+        "score", "× reference", "Geometric mean of the error, divided by the reference figure of the scenario.", "ratio"
+    ),
+    Column("interval", "95 % interval", "Interval of the score.", "interval"),
+    Column("failed", "Failed", "Runs that failed count as the worst.", "text"),
+)
+
+
+def facts_of(label: str, ranking: Ranking) -> list[Fact]:
+    """Rank and score in each track, and cost."""
+    found = []
+    costs = []
+    for track in ranking.tracks:
+        for row in track.rows:
+            if row.estimator != label or not row.runs:
+                continue
+            costs.append(row.update_median)
+            if row.ranked:
+                provisional = ", provisional" if row.provisional else ""
+                found.append(
+                    Fact(
+                        f"{track.title}: rank {row.ranks.replace('-', '–') or row.rank}{provisional}",
+                        tables.number(row.score),
+                    )
+                )
+            else:
+                found.append(Fact(f"{track.title}: {row.standing}", tables.number(row.score)))
+    known = [c for c in costs if c > 0.0]
+    if known:
+        found.append(Fact("Time per epoch", tables.duration(sum(known) / len(known))))
+    return found
+
+
+def runs_data(
+    label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]], scenarios: Mapping[str, ScenarioEntry]
+) -> dict[str, Any]:
+    """Every run of an estimator with its ranked figure and its scores: ``data/row-NAME.js``.
+
+    ``error`` is the ratio to the reference figure as the ranking counts it, by seed or recording.
+    """
+    found = {}
+    for table in ranking.scenarios:
+        row = next((r for r in table.rows if r.estimator == label), None)
+        if row is None:
+            continue
+        results = runs[table.scenario][label].results
+        entry = scenarios[table.scenario]
+        found[table.scenario] = {
+            "name": entry.name,
+            "page": entry.page,
+            "argument": entry.argument,
+            "run": list(row.ratios),
+            "error": [short(v, 5) for v in row.ratios.values()],
+            "seed": [r.seed for r in results],
+            "note": [r.note for r in results] if any(r.note for r in results) else None,
+            "status": [r.status for r in results],
+            "reason": [r.reason for r in results] if any(r.reason for r in results) else None,
+            "seconds": [short(r.seconds, 3) for r in results],
+            "scores": _scores(results),
+        }
+    return {"label": label, "scenarios": found}
+
+
+def _scores(results: Sequence[Result]) -> dict[str, list[float | None]]:
+    """Columns of the scores that any of the runs has."""
+    found = {c.key: [short(f * r.scores.get(c.key, math.nan)) for r in results] for c, f in SCORES_SHOWN}
+    return {key: values for key, values in found.items() if any(v is not None for v in values)}
+
+
+def estimator_data(
+    entry: EstimatorEntry,
+    ranking: Ranking,
+    runs: Mapping[str, Mapping[str, Runs]],
+    scenarios: Mapping[str, ScenarioEntry],
+    estimators: Mapping[str, EstimatorEntry],
+) -> dict[str, Any]:
+    """Everything that the page of an estimator shows."""
+    label = entry.label
+    rows = []
+    shown = [
+        (c, f)
+        for c, f in SCORES_SHOWN
+        if any(label in by and math.isfinite(by[label].score(c.key).value) for by in runs.values())
+    ]
+    unsuitable = []
+    for table in ranking.scenarios:
+        if label in table.unsuitable:
+            unsuitable.append({"name": scenarios[table.scenario].name, "why": table.unsuitable[label]})
+        row = next((r for r in table.rows if r.estimator == label), None)
+        if row is None:
+            continue
+        scenario, cell = scenarios[table.scenario], runs[table.scenario][label]
+        rows.append(
+            {
+                "name": {"text": scenario.name, "page": scenario.page},
+                "words": scenario.title,
+                "track": table.track,
+                "group": scenario.group,
+                "rank": row.rank,
+                "score": short(row.score),
+                "interval": {"value": None, "low": short(row.low), "high": short(row.high)},
+                "failed": {"text": f"{row.failed} of {row.runs}", "value": row.failed},
+                **{c.key: short(f * cell.score(c.key).value) for c, f in shown},
+            }
+        )
+    worst = _worst(label, ranking, runs)
+    plain_row = estimators.get(PLAIN)
+    return {
+        "kind": "estimator",
+        "label": label,
+        "data": entry.data,
+        "plain": None
+        if plain_row is None or label == PLAIN
+        else {"label": PLAIN, "data": plain_row.data, "page": plain_row.page},
+        "table": {
+            "name": "main",
+            "title": f"{label} by scenario",
+            "columns": plain((*_COLUMNS, *(c for c, _ in shown))),
+            "rows": rows,
+        },
+        "charts": [c.to_dict() for c in _profile(label, ranking, scenarios)],
+        "rows": {label: {"reference": entry.reference}},
+        "first": [label],
+        "worst": None if worst is None else _worst_page(label, worst, scenarios),
+        "unsuitable": unsuitable,
+        "parameters": [{"name": n, "default": d, "annotation": a} for n, d, a in entry.facts.parameters],
+    }
+
+
+def _profile(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry]) -> list[charts.Chart]:
+    points: dict[str, list[Any]] = {"group": [], "row": [], "value": [], "scenario": [], "plain": []}
+    found: list[tuple[str, ScenarioRow, str]] = []
+    for table in ranking.scenarios:
+        if any(r.estimator == label for r in table.rows):
+            found += [
+                (table.scenario, r, scenarios[table.scenario].group)
+                for r in table.rows
+                if r.estimator in (label, PLAIN)
+            ]
+    for scenario, row, group in sorted(found, key=lambda f: (f[2], f[1].estimator != PLAIN)):
+        if not (row.score > 0.0 and math.isfinite(row.score)):
+            continue
+        for key, x in (
+            ("group", group),
+            ("row", row.estimator),
+            ("value", short(row.score)),
+            ("scenario", scenarios[scenario].name),
+            ("plain", row.estimator != label),
+        ):
+            points[key].append(x)
+    if not points["row"]:
+        return []
+    beside = " Diamonds: the plain EKF." if label != PLAIN else ""
+    caption = f"One point a scenario, by what makes it difficult; 1 is the reference figure of the scenario.{beside}"
+    return [charts.ratios_by_group("profile", {"points": points}, caption)]
+
+
+def _worst(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> tuple[str, Result, float] | None:
+    """The run with the largest error, as a multiple of the reference figure: scenario, result, ratio."""
+    worst: tuple[str, Result, float] | None = None
+    for table in ranking.scenarios:
+        cell = runs[table.scenario].get(label)
+        for result in cell.good if cell is not None else ():
+            ratio = result.scores.get("horizontal_rmse", math.nan) / table.reference.value
+            if math.isfinite(ratio) and len(result.series.get("time", ())) and (worst is None or ratio > worst[2]):
+                worst = table.scenario, result, ratio
+    return worst
+
+
+def _worst_page(label: str, worst: tuple[str, Result, float], scenarios: Mapping[str, ScenarioEntry]) -> dict[str, Any]:
+    identity, result, ratio = worst
+    scenario, one = scenarios[identity], curves.one_run(result) or {}
+    made = []
+    if "track" in one:
+        data = {"curves": {"rows": {label: one["track"]}}, **chart_of(None, [result])}
+        made.append(charts.track("worst-track", "Track of the worst run", data, "Black: the true track."))
+    for key, title, unit, _ in curves.QUANTITIES:
+        if key not in one or key in ("vertical", "velocity"):
+            continue
+        bound = (
+            {"time": one[key]["time"], "bound": one[key]["bound"]} if "bound" in one[key] else {"time": [], "bound": []}
+        )
+        data = {
+            "curves": {"rows": {label: {"time": one[key]["time"], "middle": one[key]["middle"]}}},
+            "faults": {"start": [], "end": [], "name": []},
+            "bound": bound,
+        }
+        caption = (
+            "Dashed: three times the standard deviation that the estimator states."
+            if bound["time"]
+            else "Of the worst run."
+        )
+        made.append(charts.over_time(f"worst-{key}", title, unit, data, caption, spread=False))
+    return {
+        "scenario": {"name": scenario.name, "page": scenario.page},
+        "seed": result.seed,
+        "note": result.note,
+        "ratio": short(ratio),
+        "error": short(result.scores.get("horizontal_rmse")),
+        "command": f"simnav run {scenario.argument} --seed {result.seed} -e {label} --plot run.svg",
+        "charts": [c.to_dict() for c in made],
+    }

@@ -1,0 +1,191 @@
+"""What the pages say of an estimator and of a scenario, from the code and the catalogue of this installation."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.leaderboard.ranking import tables
+
+if TYPE_CHECKING:
+    from simnav.recording import Recording
+    from simnav.scenario import Scenario
+
+__all__ = ["EstimatorFacts", "catalogued", "datasheets", "estimator_facts", "events", "name_of"]
+
+_NAME_OF_LABEL = re.compile(r"[(\[ ]")  # a label is a name, and its parameters in brackets
+
+#: Titles of the families, by the module that declares the row.
+_FAMILIES = {
+    "kalman": "Kalman filter",
+    "sigma_point": "Sigma points",
+    "adaptive": "Adaptive filter",
+    "federated": "Federated filter",
+    "windows": "Factor graph",
+    "robust_windows": "Robust factor graph",
+    "gtsam": "GTSAM",
+    "smoothers": "Smoother",
+    "anfis": "Learned",
+    "dead_reckoning": "Dead reckoning",
+    "oracles": "Oracle",
+}
+
+
+def name_of(label: str) -> str:
+    """The registered name, or the file, of a label."""
+    return _NAME_OF_LABEL.split(label, maxsplit=1)[0]
+
+
+@dataclass(frozen=True)
+class EstimatorFacts:
+    """What is known of an estimator; empty for one that is not installed here.
+
+    Attributes
+    ----------
+    family, summary, text, source : str
+        Kind of method; first sentence; the rest of the description; paper.
+    file : str
+        With the line, relative to the project.
+    code : str
+        Its declaration.
+    parameters : tuple of (name, default, annotation)
+    """
+
+    family: str = "Other"
+    summary: str = ""
+    text: str = ""
+    source: str = ""
+    file: str = ""
+    code: str = ""
+    parameters: tuple[tuple[str, str, str], ...] = field(default_factory=tuple)
+
+
+def estimator_facts(label: str) -> EstimatorFacts:
+    """What the registered class says of itself."""
+    from simnav.estimator import describe, find
+
+    name = name_of(label)
+    try:
+        found, cls = describe(name), find(name)
+    except (ValueError, ImportError):
+        return EstimatorFacts()
+    text = re.split(r"\n(?:Parameters|Attributes|Notes|References)\n-+\n", inspect.getdoc(cls) or "")[0]
+    body = " ".join(text.strip().partition("\n\n")[2].split())
+    body, _, source = body.partition("Source: ")
+    path = Path(found.file)
+    parts = path.parts
+    place = "/".join(parts[parts.index("estimators") :]) if "estimators" in parts else path.name
+    return EstimatorFacts(
+        family=_FAMILIES.get(path.stem, "Other") if "estimators" in parts else "Other",
+        summary=found.summary,
+        text=body.strip(),
+        source=source.strip(),
+        file=f"{place}, line {found.line}",
+        code=_code(cls),
+        parameters=tuple(
+            (p.name, "" if p.required else "none" if p.default is None else str(p.default), p.annotation.strip("'"))
+            for p in found.parameters
+        ),
+    )
+
+
+def _code(cls: type) -> str:
+    try:
+        return inspect.getsource(cls)
+    except (OSError, TypeError):
+        return ""
+
+
+@lru_cache(maxsize=256)
+def catalogued(identity: str) -> Scenario | None:
+    """The scenario of the catalogue with this id, or None: results may come from a file that is elsewhere.
+
+    It is read once a build, which begins with ``catalogued.cache_clear()``.
+    """
+    from simnav.scenario import load
+
+    try:
+        scenario = load(identity)
+    except (ValueError, LookupError, OSError):
+        return None
+    return scenario if scenario.id == identity else None
+
+
+def toml_of(identity: str) -> str:
+    """The file of a scenario of the catalogue; empty where there is none."""
+    from simnav.catalogue import headers
+
+    path = next((h.path for h in headers() if h.id == identity), None)
+    try:
+        return "" if path is None else path.read_text(encoding="utf-8")
+    except OSError:
+        return ""
+
+
+def datasheets(scenario: Scenario | None, recording: Recording) -> list[dict[str, str]]:
+    """The instruments of a run: what each measures, how often, and how well, in the units of scenario files."""
+    specs = {} if scenario is None else scenario.instruments
+    found = []
+    imu = recording.instruments.imu
+    sheets: list[tuple[str, str, Any]] = [
+        *([] if imu is None else [(imu.name, "imu", imu)]),
+        *((a.name, a.kind, a) for a in recording.instruments.values()),
+    ]
+    for name, kind, sheet in sheets:
+        table = specs[name].to_toml() if name in specs else {k: v for k, v in asdict(sheet).items() if k != "details"}
+        text = _table(table, skip=("kind", "name", "rate", "rate_hz", "phase", "phase_s"))
+        found.append(
+            {"name": name, "kind": kind.replace("_", " "), "rate": f"{tables.number(sheet.rate)} Hz", "text": text}
+        )
+    return found
+
+
+def events(scenario: Scenario | None, recording: Recording) -> dict[str, list[Any]]:
+    """What happens in a run and when: its faults, and the manoeuvres whose length is known."""
+    rows: list[tuple[str, str, float, float, str]] = []
+    time = 0.0
+    for manoeuvre in scenario.manoeuvres if scenario is not None and scenario.log is None else ():
+        duration = getattr(manoeuvre, "duration", None)
+        if duration is None:
+            break  # its length depends on the vessel, and so does the start of all that follow
+        end = min(time + duration, recording.duration)
+        words = _table(manoeuvre.to_toml(), skip=("kind", "duration_s"))
+        rows.append(("manoeuvres", manoeuvre.kind.replace("_", " "), time, end, words))
+        time = end
+    specs = {(f.kind, tuple(f.instruments)): f for f in (scenario.faults if scenario is not None else ())}
+    for label in recording.faults:
+        start, end = max(label.start, 0.0), min(label.end, recording.duration)
+        if start < end:
+            spec = specs.get((label.kind, tuple(label.instruments)))
+            words = (
+                ""
+                if spec is None
+                else _table(spec.to_toml(), skip=("kind", "instruments", "start_s", "end_s", "intervals_s"))
+            )
+            name = label.kind.replace("_", " ")
+            rows.append((f"{name}: {', '.join(label.instruments) or 'all'}", name, start, end, words))
+    keys = ("group", "name", "start", "end", "words")
+    return {key: [row[i] for row in rows] for i, key in enumerate(keys)}
+
+
+def _table(values: Mapping[str, Any], skip: Iterable[str] = ()) -> str:
+    """A table of a scenario file on one line; what is zero or not given is left out."""
+    found = []
+    for key, value in values.items():
+        if key in skip or value is None or value == "" or not np.any(value):
+            continue
+        if isinstance(value, Mapping):
+            if inner := _table(value):
+                found.append(f"{key} ({inner})")
+        elif isinstance(value, (list, tuple, np.ndarray)):
+            found.append(f"{key} {', '.join(tables.number(v) for v in value)}")
+        else:
+            found.append(f"{key} {tables.number(value)}")
+    return "; ".join(found)

@@ -1,0 +1,315 @@
+"""The first page: one table a track, its charts, and the weights of its scenarios."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.site.charts import accuracy_and_cost, detection, short, spread
+from simnav.leaderboard.site.columns import Column, plain
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.ranking.board import Ranking, Row, TrackRanking, TrackRow
+    from simnav.leaderboard.ranking.runs import Runs
+    from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
+
+__all__ = ["BOARD_COLUMNS", "bar_scale", "board_columns", "board_row", "overview"]
+
+_WIDEST = 100.0  # largest ratio on the scale of the bars
+
+_NAME = Column(
+    "name",
+    "Estimator",
+    "The name leads to the page of the estimator. Hollow rows are references, which are told the truth and not ranked.",
+    "name",
+    fixed=True,
+)
+_BEFORE = (
+    Column("rank", "Rank", "Position by score. Equal scores share a rank.", "integer"),
+    _NAME,
+    Column("ranks", "Ranks", "Interval of the rank. The intervals of all rows hold together with 95 % probability."),
+    Column(
+        "tier",
+        "Tier",
+        "Rows of one tier cannot be told apart by these runs. Bands show the tiers.",
+        "integer",
+        wide=True,
+    ),
+)
+_AFTER = (
+    Column("family", "Family", "Kind of method.", "text", filter=True),
+    Column(
+        "badge",
+        "Consistency",
+        "Whether the stated covariance agrees with the errors from the first fault on; optimistic: errors are larger.",
+        "badge",
+        filter=True,
+    ),
+    Column(
+        "coverage",
+        "95 % coverage",
+        "Mean share of the epochs, from the first fault of a run on, with the truth in the stated 95 % ellipse.",
+        "percent",
+    ),
+    Column("clean_badge", "Consistency, clean", "The same before the first fault of a run.", "badge", hidden=True),
+    Column(
+        "clean_coverage", "95 % coverage, clean", "The same before the first fault of a run.", "percent", hidden=True
+    ),
+    Column(
+        "failed",
+        "Failed",
+        "Runs with an exception, an invalid output, a timeout, too much memory or divergence. They count as the worst.",
+        "text",
+    ),
+    Column(
+        "p95",
+        "95 % of runs",
+        "Ratio to the reference figure that 95 % of the runs do not exceed.",
+        "ratio",
+        hidden=True,
+    ),
+    Column("worst", "Worst run", "Largest ratio to the reference figure of a run.", "ratio", hidden=True),
+    Column("p", "p-value", "Adjusted for all pairs of rows, against the row with the best score.", "p", hidden=True),
+    Column("cost", "Time per epoch", "Median wall-clock time of one epoch.", "duration"),
+    Column("memory", "Memory", "Largest memory of all runs.", "size", hidden=True),
+)
+
+#: Columns whose meaning does not depend on the board.
+BOARD_COLUMNS = tuple(c for c in (*_BEFORE, *_AFTER) if c is not _NAME)
+
+
+def bar_scale(rows: Sequence[Row]) -> tuple[float, float]:
+    """Ends of the logarithmic scale on which scores are drawn."""
+    ends = [v for r in rows for v in (r.score, r.low, r.high) if v > 0.0 and math.isfinite(v)]
+    low = min(ends, default=1.0)
+    return low, max(min(max(ends, default=2.0), low * _WIDEST), low * 1.5)
+
+
+def board_columns(
+    title: str, explanation: str, scale: tuple[float, float], more: Sequence[Column] = ()
+) -> list[dict[str, Any]]:
+    """Columns of a board; ``more`` stand at the end."""
+    score = (
+        Column("score", title, explanation, "ratio"),
+        Column("bar", "On a log scale", f"{title} with its 95 % interval on a logarithmic scale.", "bar", scale=scale),
+        Column("interval", "95 % interval", "Interval of the score.", "interval", hidden=True),
+    )
+    return plain((*_BEFORE, *score, *_AFTER, *more))
+
+
+def board_row(
+    row: Row, entry: EstimatorEntry, same: Sequence[str] = (), *, provisional: bool = False
+) -> dict[str, Any]:
+    """What all boards show of a row.
+
+    ``same`` are the references that have the same result; ``provisional`` says that all of the board is, so that a row
+    need not say it.
+    """
+    notes: list[str] = [] if row.ranked else [row.standing]
+    if row.ranked and row.provisional and not provisional:
+        notes.append("provisional")
+    if same:
+        notes.append(f"same result: {', '.join(same)}")
+    return {
+        "rank": row.rank,
+        "name": {"text": row.estimator, "page": entry.page, "note": ", ".join(notes)},
+        "ranks": {"text": row.ranks.replace("-", "–") or None, "sort": row.rank_low},
+        "tier": row.tier,
+        "score": {"value": short(row.score), "help": row.why or None},
+        "bar": {"value": short(row.score), "low": short(row.low), "high": short(row.high)},
+        "interval": {"value": None, "low": short(row.low), "high": short(row.high)},
+        "family": entry.facts.family,
+        "badge": "" if row.faulty.badge == "unknown" else row.faulty.badge,
+        "coverage": short(row.faulty.coverage),
+        "clean_badge": "" if row.clean.badge == "unknown" else row.clean.badge,
+        "clean_coverage": short(row.clean.coverage),
+        "failed": {"text": f"{row.failed} of {row.runs}", "value": row.failed} if row.runs else None,
+        "p95": short(row.p95),
+        "worst": short(row.worst),
+        "p": short(row.p_value),
+        "cost": short(row.update_median),
+        "memory": row.peak_memory or None,
+        "reference": row.reference,
+        "mark": row.standing if not row.ranked else "",
+        "words": f"{entry.facts.summary} {row.why}",
+    }
+
+
+def overview(
+    ranking: Ranking,
+    estimators: Mapping[str, EstimatorEntry],
+    scenarios: Mapping[str, ScenarioEntry],
+    runs: Mapping[str, Mapping[str, Runs]],
+) -> list[dict[str, Any]]:
+    """The tracks of the first page, in order.
+
+    Parameters
+    ----------
+    ranking : Ranking
+    estimators, scenarios : mapping
+        By label and by versioned id.
+    runs : mapping
+        By scenario and label.
+    """
+    return [_track(t, estimators, scenarios, runs) for t in ranking.tracks]
+
+
+def _track(
+    track: TrackRanking,
+    estimators: Mapping[str, EstimatorEntry],
+    scenarios: Mapping[str, ScenarioEntry],
+    runs: Mapping[str, Mapping[str, Runs]],
+) -> dict[str, Any]:
+    title = "× reference" if track.relative else "Error [m]"
+    explanation = (
+        "Geometric mean of the error of each run, divided by the reference figure of its scenario. Each scenario "
+        "counts the same."
+        if track.relative
+        else "Geometric mean of the error of each run."
+    )
+    more = [
+        Column(
+            f"s:{s}", scenarios[s].name, f"{title} on {scenarios[s].title or scenarios[s].name}.", "ratio", hidden=True
+        )
+        for s in track.scenarios
+    ]
+    every = all(r.provisional for r in track.rows if r.ranked)
+    rows = [
+        board_row(row, estimators[row.estimator], others, provisional=every)
+        | {f"s:{s}": {"value": short(v), "page": scenarios[s].page} for s, v in row.ratios.items()}
+        for row, others in _once(track.rows)
+    ]
+    scored = [r for r in track.rows if r.ranked and math.isfinite(r.score)]
+    return {
+        "key": track.track,
+        "title": track.title,
+        "remarks": list(track.remarks),
+        "provisional": track.provisional,
+        "facts": f"{len(track.scenarios)} scenarios, {len(scored)} ranked estimators, "
+        f"at least {track.units} {track.unit}s each",
+        "table": {
+            "name": track.track,
+            "title": f"{track.title}: ranking",
+            "columns": board_columns(title, explanation, bar_scale(scored), more),
+            "rows": rows,
+        },
+        "charts": [c.to_dict() for c in _charts(track, scored, title, estimators, runs)],
+        "scenarios": [
+            {"id": s, "name": scenarios[s].name, "title": scenarios[s].title, "page": scenarios[s].page}
+            for s in track.scenarios
+        ],
+        "ratios": {r.estimator: {s: short(v, 6) for s, v in r.ratios.items()} for r in scored},
+    }
+
+
+def _once(rows: Sequence[TrackRow]) -> list[tuple[TrackRow, list[str]]]:
+    """Each row with the references that have the same result, which are not shown again."""
+    found: list[tuple[TrackRow, list[str]]] = []
+    seen: dict[tuple[Any, ...], list[str]] = {}
+    for row in rows:
+        key = tuple(sorted((s, short(v, 6)) for s, v in row.ratios.items()))
+        if row.reference and key and key in seen:
+            seen[key].append(row.estimator)
+            continue
+        others: list[str] = []
+        if row.reference and key:
+            seen[key] = others
+        found.append((row, others))
+    return found
+
+
+def _charts(
+    track: TrackRanking,
+    rows: Sequence[TrackRow],
+    title: str,
+    estimators: Mapping[str, EstimatorEntry],
+    runs: Mapping[str, Mapping[str, Runs]],
+) -> list[Any]:
+    costed = [r for r in rows if r.update_median > 0.0 and r.score > 0.0]
+    made = []
+    if len(costed) > 1:
+        front = _front([(r.update_median, r.score) for r in costed])
+        data = {
+            "rows": {
+                "row": [r.estimator for r in costed],
+                "cost": [short(1e3 * r.update_median) for r in costed],
+                "error": [short(r.score) for r in costed],
+                "family": [estimators[r.estimator].facts.family for r in costed],
+                "front": front,
+            }
+        }
+        made.append(accuracy_and_cost(f"{track.track}-cost", f"Score ({title})", data))
+    nees = _scores(track, rows, runs, "nees_horizontal")
+    if nees["middles"]["row"]:
+        made.append(
+            spread(
+                f"{track.track}-nees",
+                "Consistency",
+                "NEES by degree of freedom",
+                nees,
+                "Ticks: median of a scenario. Point and line: median and range over the scenarios. In the band the "
+                "covariance agrees with the errors; to the right the estimator is optimistic.",
+                ideal=(0.7, 1.5),
+            )
+        )
+    found = _medians(track, rows, runs)
+    if len(found["row"]) > 1:
+        made.append(detection(f"{track.track}-detection", {"rows": found}))
+    return made
+
+
+def _front(points: Sequence[tuple[float, float]]) -> list[bool]:
+    """Whether no other point is at least as good in both and better in one.
+
+    >>> _front([(1.0, 2.0), (2.0, 1.0), (2.0, 3.0)])
+    [True, True, False]
+    """
+    return [not any(c <= x and e <= y and (c, e) != (x, y) for c, e in points) for x, y in points]
+
+
+def _scores(
+    track: TrackRanking, rows: Sequence[TrackRow], runs: Mapping[str, Mapping[str, Runs]], name: str
+) -> dict[str, dict[str, list[Any]]]:
+    """Medians of a score by scenario, as ticks, and over the scenarios."""
+    ticks: dict[str, list[Any]] = {"row": [], "value": [], "run": []}
+    middles: dict[str, list[Any]] = {"row": [], "value": [], "low": [], "high": []}
+    for row in rows:
+        values = []
+        for s in track.scenarios:
+            cell = runs[s].get(row.estimator)
+            value = math.nan if cell is None else cell.score(name).value
+            if value > 0.0 and math.isfinite(value):
+                values.append(value)
+                for key, x in (("row", row.estimator), ("value", short(value)), ("run", s)):
+                    ticks[key].append(x)
+        if values:
+            values.sort()
+            for key, x in (
+                ("row", row.estimator),
+                ("value", short(values[len(values) // 2])),
+                ("low", short(values[0])),
+                ("high", short(values[-1])),
+            ):
+                middles[key].append(x)
+    return {"runs": ticks, "middles": middles}
+
+
+def _medians(
+    track: TrackRanking, rows: Sequence[TrackRow], runs: Mapping[str, Mapping[str, Runs]]
+) -> dict[str, list[Any]]:
+    """Detection and false-alarm rates of each row, in percent: means of the medians of the scenarios."""
+    found: dict[str, list[Any]] = {"row": [], "found": [], "false": []}
+    for row in rows:
+        pairs = []
+        for s in track.scenarios:
+            cell = runs[s].get(row.estimator)
+            if cell is not None:
+                pair = cell.score("detection_rate").value, cell.score("false_alarm_rate").value
+                if all(map(math.isfinite, pair)):
+                    pairs.append(pair)
+        if pairs:
+            found["row"].append(row.estimator)
+            for key, k in (("found", 0), ("false", 1)):
+                found[key].append(short(100.0 * sum(p[k] for p in pairs) / len(pairs)))
+    return found

@@ -1,0 +1,118 @@
+"""The breaking point: the value of a dial at which the error of an estimator passes a threshold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.leaderboard.ranking.statistics import Interval
+
+__all__ = ["BreakingPoint", "breaking_point", "crossing"]
+
+Array = NDArray[np.float64]
+
+#: Resamples of the seeds for the interval of a breaking point.
+_RESAMPLES = 400
+
+
+@dataclass(frozen=True)
+class BreakingPoint:
+    """Where an estimator breaks.
+
+    Attributes
+    ----------
+    estimator : str
+    criterion : str
+        ``twice-clean``: its median error passes twice that at the clean value; ``limit``: it passes the limit.
+    threshold : float
+        In the unit of the score.
+    value : Interval
+        Of the dial, with its 95 % interval over the seeds. Infinite where the error stays below the threshold up to the
+        highest value of the sweep: it breaks beyond, or not at all.
+    at : float or None
+        Value of the second dial of a map.
+    """
+
+    estimator: str
+    criterion: str
+    threshold: float
+    value: Interval
+    at: float | None = None
+
+
+def crossing(dial: Array, error: Array, threshold: float) -> float:
+    """Where a curve first passes a threshold, by linear interpolation between its points; infinite where it does not.
+
+    Parameters
+    ----------
+    dial, error : (n,) array
+        Ascending values, and the error at each; infinite errors are failures.
+    threshold : float
+
+    Examples
+    --------
+    >>> crossing(np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.5, 3.5]), 2.5)
+    1.5
+    """
+    above = np.flatnonzero(error > threshold)
+    if not len(above):
+        return math.inf
+    k = int(above[0])
+    if k == 0 or not np.isfinite(error[k]):
+        return float(dial[k])
+    share = (threshold - error[k - 1]) / (error[k] - error[k - 1])
+    return float(dial[k - 1] + share * (dial[k] - dial[k - 1]))
+
+
+def breaking_point(
+    estimator: str,
+    dial: Sequence[float],
+    errors: Array,
+    limit: float | None,
+    *,
+    clean: int = 0,
+    at: float | None = None,
+) -> BreakingPoint:
+    """The breaking point of one estimator.
+
+    Parameters
+    ----------
+    estimator : str
+    dial : sequence of float
+        Values, ascending.
+    errors : (runs, n) array
+        Of each seed at each value; infinite where a run failed.
+    limit : float, optional
+        Of the error; without one, twice the median error at the clean value.
+    clean : int
+        Number of the clean value; the search goes up from it.
+    at : float, optional
+        Value of the second dial.
+    """
+    x, y = np.asarray(dial, dtype=np.float64)[clean:], np.asarray(errors, dtype=np.float64)[:, clean:]
+
+    def found(rows: Array) -> tuple[float, float]:
+        middle = np.median(rows, axis=0)
+        threshold = 2.0 * float(middle[0]) if limit is None else limit
+        return crossing(x, middle, threshold), threshold
+
+    criterion = "twice-clean" if limit is None else "limit"
+    if not len(y):
+        return BreakingPoint(estimator, criterion, math.nan if limit is None else limit, Interval(math.nan), at)
+    value, threshold = found(y)
+    low, high, n = math.nan, math.nan, len(y)
+    if n >= 3:
+        draws = np.random.default_rng(0).integers(0, n, (_RESAMPLES, n))
+        low, high = _percentiles(np.array([found(y[rows])[0] for rows in draws]))
+    return BreakingPoint(estimator, criterion, threshold, Interval(value, low, high, n), at)
+
+
+def _percentiles(values: Array) -> tuple[float, float]:
+    """The 95 % interval of values of which some may be infinite."""
+    ordered = np.sort(values)
+    low, high = (int(q * (len(ordered) - 1) + 0.5) for q in (0.025, 0.975))
+    return float(ordered[low]), float(ordered[high])

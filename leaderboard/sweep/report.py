@@ -1,0 +1,183 @@
+"""A sweep: campaigns over the settings of one dial or two, and what came out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.leaderboard.figures.sweep_figure import Line, Map, error_against_dial, error_maps
+from simnav.leaderboard.ranking.statistics import Interval, median
+from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.sweep.breaking import BreakingPoint, breaking_point
+from simnav.scenario import Dial
+from simnav.scoring import SCORES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from simnav.leaderboard.campaign.campaign import Summary
+    from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.sweep.settings import Setting
+
+__all__ = ["Sweep", "SweepPoint"]
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One estimator at one setting.
+
+    Attributes
+    ----------
+    estimator : str
+    values : tuple of float
+        Of the dials, in their units.
+    error : Interval
+        Median over the runs, of which a failed one counts as infinite.
+    runs, failed : int
+    """
+
+    estimator: str
+    values: tuple[float, ...]
+    error: Interval
+    runs: int
+    failed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Errors against a dial, or two.
+
+    Attributes
+    ----------
+    scenario : str
+        Versioned id of the scenario whose dials were turned.
+    dials : tuple of Dial
+    values : tuple of tuple of float
+        Of each dial, ascending.
+    estimators : tuple of str
+    score : str
+        Key of `simnav.scoring.SCORES`.
+    limit : float or None
+        Absolute limit of the score, in its unit.
+    results : sequence of Result
+    settings : tuple of Setting
+    summary : Summary
+        Of the campaign.
+    """
+
+    scenario: str
+    dials: tuple[Dial, ...]
+    values: tuple[tuple[float, ...], ...]
+    estimators: tuple[str, ...]
+    score: str
+    limit: float | None
+    results: Sequence[Result]
+    settings: tuple[Setting, ...]
+    summary: Summary
+
+    @cached_property
+    def _errors(self) -> dict[tuple[str, tuple[float, ...]], dict[int, float]]:
+        """(estimator, values) -> seed -> error; infinite where the run failed. Unsuitable runs are left out."""
+        where = {s.scenario.id: s.values for s in self.settings}
+        found: dict[tuple[str, tuple[float, ...]], dict[int, float]] = {
+            (e, s.values): {} for e in self.estimators for s in self.settings
+        }
+        for r in self.results:
+            if r.tried:
+                value = float(r.scores.get(self.score, math.nan)) if r.status == "ok" else math.inf
+                found[r.estimator, where[r.scenario]][r.seed] = math.inf if math.isnan(value) else value
+        return found
+
+    @cached_property
+    def points(self) -> tuple[SweepPoint, ...]:
+        """Every estimator at every setting."""
+        return tuple(
+            SweepPoint(e, values, median(errors.values()), len(errors), sum(map(math.isinf, errors.values())))
+            for (e, values), errors in self._errors.items()
+        )
+
+    @cached_property
+    def breaking_points(self) -> tuple[BreakingPoint, ...]:
+        """Of every estimator along the first dial: by twice its clean error, and by the limit where there is one.
+
+        With two dials there is one for each value of the second. Only seeds that were run at every value count.
+        """
+        found = []
+        dial, values = self.dials[0], self.values[0]
+        clean = values.index(dial.range[0] if dial.clean is None else dial.clean)
+        for e in self.estimators:
+            for at in self.values[1] if len(self.dials) == 2 else (None,):
+                rest = () if at is None else (at,)
+                columns = [self._errors[e, (v, *rest)] for v in values]
+                seeds = sorted(set.intersection(*map(set, columns)))
+                errors = np.array([[c[s] for c in columns] for s in seeds]).reshape(len(seeds), len(values))
+                for limit in (None, self.limit) if self.limit is not None else (None,):
+                    found.append(breaking_point(e, values, errors, limit, clean=clean, at=at))
+        return tuple(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav sweep --json`` prints, but for the figure; infinite figures are null there."""
+        score = SCORES[self.score]
+
+        def figures(i: Interval) -> dict[str, Any]:
+            return {"value": i.value, "low": i.low, "high": i.high, "runs": i.runs}
+
+        return {
+            "scenario": self.scenario,
+            "score": {"name": self.score, "title": score.title, "unit": score.unit},
+            "limit": self.limit,
+            "dials": [
+                {"name": d.name, "key": d.key, "unit": d.unit, "title": d.title, "values": list(v)}
+                for d, v in zip(self.dials, self.values, strict=True)
+            ],
+            "points": [
+                {"estimator": p.estimator, "values": list(p.values), "failed": p.failed, "error": figures(p.error)}
+                for p in self.points
+            ],
+            "breaking_points": [
+                {"estimator": b.estimator, "criterion": b.criterion, "threshold": b.threshold, "at": b.at,
+                 "value": figures(b.value)}
+                for b in self.breaking_points
+            ],
+            "results": str(self.summary.folder),
+        }  # fmt: skip
+
+    def to_frame(self) -> Any:
+        """A row an estimator and setting; see `simnav.leaderboard.results.frame.frame`."""
+        names = [d.name if d.name != "value" else d.key for d in self.dials]
+        return frame([
+            {"estimator": p.estimator, **dict(zip(names, p.values, strict=True)), "error": p.error.value,
+             "low": p.error.low, "high": p.error.high, "runs": p.runs, "failed": p.failed}
+            for p in self.points
+        ])  # fmt: skip
+
+    def plot(self) -> Figure:
+        """Error against the dial with intervals, or a map an estimator for two dials."""
+        score = SCORES[self.score]
+        label = score.title if score.unit == "-" else f"{score.title} [{score.unit}]"
+        at = {(p.estimator, p.values): p for p in self.points}
+        if len(self.dials) == 1:
+            lines = [
+                Line(e, np.array(self.values[0]), *np.array([
+                    (p.error.value, p.error.low, p.error.high) for v in self.values[0] for p in (at[e, (v,)],)
+                ]).T)
+                for e in self.estimators
+            ]  # fmt: skip
+            marks = {b.estimator: b.value.value for b in self.breaking_points if b.criterion == "twice-clean"}
+            return error_against_dial(lines, axis_label(self.dials[0]), label, self.scenario, self.limit, marks)
+        maps = [
+            Map(e, np.array([[at[e, (a, b)].error.value for a in self.values[0]] for b in self.values[1]]))
+            for e in self.estimators
+        ]
+        return error_maps(maps, self.values[0], self.values[1], axis_label(self.dials[0]), axis_label(self.dials[1]),
+                          label, self.scenario)  # fmt: skip
+
+
+def axis_label(dial: Dial) -> str:
+    """Title and unit of a dial."""
+    return f"{dial.title} [{dial.unit}]" if dial.unit else dial.title

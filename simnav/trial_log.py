@@ -1,0 +1,378 @@
+"""What an estimator gave in a run, collected step by step, and every answer checked.
+
+The answers come in the plain form of `simnav.wire`: from this process or from another that nobody vouches for. What is
+no well-formed answer is invalid output, whoever made it.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.types import COMPONENTS, Array, NavigationStates
+from simnav.wire import (
+    ANSWER,
+    COVARIANCE,
+    ESTIMATE,
+    GIVEN_BITS,
+    MASKS,
+    VECTORS,
+    InvalidOutputError,
+    numbers_in,
+    read_tail,
+    real_array,
+)
+
+__all__ = ["DIVERGENCE_LIMIT", "DivergedError", "Trial", "TrialLog"]
+
+#: Horizontal error [m] above which an estimate counts as diverged: no instrument of a vessel is of use that far off.
+DIVERGENCE_LIMIT = 100e3
+
+_TIME_TOLERANCE = 1e-6  # s; steps are multiples of the sample interval up to rounding
+_ROUNDING = 1e-6  # of a correlation coefficient: asymmetry, and negative eigenvalues, up to this are rounding
+_CHUNK = 1024  # covariances checked together
+_EARTH_RADIUS = 6371e3
+_ALL = 0b111111111
+_STATE = 72  # bytes of position, velocity and attitude
+_COVARIANCE = 648
+_VECTORS = [struct.Struct(f"{3 * n}d") for n in range(4)]  # numbers of so many vectors
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What an estimator gave on one recording, up to the end or to its failure: T epochs.
+
+    Attributes
+    ----------
+    estimator : str
+        Registered name, or the name of the class.
+    status, reason : str
+        See the module; ``reason`` is empty where the status is ``ok``.
+    time : (T,) array
+        Ends of the steps that were completed [s]: the first T of ``recording.data.truth.time``.
+    position, velocity, attitude : (T, 3) array
+        As in `Estimate`; NaN where a vector was not given.
+    estimated : (T, 9) bool array
+        Which of `COMPONENTS` were estimated.
+    covariance : (T, 9, 9) array or None
+        NaN at epochs without one; None where there was none at all or it was not kept.
+    diagnostics : dict of str to (T, ...) array
+        NaN at epochs without the diagnostic; arrays of changing length are padded with NaN.
+    flagged : list of (instrument, time)
+        Measurements that the estimator judged faulty.
+    update_seconds : (T,) array
+        Wall time of each update [s].
+    smoothed : NavigationStates or None
+        What ``smooth()`` returned: T states.
+    reset_seconds, smooth_seconds : float
+        Wall time of ``reset()`` and ``smooth()`` [s].
+    """
+
+    estimator: str
+    status: str
+    reason: str
+    time: Array
+    position: Array
+    velocity: Array
+    attitude: Array
+    estimated: NDArray[np.bool_]
+    covariance: Array | None
+    diagnostics: dict[str, Array]
+    flagged: list[tuple[str, float]]
+    update_seconds: Array
+    smoothed: NavigationStates | None = None
+    reset_seconds: float = 0.0
+    smooth_seconds: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the trial counts as a failure (an unsuitable scenario does not)."""
+        return self.status not in ("ok", "unsuitable")
+
+
+class DivergedError(Exception):
+    """The estimate is finite and useless."""
+
+
+class TrialLog:
+    """Checks the answers of a run and collects them.
+
+    Parameters
+    ----------
+    steps : int
+        Of the run.
+    keep_covariance : bool
+        False saves 648 bytes an epoch; covariances are checked all the same.
+    limit : float
+        Bytes that diagnostics and flags may take together.
+
+    Attributes
+    ----------
+    n : int
+        How many answers are good.
+    """
+
+    def __init__(self, steps: int, keep_covariance: bool, limit: float = math.inf):
+        self.n = 0
+        self._steps, self._keep, self._limit = steps, keep_covariance, limit
+        self._time = np.full(steps, np.nan)
+        self._seconds = np.full(steps, np.nan)
+        self._states = np.full((steps, 9), np.nan)
+        self._state_bytes = _bytes_of(self._states)
+        self._estimated = np.zeros(steps, dtype=np.uint16)
+        self._shapes: list[list[tuple[str, tuple[int, ...]]]] = [[]]  # of diagnostics
+        self._sizes = [0]  # of each shape [bytes]
+        self._dimensions: dict[str, int] = {}
+        self._diagnostics: list[list[tuple[int, bytes]]] = [[]]  # by shape: step and numbers
+        self._flags: list[tuple[int, str, float]] = []
+        self._covariance: Array | None = None
+        self._chunk: Array | None = None
+        self._chunk_bytes = memoryview(b"")
+        self._epochs: list[int] = []  # of the covariances in the chunk
+        self._held = 0  # bytes of diagnostics and flags
+
+    def add(self, answer: bytes | bytearray | memoryview, end: float, seconds: float, truth: Array) -> None:
+        """Take the answer to one step, or raise and leave the log as it was.
+
+        Parameters
+        ----------
+        answer : bytes
+            In the form of `simnav.wire`.
+        end, seconds : float
+            End of the step, and wall time of the update [s].
+        truth : (3,) array
+            True position; NaN where it is not known.
+
+        Raises
+        ------
+        InvalidOutputError, DivergedError
+            With what is wrong.
+        MemoryError
+            If diagnostics and flags take more than the limit.
+        """
+        if len(answer) < ANSWER.size:
+            raise _malformed()
+        kind, given, bits, shape, flags, size, tail, stamp = ANSWER.unpack_from(answer)
+        if kind != ESTIMATE or len(answer) != ANSWER.size + size or given > 15 or bits > _ALL:
+            raise _malformed()
+        if not abs(stamp - end) <= _TIME_TOLERANCE:
+            raise InvalidOutputError(f"time of the estimate is {stamp!r}, the step ends at {end!r}")
+        body = memoryview(answer)
+        k, place = self.n, ANSWER.size
+        whole = given & 7 == 7
+        vectors = _VECTORS[(given & 7).bit_count()]
+        after = place + vectors.size + (_COVARIANCE if given & COVARIANCE else 0)
+        if after + tail > len(answer) or bits & ~GIVEN_BITS[given & 7]:
+            raise _malformed()
+        values = vectors.unpack_from(answer, place)
+        if not all(map(math.isfinite, values)):
+            _check_vectors(given, bits, values)
+        if bits & 3 == 3:
+            distance = _distance(values, truth)
+            if distance > DIVERGENCE_LIMIT:  # never where the truth is not known
+                raise DivergedError(
+                    f"horizontal error {distance / 1e3:.0f} km is above the limit of {DIVERGENCE_LIMIT / 1e3:.0f} km"
+                )
+        flagged: list[tuple[str, float]] = []
+        numbers = b""
+        if shape or flags or after < len(answer):
+            end_of_numbers = len(answer) - tail
+            numbers = bytes(body[after:end_of_numbers])
+            flagged = self._named(numbers, bytes(body[end_of_numbers:]), shape, flags)
+        # From here on nothing can fail.
+        if whole:
+            self._state_bytes[_STATE * k : _STATE * (k + 1)] = body[place : place + _STATE]
+        else:
+            for bit, section in enumerate(VECTORS.values()):
+                if given >> bit & 1:
+                    self._states[k, section], values = values[:3], values[3:]
+        self.n += 1
+        self._time[k], self._seconds[k], self._estimated[k] = end, seconds, bits
+        if shape:
+            self._diagnostics[shape].append((k, numbers))
+        if flagged:
+            self._flags += [(k, *f) for f in flagged]
+        if given & COVARIANCE:
+            if self._chunk is None:
+                self._chunk = np.empty((min(_CHUNK, self._steps), 9, 9))
+                self._chunk_bytes = _bytes_of(self._chunk)
+            begin = _COVARIANCE * len(self._epochs)
+            self._chunk_bytes[begin : begin + _COVARIANCE] = body[after - _COVARIANCE : after]
+            self._epochs.append(k)
+            if len(self._epochs) >= len(self._chunk):
+                self.check_covariances()
+
+    def _named(self, numbers: bytes, tail: bytes, shape: int, flags: int) -> list[tuple[str, float]]:
+        """Check the diagnostics, learn their names where they are new; return what was flagged."""
+        found, flagged = read_tail(tail) if tail else (None, [])
+        new = found is not None
+        if new != (shape == len(self._shapes)) or shape > len(self._shapes) or len(flagged) != flags:
+            raise _malformed()
+        if len(numbers) != (8 * numbers_in(found) if found is not None else self._sizes[shape]):
+            raise _malformed()
+        for name, sizes in found or ():
+            if self._dimensions.get(name, len(sizes)) != len(sizes):
+                raise InvalidOutputError(f"diagnostic {name!r} changes its number of dimensions")
+        self._held += len(numbers) + len(tail) + 100
+        if self._held > self._limit:
+            raise MemoryError(f"its diagnostics take more than {self._limit / 2**20:.0f} MiB")
+        if found is not None:
+            self._shapes.append(list(found))
+            self._sizes.append(len(numbers))
+            self._diagnostics.append([])
+            self._dimensions |= {name: len(sizes) for name, sizes in found}
+        return flagged
+
+    def check_covariances(self) -> None:
+        """Check those since the last call; at a bad one, forget all from its epoch on and raise."""
+        if not self._epochs or self._chunk is None:
+            return
+        epochs, p = np.array(self._epochs), self._chunk[: len(self._epochs)].copy()
+        self._epochs = []
+        known = MASKS[self._estimated[epochs]]
+        p[~(known[:, :, None] & known[:, None, :])] = np.nan
+        bad, why = _first_bad_covariance(p, known)
+        if bad is not None:
+            self.n = int(epochs[bad])
+            epochs, p = epochs[:bad], p[:bad]
+        if self._keep:
+            if self._covariance is None:
+                self._covariance = np.full((self._steps, 9, 9), np.nan)
+            self._covariance[epochs] = p
+        if bad is not None:
+            raise InvalidOutputError(f"at {self._time[self.n]:g} s the covariance {why}")
+
+    def trial(self, estimator: str, status: str, reason: str) -> Trial:
+        """What was collected."""
+        n = self.n
+        return Trial(
+            estimator=estimator,
+            status=status,
+            reason=reason,
+            time=self._time[:n],
+            position=self._states[:n, 0:3].copy(),
+            velocity=self._states[:n, 3:6].copy(),
+            attitude=self._states[:n, 6:9].copy(),
+            estimated=MASKS[self._estimated[:n]],
+            covariance=None if self._covariance is None else self._covariance[:n],
+            diagnostics=self._collected(n),
+            flagged=[(name, t) for k, name, t in self._flags if k < n],
+            update_seconds=self._seconds[:n],
+        )
+
+    def _collected(self, n: int) -> dict[str, Array]:
+        """The diagnostics of the first n steps by name, in the order in which they appeared."""
+        kept = [[(k, numbers) for k, numbers in items if k < n] for items in self._diagnostics]
+        sizes: dict[str, tuple[int, ...]] = {}
+        for shape, items in zip(self._shapes, kept, strict=True):
+            for name, dimensions in shape if items else ():
+                sizes[name] = tuple(map(max, zip(dimensions, sizes.get(name, dimensions), strict=True)))
+        found = {name: np.full((n, *dimensions), np.nan) for name, dimensions in sizes.items()}
+        for shape, items in zip(self._shapes, kept, strict=True):
+            if not items:
+                continue
+            epochs = np.array([k for k, _ in items])
+            values = np.frombuffer(b"".join(numbers for _, numbers in items)).reshape(len(items), -1)
+            begin = 0
+            for name, dimensions in shape:
+                end = begin + math.prod(dimensions)
+                part = values[:, begin:end].reshape(len(items), *dimensions)
+                place: Any = (epochs, *(slice(d) for d in dimensions))
+                found[name][place] = part
+                begin = end
+        return found
+
+    def trajectory(self, states: object) -> NavigationStates | None:
+        """A smoothed trajectory, copied, or None.
+
+        Raises
+        ------
+        InvalidOutputError
+            Where it does not fit the run.
+        """
+        if states is None:
+            return None
+        if not isinstance(states, NavigationStates):
+            raise InvalidOutputError(f"expected NavigationStates or None, got {type(states).__name__}")
+        n = self.n
+        times = real_array(states.time, "time", (n,)).copy()
+        if not (np.abs(times - self._time[:n]) <= _TIME_TOLERANCE).all():
+            raise InvalidOutputError("the times are not the ends of the steps")
+        vectors = {name: real_array(getattr(states, name), name, (n, 3)).copy() for name in VECTORS}
+        given: NDArray[np.bool_] = np.any(MASKS[self._estimated[:n]], axis=0)
+        for name, vector in vectors.items():
+            wanted = given[VECTORS[name]] if name != "attitude" else _attitude_given(given[6:])
+            if not np.isfinite(vector[:, wanted]).all():
+                raise InvalidOutputError(f"{name} is not finite")
+        return NavigationStates(times, **vectors)
+
+
+def _bytes_of(array: Array) -> memoryview:
+    """The memory of an array."""
+    return memoryview(array.reshape(-1).view(np.uint8)) if array.size else memoryview(bytearray())  # type: ignore[arg-type]
+
+
+def _malformed() -> InvalidOutputError:
+    return InvalidOutputError("the answer is not in the form of an estimate")
+
+
+def _check_vectors(given: int, bits: int, values: Sequence[float]) -> None:
+    """Raise where a component that is estimated is not finite."""
+    mask, begin = MASKS[bits], 0
+    for bit, (name, section) in enumerate(VECTORS.items()):
+        if not given >> bit & 1:
+            continue
+        vector = np.array(values[begin : begin + 3])
+        begin += 3
+        wanted = mask[section] if name != "attitude" else _attitude_given(mask[6:])
+        if not np.isfinite(vector[wanted]).all():
+            raise InvalidOutputError(f"{name} is not finite: {vector.tolist()}")
+
+
+def _attitude_given(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of roll, pitch, yaw the estimated components (north, east, down) of the attitude error need."""
+    level = bool(mask[0] or mask[1])
+    return np.array([level, level, bool(mask[2])])
+
+
+def _distance(position: Sequence[float], truth: Array) -> float:
+    """Rough horizontal distance [m], on a sphere: it only has to tell 100 km from less."""
+    north = float(position[0] - truth[0])
+    east = math.remainder(float(position[1] - truth[1]), 2.0 * math.pi) * math.cos(float(truth[0]))
+    return _EARTH_RADIUS * math.hypot(north, east)
+
+
+def _first_bad_covariance(p: Array, estimated: NDArray[np.bool_]) -> tuple[int | None, str]:
+    """Index of the first covariance that is not finite, symmetric and positive semi-definite, and why."""
+    variance = np.diagonal(p, axis1=1, axis2=2)
+    unknown = ~(estimated[:, :, None] & estimated[:, None, :])
+    infinite: NDArray[np.bool_] = ~np.all(np.isfinite(p) | unknown, axis=(1, 2))
+    negative: NDArray[np.bool_] = np.any(variance < 0.0, axis=1)
+    sigma = np.sqrt(np.where(variance > 0.0, variance, 1.0))
+    p = np.where(unknown | infinite[:, None, None], 0.0, p) / sigma[:, :, None] / sigma[:, None, :]
+    asymmetric: NDArray[np.bool_] = np.any(np.abs(p - p.swapaxes(1, 2)) > _ROUNDING, axis=(1, 2))
+    p = 0.5 * (p + p.swapaxes(1, 2))
+    try:  # much faster than eigenvalues, and enough where all is well
+        np.linalg.cholesky(p + _ROUNDING * np.eye(9))
+        indefinite = np.zeros(len(p), dtype=bool)
+    except np.linalg.LinAlgError:
+        indefinite = np.linalg.eigvalsh(p)[:, 0] < -_ROUNDING
+    bad: NDArray[np.intp] = np.flatnonzero(infinite | negative | asymmetric | indefinite)
+    if len(bad) == 0:
+        return None, ""
+    k = int(bad[0])
+    if infinite[k]:
+        return k, "is not finite"
+    if negative[k]:
+        j = int(np.nanargmin(variance[k]))
+        return k, f"has a negative variance of {COMPONENTS[j]}: {variance[k, j]:g}"
+    return k, "is not symmetric" if asymmetric[k] else "is not positive semi-definite"

@@ -1,0 +1,39 @@
+"""The truth is out of reach, and nobody harms another row: each cheat and each vandal, in a real campaign."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from simnav.leaderboard.campaign.confinement import bubblewrap
+from simnav.warmup import warmup
+from tests.hostile.attacks import CHEATS, cheats, vandals
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="estimators are confined on POSIX systems only")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def warm() -> None:
+    """On a fresh machine the kernels compile here, not within an estimator's time limit."""
+    warmup(load=False)
+
+
+@pytest.fixture(params=["process", "bubblewrap"])
+def confinement(request: pytest.FixtureRequest) -> str:
+    if request.param == "bubblewrap" and bubblewrap.available():
+        pytest.skip(bubblewrap.available())
+    return str(request.param)
+
+
+def test_no_cheat_gains(tmp_path: Path) -> None:
+    assert len(CHEATS) == 8
+    assert cheats(tmp_path, "process", seeds=2) == []
+
+
+def test_no_vandal_touches_another_row(tmp_path: Path, confinement: str) -> None:
+    harm = vandals(tmp_path, confinement, seeds=1)
+    assert harm.touched == []
+    assert harm.unnamed == []
+    assert harm.tried >= 13

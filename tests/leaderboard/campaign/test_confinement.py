@@ -1,0 +1,259 @@
+"""An estimator in a process of its own: the same bits as here, and nothing to be learned there."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simnav.estimator import make
+from simnav.leaderboard.campaign.confinement import bubblewrap
+from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, chosen_confinement, seed_words
+from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits
+from simnav.leaderboard.campaign.entrant import Entrant
+from simnav.recording import Recording
+from simnav.scenario import load
+from simnav.source import record
+from simnav.trial import Trial, run_trial
+from simnav.warmup import warmup
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="estimators are confined on POSIX systems only")
+
+HEAD = """
+import os, sys, json, random, time
+import numpy as np
+from simnav import Estimate, Estimator, NavigationStates, UnsuitableScenario
+
+class Mine(Estimator):
+    def reset(self, start, instruments):
+        self.position, self.k = start.position, 0
+        {reset}
+
+    def update(self, measurements):
+        self.k += 1
+        diagnostics, flagged = {{}}, []
+        {update}
+        return Estimate(measurements.time, position=self.position, diagnostics=diagnostics, flagged=flagged)
+"""
+
+
+@pytest.fixture(autouse=True)
+def _registry(clean_registry: None) -> None:
+    """Each test has a class ``Mine`` in a file ``mine.py`` of its own."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[EstimatorServer]:
+    warmup(load=False)
+    made = EstimatorServer("process")
+    made.wait_until_ready()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return record(load("harbour-multipath").model_copy(update={"duration": 60.0}), 5)
+
+
+def entrant(name: str, **parameters: Any) -> Entrant:
+    return Entrant(name, parameters, name, False, "")
+
+
+def same(a: Trial, b: Trial) -> None:
+    """All but wall times, bit for bit."""
+    assert (a.estimator, a.status, a.reason, a.flagged) == (b.estimator, b.status, b.reason, b.flagged)
+    assert list(a.diagnostics) == list(b.diagnostics)
+    pairs: list[tuple[Any, Any]] = [(getattr(a, n), getattr(b, n)) for n in ("time", "position", "velocity", "attitude",
+                                                                            "estimated", "covariance")]  # fmt: skip
+    pairs += [(a.diagnostics[n], b.diagnostics[n]) for n in a.diagnostics]
+    pairs += [(getattr(a.smoothed, n, None), getattr(b.smoothed, n, None)) for n in ("time", "position", "attitude")]
+    for x, y in pairs:
+        assert (x is None) == (y is None)
+        if x is not None:
+            assert x.shape == y.shape
+            assert x.tobytes() == y.tobytes()
+
+
+@pytest.mark.parametrize("name", ["ekf", "ekf-rts", "ship-ekf", "gnss-only", "iae", "sw-fgo", "gtsam-batch"])
+def test_both_ways_give_the_same_bits(name: str, server: EstimatorServer, recording: Recording) -> None:
+    there = attempt(server, entrant(name), recording, Limits(60.0, 1 << 30))
+    assert there.trial is not None
+    assert there.status == "ok"
+    same(there.trial, run_trial(make(name), recording))
+
+
+NEXT = "\n    def nothing(self, measurements):\n        diagnostics, flagged = {}, []"
+
+CASES = {
+    "varying": ("", "diagnostics = {'a': np.arange(self.k % 3 + 1.0), 'n': self.k, 'b': True}"),
+    "names come and go": ("", "diagnostics = {str(self.k % 4): np.eye(2), 'x': 1.5} if self.k % 3 else {}"),
+    "flags": ("", "flagged = [('gnss', measurements.time), ('n\\u00e4me \\udc80', float('nan'))]"),
+    "raises": ("", "if self.k == 7: raise KeyError('lost\\nin a line')"),
+    "leaves": ("", "if self.k == 7: sys.exit(3)"),
+    "wants memory": ("", "if self.k == 7: raise MemoryError"),
+    "refuses at once": ("raise UnsuitableScenario('no sonar')", ""),
+    "refuses": ("", "raise UnsuitableScenario('no sonar')"),
+    "raises in reset": ("[][1]", ""),
+    "needs a DVL": ("", f"pass\n    needs = ('imu', ('dvl', 'terrain_fix')){NEXT}"),
+    "odd needs": ("", f"pass\n    needs = 'imu'{NEXT}"),
+    "wrong type": ("", "if self.k == 7: return 3"),
+    "wrong shape": ("", "if self.k == 7: self.position = np.zeros(4)"),
+    "wrong time": ("", "if self.k == 7: return Estimate(0.0, position=self.position)"),
+    "not finite": ("", "if self.k == 7: self.position = self.position * np.nan"),
+    "far away": ("", "if self.k == 7: self.position = self.position + 0.1"),
+    "wrong covariance": ("", "if self.k > 5: return Estimate(measurements.time, position=self.position, "
+                             "covariance=-np.eye(9))"),
+    "partly": ("", "return Estimate(measurements.time, position=self.position, "
+                   "estimated=np.arange(9) < 2, covariance=np.full((9, 9), np.nan) * (self.k > 20) + np.eye(9))"),
+    "dimensions": ("", "diagnostics = {'a': np.zeros((1,) * self.k)} if self.k < 3 else {}"),
+    "no diagnostics": ("", "diagnostics = [] if self.k == 7 else {}"),
+    "a complex one": ("", "diagnostics = {'c': 1j}"),
+    "writes its input": ("", "measurements.imu.specific_force[:] = 0.0; measurements.aids.clear()"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_both_ways_judge_alike(case: str, server: EstimatorServer, recording: Recording, tmp_path: Path) -> None:
+    reset, update = CASES[case]
+    file = tmp_path / "mine.py"
+    file.write_text(HEAD.format(reset=reset, update=update))
+    there = attempt(server, entrant(str(file)), recording, Limits(60.0, 1 << 30))
+    assert there.trial is not None, there.reason
+    same(there.trial, run_trial(make(str(file)), recording))
+
+
+SMOOTHS = {
+    "whole": "return NavigationStates(np.arange(1.0, self.k + 1), *(np.ones((self.k, 3)) for _ in range(3)))",
+    "short": "return NavigationStates(np.arange(1.0, self.k), *(np.ones((self.k - 1, 3)) for _ in range(3)))",
+    "no states": "return [1.0]",
+    "raises": "raise ValueError('no way back')",
+}
+
+
+@pytest.mark.parametrize("case", SMOOTHS)
+def test_smoothed_trajectories_cross_too(
+    case: str, server: EstimatorServer, recording: Recording, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(HEAD.format(reset="", update="") + f"\n    def smooth(self):\n        {SMOOTHS[case]}\n")
+    there = attempt(server, entrant(str(file)), recording, Limits(60.0, 1 << 30))
+    assert there.trial is not None
+    same(there.trial, run_trial(make(str(file)), recording))
+
+
+@pytest.fixture
+def told(server: EstimatorServer, recording: Recording, tmp_path: Path) -> Callable[..., Any]:
+    """What an estimator finds where it runs: the value of an expression, as JSON in the name of a diagnostic."""
+
+    def tell(expression: str, limits: Limits | None = None) -> Any:
+        file = tmp_path / "mine.py"
+        file.write_text(HEAD.format(reset="", update=f"diagnostics = {{json.dumps({expression}, default=str): 1.0}}"))
+        there = attempt(server, entrant(str(file)), recording, limits or Limits(60.0, 1 << 30))
+        assert there.status == "ok", there.reason
+        assert there.trial is not None
+        return json.loads(next(iter(there.trial.diagnostics)))
+
+    return tell
+
+
+def test_it_inherits_nothing_secret(told: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert told("dict(os.environ)").keys().isdisjoint({"SIMNAV_DATA", "PYTEST_CURRENT_TEST", "OLDPWD", "PWD"})
+    words = told("sys.orig_argv + sys.argv")
+    assert "harbour" not in " ".join(words)
+    assert "pytest" not in " ".join(words)
+    assert told("os.getcwd()") == str(tmp_path)  # the folder of its own file
+    opened = told("[os.readlink('/proc/self/fd/' + d) for d in os.listdir('/proc/self/fd') if os.path.exists("
+                  "'/proc/self/fd/' + d)]")  # fmt: skip
+    assert sorted({name.partition(":")[0] for name in opened}) == ["/dev/null", "pipe"]
+    assert len([name for name in opened if name.startswith("pipe")]) == 2
+    secret = "[type(o).__name__ for o in __import__('gc').get_objects() if type(o).__name__ in ('Recording', 'Unit')]"
+    assert told(secret) == []
+
+
+def test_global_generators_tell_nothing_and_are_the_same_everywhere(
+    told: Callable[..., Any], recording: Recording
+) -> None:
+    drawn = told("[random.random(), float(np.random.rand())]")
+    assert told("[random.random(), float(np.random.rand())]") == drawn
+    assert np.random.RandomState(recording.seed).rand() not in drawn
+    words = seed_words(recording, entrant("a"))
+    other = record(load("harbour-multipath").model_copy(update={"duration": 60.0}), 6)
+    assert len({tuple(words), tuple(seed_words(recording, entrant("b"))), tuple(seed_words(other, entrant("a")))}) == 3
+
+
+def ended(server: EstimatorServer, recording: Recording, tmp_path: Path, update: str, **limits: Any) -> Attempt:
+    file = tmp_path / "mine.py"
+    file.write_text(HEAD.format(reset="", update=update))
+    return attempt(server, entrant(str(file)), recording, Limits(**{"timeout": 60.0, "memory": 1 << 30, **limits}))
+
+
+def test_how_a_process_ended_is_told(server: EstimatorServer, recording: Recording, tmp_path: Path) -> None:
+    def end(update: str, **limits: Any) -> tuple[str, str]:
+        there = ended(server, recording, tmp_path, update, **limits)
+        return there.status, there.reason
+
+    assert end("os.kill(os.getpid(), 9)") == ("error", "the process died (SIGKILL) without an answer")
+    assert end("os._exit(3)") == ("error", "the process died (exit code 3) without an answer")
+    assert end("time.sleep(9.0)", timeout=0.5) == ("timeout", "stopped after 0.5 s")
+    status, reason = end("self.eaten = np.ones(40 << 20)", memory=100 << 20)
+    assert status == "out-of-memory"
+    assert reason
+    assert end("") == ("ok", "")  # and the server is as before
+
+
+def test_time_is_measured_outside(server: EstimatorServer, recording: Recording, tmp_path: Path) -> None:
+    """What an estimator does to its own clocks does not matter."""
+    update = "begun = time.monotonic()\n        while time.monotonic() < begun + 0.003: pass\n        "
+    update += "time.perf_counter_ns = time.perf_counter = lambda: 0"
+    there = ended(server, recording, tmp_path, update)
+    assert there.trial is not None
+    assert there.trial.update_seconds.min() > 0.003
+
+
+def test_what_can_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SIMNAV_CONFINEMENT", raising=False)
+    assert chosen_confinement("none") == "none"
+    assert chosen_confinement() == ("process" if bubblewrap.available() else "bubblewrap")
+    monkeypatch.setenv("SIMNAV_CONFINEMENT", "process")
+    assert chosen_confinement() == "process"
+    with pytest.raises(ValueError, match="confinement = 'prison' is unknown; there are auto, bubblewrap"):
+        chosen_confinement("prison")
+
+
+@pytest.mark.skipif(bool(bubblewrap.available()), reason=bubblewrap.available() or "it works")
+def test_a_sandbox_hides_results_and_has_no_network(recording: Recording, tmp_path: Path) -> None:
+    results, outside = tmp_path / "results", tmp_path / "outside"
+    results.mkdir()
+    outside.mkdir()
+    (results / "secret").touch()
+    server = EstimatorServer("bubblewrap", results)
+    try:
+        update = f"""
+        import socket
+        def writes(folder):
+            try:
+                open(folder + '/x', 'w').close()
+            except OSError:
+                return False
+            return True
+        found = [os.listdir({str(results)!r}), writes({str(outside)!r}), writes(os.environ['TMPDIR']),
+                 len(socket.if_nameindex()), sorted(int(p) for p in os.listdir('/proc') if p.isdigit())[0]]
+        diagnostics = {{json.dumps(found): 1.0}}"""
+        there = ended(server, recording, tmp_path, update)
+        assert there.status == "ok", there.reason
+        assert there.trial is not None
+        assert there.confinement == "bubblewrap"
+        listed, out, temporary, networks, first = json.loads(next(iter(there.trial.diagnostics)))
+        assert (listed, out, temporary, networks, first) == ([], False, True, 1, 1)
+        same(
+            attempt(server, entrant("ekf"), recording, Limits(60.0, 1 << 30)).trial,  # type: ignore[arg-type]
+            run_trial(make("ekf"), recording),
+        )
+    finally:
+        server.close()

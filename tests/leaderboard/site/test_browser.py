@@ -1,0 +1,321 @@
+"""The site in a browser: headless Chromium, from disk, without a network, on a screen and on a phone."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import shutil
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="there is no Chromium on this machine: apt-get install chromium"
+)
+
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+SCREEN, PHONE = 1400, 390
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as engine:
+        found = engine.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield found
+        found.close()
+
+
+class Visit:
+    """A tab of the browser; an error or a warning on its console is a failure."""
+
+    def __init__(self, browser: Any, folder: Path, width: int = SCREEN, scheme: str = "light"):
+        self.folder = folder
+        self.context = browser.new_context(
+            viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True, accept_downloads=True
+        )
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(10_000)
+        self.complaints: list[str] = []
+        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None)
+        self.page.on("pageerror", lambda e: self.complaints.append(str(e)))
+
+    def open(self, name: str) -> Any:
+        self.page.goto("about:blank")  # so that a new fragment loads the page again
+        self.page.goto(f"{(self.folder / name.partition('#')[0]).as_uri()}{''.join(name.partition('#')[1:])}")
+        self.page.wait_for_selector("body[data-ready]")
+        return self.page
+
+    def names(self, within: str = "[role=tabpanel]:not([hidden]) [data-table]") -> list[str]:
+        """What stands in the first column of names, row by row."""
+        cells = self.page.query_selector_all(f"{within} tbody th")
+        return [c.evaluate("c => (c.querySelector('a') ?? c).textContent.trim()") for c in cells]
+
+    def close(self) -> None:
+        self.context.close()
+        assert self.complaints == []
+
+
+@pytest.fixture
+def visit(browser: Any, folder: Path) -> Iterator[Visit]:
+    made = Visit(browser, folder)
+    yield made
+    made.close()
+
+
+def chart(page: Any, name: str) -> Any:
+    """A chart, drawn."""
+    page.locator(f"#chart-{name}").scroll_into_view_if_needed()
+    return page.wait_for_selector(f"#chart-{name} .vega[data-drawn] svg")
+
+
+PAGES = ("index.html", "{scenario}.html", "made-up-two-v3.html", "estimator-sw-fgo.html", "compare.html", "about.html")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(SCREEN, "light"), (PHONE, "dark")])
+def test_every_kind_of_page_fits_and_draws_all_charts(browser, folder, catalogued, width, scheme):
+    visit = Visit(browser, folder, width, scheme)
+    for name in PAGES:
+        page = visit.open(name.format(scenario=catalogued))
+        assert page.evaluate("document.documentElement.scrollWidth") == width, name
+        for place in page.query_selector_all(
+            "[role=tabpanel]:not([hidden]) figure.chart, section > .charts > figure.chart"
+        ):
+            drawn = chart(page, place.get_attribute("id").removeprefix("chart-"))
+            box = drawn.bounding_box()
+            assert box["width"] <= width
+            assert box["height"] > 40
+        text = page.evaluate("getComputedStyle(document.body).color")
+        assert (sum(map(int, text[4:-1].split(","))) > 384) == (scheme == "dark")
+    visit.close()
+
+
+def test_the_overview_opens_quickly_without_the_chart_library(browser, folder):
+    """The library is read when the first chart comes into view; the table does not wait for it."""
+    visit = Visit(browser, folder, PHONE)
+    visit.context.route("**/vega.js", lambda route: route.abort())
+    page = visit.open("index.html")
+    assert len(visit.names()) > 2
+    loaded = page.evaluate("performance.getEntriesByType('navigation')[0].domContentLoadedEventEnd")
+    assert loaded < 1000.0 * 3  # a second on an idle machine; tests share theirs
+    visit.context.close()
+
+
+def test_tables_sort_filter_and_search_and_the_address_keeps_it(visit, hostile):
+    page = visit.open("index.html#track=other")
+    assert visit.names() == ["sw-fgo", "ekf", hostile, "inertial", "oracle"]
+    page.click("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost] button")
+    assert visit.names()[0] == "ekf"  # the shortest name has the least time here
+    assert (
+        page.get_attribute("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost]", "aria-sort") == "ascending"
+    )
+    page.click("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost] button")
+    assert (
+        page.get_attribute("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost]", "aria-sort") == "descending"
+    )
+    descending = visit.names()
+    panel = page.locator("[role=tabpanel]:not([hidden]) [data-table]")
+    panel.locator("select[aria-label='Only Family']").select_option("Factor graph")
+    assert visit.names() == ["sw-fgo"]
+    panel.locator("summary").click()
+    panel.get_by_label("Worst run").check()
+    address = page.url.partition("#")[2]
+    assert {"track=other", "other.sort=-cost", "other.family=Factor+graph"} <= set(address.split("&"))
+    page = visit.open(f"index.html#{address}")
+    assert visit.names() == ["sw-fgo"]
+    assert page.query_selector("#track-other th[data-key=worst]") is not None
+    page.locator("#track-other [data-table] select").select_option("")
+    assert visit.names() == descending
+    page.locator("#track-other [data-table] input[type=search]").fill("sliding window")
+    assert visit.names() == ["sw-fgo"]  # found by its description
+    assert "1 of 5 rows" in page.inner_text("#track-other [data-table] [role=status]")
+
+
+def test_tabs_are_chosen_by_keyboard_and_link(visit):
+    page = visit.open("index.html")
+    tabs = page.get_by_role("tab")
+    first = tabs.nth(0)
+    first.focus()
+    page.keyboard.press("ArrowRight")
+    assert tabs.nth(1).get_attribute("aria-selected") == "true"
+    assert page.evaluate("document.activeElement.getAttribute('role')") == "tab"
+    assert page.locator("[role=tabpanel]:not([hidden])").count() == 1
+    assert "track=other" in page.url
+
+
+def test_headings_and_charts_explain_themselves_on_hover(visit, catalogued):
+    page = visit.open("index.html#track=other")
+    page.hover("#track-other [data-table] th[data-key=tier] button")
+    assert "cannot be told apart" in page.inner_text("#tip")
+    page.mouse.move(0, 0)
+    page.focus("#track-other [data-table] th[data-key=coverage] button")
+    assert "95 % ellipse" in page.inner_text("#tip")
+    page = visit.open(f"{catalogued}.html")
+    drawn = chart(page, "rmse")
+    drawn.query_selector_all("g.mark-symbol path")[0].hover(force=True)
+    page.wait_for_selector("#vg-tooltip-element.visible")
+    assert "Horizontal RMSE" in page.inner_text("#vg-tooltip-element")
+
+
+def test_rows_of_charts_are_switched_on_and_off(visit, catalogued):
+    page = visit.open(f"{catalogued}.html")
+
+    def curves() -> int:
+        chart(page, "horizontal")
+        page.wait_for_timeout(300)
+        return len(page.query_selector_all("#chart-horizontal svg g.mark-line path[stroke]"))
+
+    before = curves()
+    page.click(".chip[data-row=ekf]")
+    assert curves() == before - 1
+    page.locator("[data-rows] select").select_option("oracle")
+    assert curves() == before
+    assert "oracle" in page.url
+    assert "ekf" not in page.evaluate("new URLSearchParams(location.hash.slice(1)).get('rows').split('|')")
+
+
+def test_one_run_has_its_track_and_the_command_that_repeats_it(visit, catalogued):
+    page = visit.open(f"{catalogued}.html#row=sw-fgo&seed=0")
+    page.locator("[data-run]").scroll_into_view_if_needed()
+    chart(page, "track")
+    assert page.inner_text("[data-run] pre") == f"simnav run {catalogued} --seed 0 -e sw-fgo --plot run.svg"
+    other = next(s for s in range(1, 12) if s not in page.evaluate("simnav.page.runs.seeds"))
+    page.locator("[data-run] select[aria-label=Run]").select_option(str(other))
+    page.wait_for_function(f"document.querySelector('[data-run] pre').textContent.includes('--seed {other} ')")
+    assert page.locator("[data-run] .charts").is_hidden()
+    page.get_by_text("All runs of this estimator").click()
+    assert len(visit.names("[data-run] details")) == 12
+
+
+def paired(results, a: str, b: str) -> dict[str, list[float]]:
+    by = {(r.scenario, r.seed, r.estimator): r.scores["horizontal_rmse"] for r in results if r.status == "ok"}
+    found: dict[str, list[float]] = {}
+    for (scenario, seed, label), value in by.items():
+        if label == a and (scenario, seed, b) in by:
+            found.setdefault(scenario, []).append(math.log(value / by[scenario, seed, b]))
+    return found
+
+
+def test_two_rows_are_compared_run_by_run(visit, results):
+    """Against the same figures in Python; the p-value against all flips of the signs."""
+    page = visit.open("compare.html#a=sw-fgo&b=ekf")
+    page.wait_for_selector("[data-table] tbody tr")
+    found = paired(results, "sw-fgo", "ekf")
+    ratio = math.exp(sum(sum(d) / len(d) for d in found.values()) / len(found))
+    text = page.inner_text("[data-verdict]")
+    assert f"{sum(map(len, found.values()))} runs" in text
+    assert f"{100 * (1 - ratio):.3g} % smaller" in text
+    chart(page, "pairs")
+    rows = page.evaluate(
+        "Object.fromEntries(simnav.tables.main.given.rows.map((r) => [r.scenario, [r.ratio, r.p, r.wins]]))"
+    )
+    for scenario, differences in found.items():
+        n = len(differences)
+        assert rows[scenario][0] == pytest.approx(math.exp(sum(differences) / n), rel=1e-3)
+        assert rows[scenario][2] == pytest.approx(sum(d < 0 for d in differences) / n)
+        observed = abs(sum(differences)) * (1 - 1e-4)
+        flips = [abs(sum(s * d for s, d in zip(signs, differences))) for signs in product((-1, 1), repeat=n)]
+        assert rows[scenario][1] == pytest.approx(sum(f >= observed for f in flips) / len(flips), abs=2e-3)
+    page.click("text=Swap")
+    page.wait_for_function("document.querySelector('[data-verdict]').textContent.includes('of ekf is')")
+    assert "larger" in page.inner_text("[data-verdict]")
+    assert "a=ekf" in page.url
+
+
+def test_random_sign_flips_agree_with_all_of_them(visit):
+    """Where there are more runs than all flips can be taken of."""
+    page = visit.open("compare.html")
+    few, many = page.evaluate(
+        """() => {
+          const x = [0.3, -0.1, 0.25, 0.4, -0.2, 0.15, 0.05, 0.3, -0.05, 0.2, 0.1, 0.15, 0.35];
+          return [simnav.signflips([x]), simnav.signflips([[...x, 1e-9]])];
+        }"""
+    )
+    assert 0.0 < few < 0.05
+    assert many == pytest.approx(few, abs=0.008)
+
+
+def test_weights_of_scenarios_move_the_places(visit):
+    page = visit.open("index.html#track=other")
+    table = "#track-other [data-weights]"
+    page.locator(f"{table} input[type=number]").nth(0).scroll_into_view_if_needed()
+    scores = page.evaluate("simnav.page.tracks.find((t) => t.key === 'other').ratios")
+    page.locator(f"{table} input[type=number]").nth(0).fill("0")
+    expected = sorted(scores, key=lambda row: scores[row]["made-up-two-v3"])
+    assert visit.names(table) == expected
+    assert "other.weights=0%2C1" in page.url
+
+
+def test_every_table_is_written_as_csv_and_latex(visit, hostile):
+    page = visit.open("index.html#track=other")
+    panel = page.locator("#track-other [data-table]")
+    with page.expect_download() as waiting:
+        panel.get_by_role("button", name="CSV").click()
+    rows = list(csv.DictReader(io.StringIO(Path(waiting.value.path()).read_text())))
+    assert [row["Estimator"] for row in rows] == visit.names()
+    assert rows[2]["Estimator"] == hostile
+    assert float(rows[0]["× reference"]) > 1.0
+    with page.expect_download() as waiting:
+        panel.get_by_role("button", name="LaTeX").click()
+    text = Path(waiting.value.path()).read_text()
+    assert waiting.value.suggested_filename.endswith(".tex")
+    assert text.count("\\\\") == len(rows) + 1
+    assert "\\{\\{ 7 * 7 \\}\\}" in text
+    assert "simnav-bench 1.0" in text  # where the table comes from
+
+
+def test_header_and_names_stay_in_view_on_a_phone(browser, folder):
+    visit = Visit(browser, folder, PHONE)
+    page = visit.open("index.html#track=other")
+    scroll = page.locator("#track-other [data-table] .scroll")
+    scroll.evaluate("s => { s.scrollLeft = 300; }")
+    left = scroll.bounding_box()["x"]
+    name = page.locator("#track-other [data-table] tbody th").first.bounding_box()
+    assert abs(name["x"] - left) < 12
+    covering = page.evaluate(
+        f"document.elementFromPoint({name['x'] + 20}, {name['y'] + name['height'] / 2}).closest('th, td').tagName"
+    )
+    assert covering == "TH"  # nothing lies over the name
+    visit.close()
+
+
+def test_links_lead_somewhere(visit):
+    page = visit.open("index.html#track=other")
+    page.locator("#track-other [data-table]").get_by_role("link", name="sw-fgo").click()
+    page.wait_for_selector("body[data-ready]")
+    assert page.inner_text("h1") == "sw-fgo"
+    page.get_by_role("link", name="All runs").click()
+    page.wait_for_selector("[data-table] tbody tr")
+    assert "sw-fgo" in page.inner_text("[data-verdict]")
+    page.locator("[data-table]").get_by_role("link").first.click()
+    page.wait_for_selector("body[data-ready]")
+    assert page.evaluate("simnav.page.kind") == "scenario"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_has_no_serious_finding(browser, folder, catalogued, scheme):
+    """All rules in light colours, contrast in dark ones."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed").Axe()
+    options: dict[str, Any] = {"preload": False}  # it would read the style sheet again, which a file cannot be
+    if scheme == "dark":
+        options["runOnly"] = ["color-contrast"]
+    visit = Visit(browser, folder, scheme=scheme)
+    for name in ("index.html", "{scenario}.html", "estimator-sw-fgo.html", "compare.html", "about.html"):
+        page = visit.open(name.format(scenario=catalogued))
+        for drawn in page.query_selector_all("[role=tabpanel]:not([hidden]) figure.chart")[:2]:
+            chart(page, drawn.get_attribute("id").removeprefix("chart-"))
+        # One page with the inside of its charts, which are many elements of few kinds, and take long.
+        context = None if name == "compare.html" else {"exclude": [[".vega svg"]]}
+        found = [
+            (v["id"], v["nodes"][0]["html"][:200], v["nodes"][0]["failureSummary"][:300])
+            for v in axe.run(page, context=context, options=options).response["violations"]
+            if v["impact"] in ("serious", "critical")
+        ]
+        assert found == [], name
+    visit.close()
