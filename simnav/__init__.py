@@ -34,6 +34,8 @@ if TYPE_CHECKING:
         rescore,
         run,
         sweep,
+        tune,
+        verify,
     )
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
@@ -104,6 +106,8 @@ __all__ = [
     "run_trial",
     "score",
     "sweep",
+    "tune",
+    "verify",
 ]
 
 # Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
@@ -148,6 +152,8 @@ _HOMES = {
         "rescore",
         "run",
         "sweep",
+        "tune",
+        "verify",
     ),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}
@@ -178,6 +184,32 @@ def _register_scenarios() -> None:
                 vector_entry_point="simnav.environment:NavigationVectorEnv",
                 kwargs={"scenario": header.id},
             )
+        _register_tasks(header.gym_id, header.id, recorded=header.recorded)
+
+
+# Learning tasks are of the second floor: their entry points are texts, so that the library does not import them.
+_LEARNING = "simnav.estimators.learning"
+
+
+def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
+    """Give the learning tasks over a scenario their Gymnasium ids."""
+    name, _, version = gym_id.rpartition("-v")
+    for task in ("Tuning", "Detection", "Correction"):
+        task_id = f"{name}-{task}-v{version}"
+        if task_id not in _registry:
+            _register_env(
+                id=task_id,
+                entry_point=f"{_LEARNING}.environment:FilterTaskEnv",
+                vector_entry_point=f"{_LEARNING}.vector:FilterTaskVectorEnv",
+                kwargs={"scenario": scenario, "task": task},
+            )
+    task_id = f"{name}-Guidance-v{version}"
+    if not recorded and task_id not in _registry:
+        _register_env(
+            id=task_id,
+            entry_point=f"{_LEARNING}.guidance:GuidanceEnv",
+            kwargs={"scenario": scenario},
+        )
 
 
 _register_scenarios()

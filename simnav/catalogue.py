@@ -3,7 +3,7 @@
 A pack is an importable package that holds scenario files (``*.toml``, and those of families in ``families/*.toml``);
 installing it is all it takes. Only the heads of the files are read here, because ``import simnav`` asks for them to
 register its Gymnasium ids. A broken pack or file is named in a warning and
-harms nobody else.
+does not affect the others.
 """
 
 from __future__ import annotations
@@ -52,6 +52,8 @@ class Header:
         Parameters are chosen on it; campaigns leave it out unless it is named.
     path : Path
         Path of the TOML file.
+    recorded : bool
+        Whether the measurements come from a log.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Header:
     group: str
     training: bool
     path: Path
+    recorded: bool = False
 
     @property
     def id(self) -> str:
@@ -161,6 +164,7 @@ def _header(path: Path) -> Header | None:
         group=str(table.get("group", "other")),
         training=table.get("training") is True,
         path=path,
+        recorded="log" in table,
     )
 
 

@@ -136,11 +136,16 @@ class Simulator:
         self._layers = build_layers(scenario.faults, root)
         self._label_imu = any("imu" in f.instruments for f in scenario.faults)
 
-    def steer_by(self, north: float, east: float) -> None:
-        """Closed loop: from now on the vessel is steered by a position that is off by this much [m]."""
+    def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
+        """Closed loop: from now on the vessel is steered by a position [m] and a heading [rad] that are off by this."""
+        self.world.steer_by(north, east, heading)
+
+    @property
+    def world(self) -> World:
+        """The world of the run; ValueError where several runs share one truth, for then it cannot be steered."""
         if self._world is None:
             raise ValueError("runs that share one truth cannot be steered")
-        self._world.steer_by(north, east)
+        return self._world
 
     def advance(self, until: float) -> Block:
         """What happens from now to a time.

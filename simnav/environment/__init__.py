@@ -2,7 +2,9 @@
 
 `NavigationEnv` (``navigation.py``) is an adapter over the same sources of data that every campaign uses,
 `NavigationVectorEnv` (``vector.py``) several of them side by side, and `EstimatorAgent` (``agent.py``) the bridge the
-other way, from an estimator to an agent. ``rendering.py`` draws the chart of a run.
+other way, from an estimator to an agent. ``wrappers.py`` holds relative actions and observations of order one,
+``seeds.py`` the seeds of training, and ``rendering.py`` draws the chart of a run. Tasks around a running filter are in
+`simnav.estimators.learning`.
 """
 
 from __future__ import annotations
@@ -10,13 +12,16 @@ from __future__ import annotations
 from simnav.environment.agent import EstimatorAgent, unpack
 from simnav.environment.navigation import REWARDS, NavigationEnv, Observation, checked_action
 from simnav.environment.vector import NavigationVectorEnv, spawn_seeds
+from simnav.environment.wrappers import NormaliseObservation, RelativeAction
 
 __all__ = [
     "REWARDS",
     "EstimatorAgent",
     "NavigationEnv",
     "NavigationVectorEnv",
+    "NormaliseObservation",
     "Observation",
+    "RelativeAction",
     "checked_action",
     "spawn_seeds",
     "unpack",

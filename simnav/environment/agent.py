@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from simnav.estimator import Estimator
 from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurement, Measurements
@@ -50,6 +51,8 @@ class EstimatorAgent:
     ----------
     estimator : Estimator
         Not one that is told the truth (``reference``): the environment does not tell it.
+    observation_space : gymnasium.spaces.Dict, optional
+        That of the `NavigationEnv`: then flat observations (Gymnasium's ``FlattenObservation``) are taken, too.
 
     Attributes
     ----------
@@ -62,13 +65,13 @@ class EstimatorAgent:
         If the estimator is a reference that needs the truth.
     """
 
-    def __init__(self, estimator: Estimator):
+    def __init__(self, estimator: Estimator, observation_space: spaces.Dict | None = None):
         if estimator.reference:
             raise ValueError(
                 f"estimator {estimator.name or type(estimator).__name__!r} is a reference that is told the truth; "
                 "an environment does not tell it"
             )
-        self.estimator = estimator
+        self.estimator, self._space = estimator, observation_space
         self.estimate: Estimate | None = None
 
     def reset(self, info: Mapping[str, Any]) -> None:
@@ -79,18 +82,27 @@ class EstimatorAgent:
         self.estimate = None
         self.estimator.reset(start, self._instruments)
 
-    def act(self, observation: Mapping[str, Any]) -> Array:
+    def act(self, observation: Mapping[str, Any] | Array) -> Array:
         """The action: the estimate, with the initial state in place of what is not estimated.
 
         Parameters
         ----------
-        observation : dict
+        observation : dict or array
             What the environment gave for the step.
 
         Returns
         -------
         (3, 3) array
+
+        Raises
+        ------
+        ValueError
+            If the observation is flat, and the agent does not know its space.
         """
+        if not isinstance(observation, Mapping):
+            if self._space is None:
+                raise ValueError("a flat observation needs the space: EstimatorAgent(estimator, observation_space)")
+            observation = spaces.unflatten(self._space, np.asarray(observation))
         self.estimate = estimate = self.estimator.update(unpack(observation, self._instruments))
         vectors = (estimate.position, estimate.velocity, estimate.attitude)
         given = np.stack([self._start[i] if v is None else v for i, v in enumerate(vectors)])

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from simnav.recording import AidStream, Block
     from simnav.scenario import Scenario
 
-__all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action"]
+__all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action", "most_samples"]
 
 Observation = dict[str, Any]
 
@@ -61,7 +61,7 @@ class _Stretch:
     intervals: Array  # (S, 2)
     columns: dict[str, dict[str, NDArray[Any]]]  # instrument -> entry -> (S, K, ...)
     truth: Array  # (S, 3, 3): rows position, velocity, attitude
-    rows: list[list[float]]  # latitude, longitude, height, metres per radian of latitude and of longitude
+    rows: list[list[float]]  # latitude, longitude, height, metres per radian of latitude and of longitude, heading
     aids: dict[str, AidStream]
     cuts: dict[str, NDArray[np.intp]]  # instrument -> (S + 1,) bounds of each step's measurements in its stream
 
@@ -107,7 +107,9 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
     reveal_truth : bool
         Put the truth into ``info``.
     closed_loop : bool
-        The vessel steers by the estimate: a wrong one puts it off its track. Simulated scenarios only.
+        The vessel steers by the estimate, position and heading: a wrong one puts it off its track. For its waypoints it
+        steers from where it believes to be, and in all other manoeuvres it keeps to the planned track. Simulated
+        scenarios only.
     render_mode : {"human", "rgb_array"}, optional
         Show the chart in a window, or return it as an array; default: no chart.
 
@@ -146,7 +148,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self._weights = _weights(reward)
         # The spaces are fixed: they hold what any run of the scenario can bring.
         possible = scenario.extremes()
-        most = [_most_samples(s) for s in possible]
+        most = [most_samples(s) for s in possible]
         self._most = {name: max(m.get(name, 0) for m in most) for m in most for name in m}
         self._widths = {
             name: len(KINDS[sheet.kind].values) for s in possible for name, sheet in s.instruments_sheet().items()
@@ -187,8 +189,9 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         start: InitialState = self._source.start
         if self.closed_loop:
             truth = self._source.initial_truth
-            row = _rows(truth.position)[0]
-            self._source.steer_by(*_horizontal(start.position.tolist(), row))
+            row = _rows(truth.position, truth.attitude)[0]
+            heading = math.remainder(float(start.attitude[2]) - row[5], math.tau)
+            self._source.steer_by(*_horizontal(start.position.tolist(), row), heading)
         if not self._load():
             raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
         if self.render_mode is not None:
@@ -227,7 +230,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         if self._chart is not None:
             self._draw(self._chart, estimate)
         if self.closed_loop:
-            self._source.steer_by(north, east)
+            self._source.steer_by(north, east, math.remainder(estimate[8] - row[5], math.tau))
         self._row += 1
         if self._row < len(stretch.rows) or self._load():
             return self._observation(), reward, False, False, self._reveal({})
@@ -346,7 +349,7 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
 # ------------------------------------------------------------------------------------------------- spaces
 
 
-def _most_samples(scenario: Scenario) -> dict[str, int]:
+def most_samples(scenario: Scenario) -> dict[str, int]:
     """Per instrument (and ``imu``) the most samples that one step can bring."""
     instruments, step = scenario.instruments_sheet(), scenario.step
     rates = {name: sheet.rate for name, sheet in instruments.items()}
@@ -454,15 +457,15 @@ def _pack(block: Block, begin: float, most: Mapping[str, int]) -> _Stretch:
             out[where] = a[: cut[-1]]
     intervals = np.stack([np.concatenate(([begin], truth.time[:-1])), truth.time], axis=1)
     states = np.stack([truth.position, truth.velocity, truth.attitude], axis=1)
-    return _Stretch(intervals, columns, states, _rows(truth.position), block.aids, cuts)
+    return _Stretch(intervals, columns, states, _rows(truth.position, truth.attitude), block.aids, cuts)
 
 
-def _rows(position: Array) -> list[list[float]]:
-    """Per position: latitude, longitude, height, and metres per radian of latitude and of longitude."""
+def _rows(position: Array, attitude: Array) -> list[list[float]]:
+    """Per state: latitude, longitude, height, metres per radian of latitude and of longitude, and heading."""
     meridian, prime_vertical = principal_radii(position[:, 0])
     height = np.nan_to_num(position[:, 2])  # a log may have no reference of it
     scale = np.stack([meridian + height, (prime_vertical + height) * np.cos(position[:, 0])], axis=1)
-    rows: list[list[float]] = np.concatenate([position, scale], axis=1).tolist()
+    rows: list[list[float]] = np.concatenate([position, scale, attitude[:, 2:]], axis=1).tolist()
     return rows
 
 

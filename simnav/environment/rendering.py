@@ -24,6 +24,8 @@ _log = logging.getLogger("simnav")
 
 _INK, _GRID = "#33414e", "#dde3e8"
 _RECENT = 200
+#: 95 % quantile of chi-square with two degrees of freedom.
+_ELLIPSE = 5.991
 _TRUTH, _ESTIMATE, _FIX, _FAULT = "#33414e", "#d1495b", "#6aa9d8", "#edae49"
 
 
@@ -103,6 +105,7 @@ class Chart:
         self._origin: Array | None = None
         self._pending: list[tuple[Array, NDArray[np.bool_]]] = []
         self._now = (0.0, 0.0)
+        self._ellipse: Array | None = None
         self._window: Any = None
         self._figure: Any = None
         self._background: Any = None  # axes, ticks and words: drawn anew only when the limits change
@@ -121,7 +124,7 @@ class Chart:
             trace.clear()
         for recent in self._recent:
             recent.clear()
-        self._origin, self._pending, self._now = None, [], (0.0, 0.0)
+        self._origin, self._pending, self._now, self._ellipse = None, [], (0.0, 0.0), None
         self._view: tuple[Array, Array] | None = None
         self._span, self._top = 0.0, 0.0
 
@@ -138,7 +141,7 @@ class Chart:
         if len(position) and not self._silent:
             self._pending.append((position, faulty))
 
-    def add(self, time: float, truth: Array, estimate: Array) -> None:
+    def add(self, time: float, truth: Array, estimate: Array, *, covariance: Array | None = None) -> None:
         """Add the end of a step; nothing where a log has no reference.
 
         Parameters
@@ -147,9 +150,12 @@ class Chart:
             End of the step [s].
         truth, estimate : (3,) array
             Geodetic [rad, rad, m].
+        covariance : (2, 2) array, optional
+            Of the estimate, north and east [m^2]: drawn as the ellipse that should hold the truth in 95 of 100 cases.
         """
         if self._silent:
             return
+        self._ellipse = None if covariance is None else _ellipse(covariance)
         pending, self._pending = self._pending, []
         if np.isnan(truth[:2]).any():
             return
@@ -223,6 +229,7 @@ class Chart:
         self._close.tick_params(length=0, labelbottom=False, labelleft=False)
         chart.plot([0], [0], color=_TRUTH, marker="o", markersize=5, markerfacecolor="white", linestyle="none")
         self._on_chart, self._on_close = _track(chart), _track(close)
+        (self._outline,) = close.plot([], [], color=_ESTIMATE, linewidth=1.0)
         (self._error_line,) = below.plot([], [], color=_ESTIMATE, linewidth=1.2)
         below.set_ylabel("horizontal error [m]", fontsize=9, color=_INK)
         self._figure.legend(
@@ -241,7 +248,7 @@ class Chart:
         self._width = self._figure.text(0.875, 0.272, "", fontsize=9, color=_INK, ha="center")
         # dots first: the lines are drawn over them
         self._moving = [a for track in (self._on_chart, self._on_close) for a in (*track[2:4], *track[:2], *track[4:])]
-        self._moving += [self._error_line, self._reading, self._width]
+        self._moving += [self._outline, self._error_line, self._reading, self._width]
         for artist in self._moving:
             artist.set_animated(self._window is None)
 
@@ -266,6 +273,10 @@ class Chart:
             self._width.set_text(f"close-up, {2 * half:g} m")
         for artist, trace in zip(self._on_close, (*recent, recent[0][-1:], recent[1][-1:]), strict=True):
             artist.set_data((trace[:, 0] - here[0]) / half, (trace[:, 1] - here[1]) / half)
+        outline = np.empty((0, 2))
+        if self._ellipse is not None and len(truth):
+            outline = (recent[1][-1] + self._ellipse - here) / half
+        self._outline.set_data(outline[:, 0], outline[:, 1])
         return changed
 
     def _limits(self, truth: Array, estimate: Array) -> bool:
@@ -320,6 +331,15 @@ def _track(axes: Any) -> list[Any]:
         {"color": _ESTIMATE, "markersize": 5, **dot},
     )
     return [axes.plot([], [], **style)[0] for style in styles]
+
+
+def _ellipse(covariance: Array) -> Array:
+    """(n, 2) outline, east and north [m], that holds 95 in 100 of a normal distribution over north and east."""
+    values, axes = np.linalg.eigh(covariance)
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
+    circle = np.sqrt(_ELLIPSE * np.maximum(values, 0.0)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    outline: Array = (circle @ axes.T)[:, ::-1]
+    return outline
 
 
 def _round_up(length: float) -> float:

@@ -1,8 +1,9 @@
 """The vector form of the environment: several independent runs of one scenario side by side.
 
-Gymnasium's own vector environments give sub-environment i the seed ``seed + i``, so that neighbouring base seeds share
-most of their runs, and reset a finished run of their own accord. Here an integer seed spawns independent seeds, a list
-assigns them, and a run that is over stands still until it is reset.
+It behaves like Gymnasium's own vector environments: an integer seed is ``seed + i`` for sub-environment i, and a run
+that is over begins anew with the next step. Neighbouring base seeds then share most of their runs: who compares runs of
+different base seeds asks for ``independent_seeds``. Who follows n episodes to their ends takes
+`AutoresetMode.DISABLED`: episodes that are assigned beforehand do not favour those that end first.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from simnav.types import Array
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["NavigationVectorEnv", "spawn_seeds"]
+__all__ = ["NavigationVectorEnv", "autoreset_of", "reset_mask", "seeds_of", "spawn_seeds"]
 
 
 def spawn_seeds(seed: int, n: int) -> list[int]:
@@ -45,12 +46,58 @@ def spawn_seeds(seed: int, n: int) -> list[int]:
     return [int(child.generate_state(1, np.uint64)[0] >> np.uint64(1)) for child in children]
 
 
+def autoreset_of(mode: AutoresetMode | str) -> AutoresetMode:
+    """A mode by itself, its name or its value; ValueError where it is none."""
+    for each in AutoresetMode:
+        if mode in (each, each.name, each.value):
+            return each
+    raise ValueError(f"autoreset_mode is one of {', '.join(each.name for each in AutoresetMode)}, not {mode!r}")
+
+
+def seeds_of(seed: int | Sequence[int | None] | None, n: int, independent: bool) -> list[int | None]:
+    """The seeds of n runs.
+
+    Parameters
+    ----------
+    seed : int or sequence of int, optional
+        One integer is ``seed + i`` for run i, or spawns; a sequence assigns them; None in it, or none at all: None.
+    n : int
+    independent : bool
+        Whether an integer spawns (`spawn_seeds`).
+
+    Raises
+    ------
+    ValueError
+        If there are too few or too many.
+    """
+    if isinstance(seed, (int, np.integer)):
+        return list(spawn_seeds(int(seed), n)) if independent else [int(seed) + i for i in range(n)]
+    given: list[int | None] = [None] * n if seed is None else [None if s is None else int(s) for s in seed]
+    if len(given) != n:
+        raise ValueError(f"{n} runs need as many seeds, not {len(given)}")
+    return given
+
+
+def reset_mask(options: dict[str, Any] | None, n: int) -> NDArray[np.bool_]:
+    """The runs to begin anew, from the options of a reset: all by default.
+
+    Raises
+    ------
+    ValueError
+        If ``reset_mask`` is not an (n,) bool array with at least one True.
+    """
+    if options is None or "reset_mask" not in options:
+        return np.ones(n, dtype=bool)
+    mask = np.asarray(options["reset_mask"])
+    if mask.shape != (n,) or mask.dtype != np.bool_ or not mask.any():
+        raise ValueError(f"reset_mask is an ({n},) bool array with at least one True, not {options['reset_mask']!r}")
+    return mask
+
+
 class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
     """n independent runs of one scenario, stepped together.
 
-    Observations, actions and rewards are those of `NavigationEnv` with a leading axis of n. Nothing resets itself
-    (`AutoresetMode.DISABLED`): a run that is over stands still (empty observation, reward 0, truncated) until
-    ``reset(options={"reset_mask": mask})`` begins it anew, so that n episodes can all be followed to their ends.
+    Observations, actions and rewards are those of `NavigationEnv` with a leading axis of n.
 
     Parameters
     ----------
@@ -58,17 +105,33 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         A scenario, its name in the catalogue, or a TOML file.
     num_envs : int
         Number n of runs.
+    autoreset_mode : AutoresetMode or str
+        ``NEXT_STEP`` (as of Gymnasium: the step after the last one begins a new run, and its action is not read),
+        ``SAME_STEP`` (the last step returns the new run's observation, and its own in ``final_obs``), or ``DISABLED``
+        (a run that is over stands still, with an empty observation, reward 0 and truncated, until
+        ``reset(options={"reset_mask": mask})`` begins it anew).
+    independent_seeds : bool
+        What an integer seed becomes: False: ``seed + i`` for run i, as in Gymnasium; True: `spawn_seeds`.
     **options
         As for `NavigationEnv`.
     """
 
-    def __init__(self, scenario: Scenario | str | Path, num_envs: int = 1, **options: Any):
+    def __init__(
+        self,
+        scenario: Scenario | str | Path,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        independent_seeds: bool = False,
+        **options: Any,
+    ):
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is a positive integer, not {num_envs!r}")
         first = NavigationEnv(scenario, **options)
         self.envs = [first, *(NavigationEnv(first.scenario, **options) for _ in range(num_envs - 1))]
         self.num_envs = num_envs
-        self.metadata = {**NavigationEnv.metadata, "autoreset_mode": AutoresetMode.DISABLED}
+        self.autoreset_mode, self._independent = autoreset_of(autoreset_mode), independent_seeds
+        self.metadata = {**NavigationEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = first.render_mode
         self.single_observation_space = first.observation_space
         self.single_action_space = first.action_space
@@ -88,8 +151,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         Parameters
         ----------
         seed : int or sequence of int, optional
-            One integer spawns a seed for each run (`spawn_seeds`); a sequence assigns them, None in it or none at all:
-            drawn from `np_random`.
+            One integer is ``seed + i`` for run i, or spawns independent seeds (see the class); a sequence assigns them;
+            None in it or none at all: each run draws one of its own.
         options : dict, optional
             ``reset_mask``: (n,) bool array, the runs to begin anew; the others go on.
 
@@ -104,8 +167,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         ValueError
             If seeds or mask do not fit.
         """
-        seeds = self._seeds(seed)
-        mask = self._mask(options)
+        seeds = seeds_of(seed, self.num_envs, self._independent)
+        mask = reset_mask(options, self.num_envs)
         if not self._last and not mask.all():
             raise gymnasium.error.ResetNeeded("the first reset begins all runs: leave reset_mask out")
         self._last = self._last or [{} for _ in self.envs]
@@ -131,7 +194,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         gymnasium.error.ResetNeeded
             If all runs are over.
         """
-        if self._over.all():
+        if not self._last or (self.autoreset_mode == AutoresetMode.DISABLED and self._over.all()):
             raise gymnasium.error.ResetNeeded("all runs are over or have not begun: call reset() first")
         if len(actions) != self.num_envs:
             raise ValueError(f"actions are an ({self.num_envs}, 3, 3) array, one for each run, not {len(actions)}")
@@ -140,16 +203,25 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
                 checked_action(actions[i])
             except ValueError as error:
                 raise ValueError(f"run {i}: {error}") from None
-        rewards = np.zeros(self.num_envs)
+        rewards, truncated = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         infos: dict[str, Any] = {}
         for i, env in enumerate(self.envs):
-            if self._over[i]:
+            if not self._over[i]:
+                self._last[i], rewards[i], _, truncated[i], info = env.step(actions[i])
+                self._over[i] = truncated[i]
+                if truncated[i] and self.autoreset_mode == AutoresetMode.SAME_STEP:
+                    info = {**info, "final_obs": self._last[i], "final_info": info}
+                    self._last[i], begun = env.reset()
+                    info, self._over[i] = {**info, **begun}, False
+            elif self.autoreset_mode == AutoresetMode.NEXT_STEP:
+                self._last[i], info = env.reset()
+                self._over[i] = False
+            else:
+                truncated[i] = True
                 continue
-            self._last[i], rewards[i], _, truncated, info = env.step(actions[i])
-            self._over[i] = truncated
             if info:
                 infos = self._add_info(infos, info, i)
-        return self._batch(), rewards, np.zeros(self.num_envs, dtype=bool), self._over.copy(), infos
+        return self._batch(), rewards, np.zeros(self.num_envs, dtype=bool), truncated, infos
 
     def render(self) -> tuple[Any, ...] | None:
         """The frames of all runs."""
@@ -159,25 +231,6 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         """Close all runs."""
         for env in self.envs:
             env.close()
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int]:
-        if isinstance(seed, (int, np.integer)):
-            super().reset(seed=int(seed))
-            return spawn_seeds(int(seed), self.num_envs)
-        given = [None] * self.num_envs if seed is None else list(seed)
-        if len(given) != self.num_envs:
-            raise ValueError(f"{self.num_envs} runs need as many seeds, not {len(given)}")
-        return [int(self.np_random.integers(2**63 - 1)) if s is None else int(s) for s in given]
-
-    def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
-        if options is None or "reset_mask" not in options:
-            return np.ones(self.num_envs, dtype=bool)
-        mask = np.asarray(options["reset_mask"])
-        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
-            raise ValueError(
-                f"reset_mask is an ({self.num_envs},) bool array with at least one True, not {options['reset_mask']!r}"
-            )
-        return mask
 
     def _batch(self) -> Observation:
         """Stack the runs' last observations; always new arrays."""

@@ -31,7 +31,10 @@ ERROR_NORTH, ERROR_EAST = 46, 47
 ROLL, PITCH = 48, 49
 COS_PSI, SIN_PSI, COS_GAMMA, SIN_GAMMA = range(50, 54)
 WATER_NORTH, WATER_EAST = 54, 55
-STATE = 56
+# In closed loop: error of the heading that the vessel is steered by, and what is steered to come back to the track.
+# In a turn for a time, where the rate is commanded and not the heading: how much of both has been turned already.
+ERROR_HEADING, TO_TRACK, TURNED = 56, 57, 58
+STATE = 59
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
 # ... and in the parameters.
 DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)
@@ -95,7 +98,7 @@ def _waypoint(points, j, relative, x):  # type: ignore[no-untyped-def]
 @kernel()
 def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
     """Walk the manoeuvre table; leave the references in the state and return the commanded yaw rate."""
-    psi = x[PSI]
+    psi = x[PSI] + x[ERROR_HEADING] - x[TO_TRACK]
     # Where the heading would come to rest if the rate were commanded to zero now.
     rest = psi + 2.0 * p[TAU_R] * x[R] + p[TAU_R] ** 2 * x[DR]
     direct = inf  # a rate commanded past the heading loop
@@ -140,13 +143,19 @@ def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
             elif done:
                 x[PSI_REFERENCE] = rest
             else:
-                direct = x[SEGMENT_SIGN] * rate
+                extra = (x[TO_TRACK] - x[ERROR_HEADING] - x[TURNED]) / (2.0 * p[TAU_R])
+                extra = min(max(extra, -p[TURN_RATE]), p[TURN_RATE])
+                x[TURNED] += extra * p[DT]
+                direct = x[SEGMENT_SIGN] * rate + extra
         elif kind == ZIGZAG:
             rate = rows[i, 3] if rows[i, 3] > 0.0 else p[TURN_RATE]
             if x[SEGMENT_SIGN] * (psi - x[SEGMENT_PSI]) >= rows[i, 2]:
                 x[SEGMENT_SIGN] = -x[SEGMENT_SIGN]
             if not done:
-                direct = x[SEGMENT_SIGN] * rate
+                extra = (x[TO_TRACK] - x[ERROR_HEADING] - x[TURNED]) / (2.0 * p[TAU_R])
+                extra = min(max(extra, -p[TURN_RATE]), p[TURN_RATE])
+                x[TURNED] += extra * p[DT]
+                direct = x[SEGMENT_SIGN] * rate + extra
         elif kind == WAYPOINTS:
             # Steered by where the navigator believes the vessel to be.
             north, east = x[NORTH] + x[ERROR_NORTH], x[EAST] + x[ERROR_EAST]
@@ -159,7 +168,8 @@ def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
                 # Reached inside the radius, or when passed abeam: a tight corner is not circled for ever.
                 passed = (north - a) * (a - from_a) + (east - b) * (b - from_b) > 0.0
                 if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2 and not passed:
-                    x[PSI_REFERENCE] = psi + _wrap(atan2(b - east, a - north) - psi)
+                    # Waypoints are steered for by themselves: nothing is added to come back to a track.
+                    x[PSI_REFERENCE] = psi + _wrap(atan2(b - east, a - north) - x[TO_TRACK] - psi)
                     break
                 index[2] += 1
             done = index[2] >= int(rows[i, 3])
@@ -172,6 +182,7 @@ def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
         direct = inf
     if direct < inf:
         return direct
+    x[TURNED] = x[TO_TRACK] - x[ERROR_HEADING]
     # Steering the heading of rest makes the loop a plain exponential: its derivative is the commanded rate itself.
     wanted = (x[PSI_REFERENCE] - rest) / (2.0 * p[TAU_R])
     return min(max(wanted, -x[RATE_LIMIT]), x[RATE_LIMIT])
@@ -251,7 +262,7 @@ def advance(x, index, p, rows, points, phase, table, eddies, tap_time, taps, rat
 
     Parameters
     ----------
-    x : (56,) array
+    x : (59,) array
         State; updated.
     index : (4,) int array
         Sample, segment, waypoint, whether the segment has begun; updated.

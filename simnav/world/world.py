@@ -13,9 +13,13 @@ from simnav.world import motion
 from simnav.world.current import Current, eddies
 from simnav.world.manoeuvres import Manoeuvre, table
 from simnav.world.sea import Sea, components
+from simnav.world.track import PlannedTrack
 from simnav.world.vessel import Start, Vessel
 
 __all__ = ["World", "WorldBlock"]
+
+#: How far ahead the vessel looks to come back to its track: at least [m], and so many seconds of its speed.
+LEAST_LOOKAHEAD, LOOKAHEAD_TIME = 30.0, 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +73,8 @@ class World:
         if not rate > 0.0:
             raise ValueError(f"rate = {rate!r} Hz should be positive")
         self.rate = float(rate)
+        self._plan: PlannedTrack | None = None
+        self._told = start, vessel, manoeuvres, current
         p = np.zeros(motion.PARAMETERS)
         p[motion.DT] = 1.0 / rate
         p[motion.TAU_U], p[motion.TAU_R] = vessel.speed_time_constant, vessel.turn_time_constant
@@ -110,9 +116,59 @@ class World:
         velocity = x[motion.V : motion.V + 3]
         return NavigationStates(np.array([self.time]), position[None].copy(), velocity[None].copy(), attitude[None])
 
-    def steer_by(self, north: float, east: float) -> None:
-        """Let the guidance see a position that is off by this much [m] from now on (closed loop)."""
-        self._x[motion.ERROR_NORTH], self._x[motion.ERROR_EAST] = north, east
+    def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
+        """Closed loop: from now on the guidance sees a position and a heading that are off by this much.
+
+        Waypoints are steered for from the position that is believed. In every other manoeuvre the vessel comes back to
+        the planned track (`simnav.world.track.PlannedTrack`), as far as it believes itself beside it.
+
+        Parameters
+        ----------
+        north, east : float
+            Believed minus true position [m].
+        heading : float
+            Likewise [rad].
+        """
+        x = self._x
+        x[motion.ERROR_NORTH], x[motion.ERROR_EAST], x[motion.ERROR_HEADING] = north, east, heading
+        if self._plan is None:
+            self._plan = World.plan(*self._told)
+        aside, speed = self._plan.aside(float(x[motion.NORTH]) + north, float(x[motion.EAST]) + east, self.time)
+        ahead = max(LEAST_LOOKAHEAD, LOOKAHEAD_TIME * speed)
+        x[motion.TO_TRACK] = -np.arctan(aside / ahead)
+
+    @classmethod
+    def plan(
+        cls, start: Start, vessel: Vessel, manoeuvres: Sequence[Manoeuvre] = (), current: Current | None = None
+    ) -> PlannedTrack:
+        """The track that is planned: without waves, in the mean current."""
+        steady = None if current is None else current.model_copy(update={"variation": 0.0})
+        return PlannedTrack(cls(start, vessel, manoeuvres, None, steady, rate=PlannedTrack.RATE, seed=0))
+
+    def command(self, heading: float, speed: float) -> None:
+        """Steer a heading, as it is believed [rad], and a speed through the water [m/s]; without manoeuvres only.
+
+        Raises
+        ------
+        ValueError
+            If there are manoeuvres, which steer for themselves.
+        """
+        if len(self._rows):
+            raise ValueError("a world with manoeuvres steers for itself")
+        x = self._x
+        believed = float(x[motion.PSI] + x[motion.ERROR_HEADING])
+        x[motion.PSI_REFERENCE] = believed + float(wrap_angle(heading - believed))
+        x[motion.SPEED_TARGET] = max(speed, 0.0)
+
+    def believe(self, heading: float) -> None:
+        """The heading that commands are steered by is off by this much [rad] from now on."""
+        self._x[motion.ERROR_HEADING] = heading
+
+    @property
+    def track(self) -> Array:
+        """(4,) array: north and east of the start [m], heading [rad], speed through the water [m/s]."""
+        x = self._x
+        return np.array([x[motion.NORTH], x[motion.EAST], x[motion.PSI], x[motion.U]])
 
     def advance(self, until: float, taps: Mapping[str, Array]) -> WorldBlock:
         """Advance to a time.

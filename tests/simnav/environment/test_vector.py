@@ -5,7 +5,7 @@ from __future__ import annotations
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from simnav.environment import NavigationEnv
 from simnav.environment.vector import NavigationVectorEnv, spawn_seeds
@@ -48,7 +48,7 @@ def assert_run(batch, i, observation):
 
 
 def test_every_run_is_the_one_of_its_seed(scenario):
-    envs = NavigationVectorEnv(scenario, 3, reveal_truth=True)
+    envs = NavigationVectorEnv(scenario, 3, reveal_truth=True, autoreset_mode="DISABLED")
     seeds = [5, 99, 5]
     batch, infos = envs.reset(seed=seeds)
     assert infos["seed"].tolist() == seeds
@@ -80,10 +80,10 @@ def test_spawned_seeds_do_not_overlap_between_neighbours():
     assert spawn_seeds(7, 50)[:10] == spawn_seeds(7, 10)
 
 
-def test_an_integer_seed_spawns_and_no_seed_draws(scenario):
+def test_an_integer_seed_is_what_gymnasium_makes_of_it_or_spawns(scenario):
     envs = NavigationVectorEnv(scenario, 4)
     _, infos = envs.reset(seed=1)
-    assert infos["seed"].tolist() == spawn_seeds(1, 4)
+    assert infos["seed"].tolist() == [1, 2, 3, 4]
     _, fresh = envs.reset()
     _, infos = envs.reset(seed=1)
     _, again = envs.reset()
@@ -91,10 +91,32 @@ def test_an_integer_seed_spawns_and_no_seed_draws(scenario):
     assert len({*fresh["seed"].tolist(), *infos["seed"].tolist()}) == 8
     _, infos = envs.reset(seed=[3, None, 4, None])
     assert infos["seed"][[0, 2]].tolist() == [3, 4]
+    _, infos = NavigationVectorEnv(scenario, 4, independent_seeds=True).reset(seed=1)
+    assert infos["seed"].tolist() == spawn_seeds(1, 4)
+
+
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
+def test_a_run_that_is_over_begins_anew_as_in_gymnasiums_own_vector_form(scenario, mode):
+    envs = NavigationVectorEnv(scenario, 2, autoreset_mode=mode)
+    theirs = SyncVectorEnv([lambda: NavigationEnv(scenario)] * 2, autoreset_mode=AutoresetMode[mode])
+    batch, infos = envs.reset(seed=7)
+    other, _ = theirs.reset(seed=7)
+    actions = start_of(infos)
+    for _ in range(15):
+        for i in range(2):
+            assert_run(
+                batch, i, {k: v[i] if k == "interval" else {n: a[i] for n, a in v.items()} for k, v in other.items()}
+            )
+        batch, rewards, _, truncated, infos = envs.step(actions)
+        other, *expected, others = theirs.step(actions)
+        np.testing.assert_array_equal(rewards, expected[0])
+        np.testing.assert_array_equal(truncated, expected[2])
+        assert ("final_obs" in infos) == ("final_obs" in others)
+        assert infos.get("seed", np.zeros(2)).tolist() == others.get("seed", np.zeros(2)).tolist()
 
 
 def test_a_mask_begins_some_runs_anew_and_the_others_go_on(scenario):
-    envs = NavigationVectorEnv(scenario, 2)
+    envs = NavigationVectorEnv(scenario, 2, autoreset_mode="DISABLED")
     _, infos = envs.reset(seed=[1, 2])
     actions = start_of(infos)
     for _ in range(4):
@@ -159,7 +181,7 @@ def test_the_first_reset_begins_all(scenario):
 def test_make_vec_uses_it():
     envs = gymnasium.make_vec("simnav:simnav/OpenSea-v1", num_envs=4, reward="position")
     assert isinstance(envs, NavigationVectorEnv)
-    assert envs.metadata["autoreset_mode"] is AutoresetMode.DISABLED
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
     batch, infos = envs.reset(seed=3)
     assert batch in envs.observation_space
     assert envs.action_space.shape == (4, 3, 3)

@@ -1,0 +1,361 @@
+"""One filter or a bank of them, with noise of their own, as kernels over the linear problems of the plain filter.
+
+The equations are those of `simnav.estimators.learning.reference`. The environment of one voyage, the vector form and an
+estimator that holds a policy call the same three kernels, so that they agree bit for bit.
+"""
+
+from __future__ import annotations
+
+from math import exp, log, log1p, log10, sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.algebra.joseph import joseph_update, project
+from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
+
+__all__ = ["MEMORY_COLUMNS", "REWARDS", "observe", "reward", "set_scales", "take"]
+
+#: Of each instrument: four fading means, time of the last measurement, logarithm of the scale over the largest.
+MEMORY_COLUMNS = 6
+#: Codes of the rewards (`reward`).
+REWARDS = {"error": 0, "likelihood": 1, "labels": 2, "improvement": 3}
+
+
+@kernel("void(f8[:, ::1], f8, f8[:, ::1], f8[:, :, ::1], f8[::1])")
+def set_scales(actions, largest, setting, scale, process_scale):  # type: ignore[no-untyped-def]
+    """Factors on the sigmas from logarithms in [-1, 1], in units of that of the largest factor; clipped.
+
+    Parameters
+    ----------
+    actions : (b, p + 1) array
+        Of p instruments, and of the process noise.
+    largest : float
+        Largest factor.
+    setting : (b, p) array
+        Overwritten with the logarithms of the instruments.
+    scale : (b, p, k) array
+    process_scale : (b,) array
+        Overwritten.
+    """
+    places = setting.shape[1]
+    for b in range(actions.shape[0]):
+        for i in range(places):
+            a = min(max(actions[b, i], -1.0), 1.0)
+            setting[b, i] = a
+            factor = exp(a * log(largest))
+            for j in range(scale.shape[2]):
+                scale[b, i, j] = factor
+        process_scale[b] = exp(min(max(actions[b, places], -1.0), 1.0) * log(largest))
+
+
+@kernel()
+def _clipped(value):  # type: ignore[no-untyped-def]
+    return min(max(value, -LIMIT), LIMIT)
+
+
+@kernel(
+    "void(f8[:, :, ::1], b1[::1], i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], "
+    "i8[::1], i8[::1], f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, b1[::1], "
+    "f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f4[:, ::1])"
+)
+def observe(  # type: ignore[no-untyped-def]
+    transition, moves, instrument, time, size, innovation, jacobian, noise, correction,
+    first, last, end, context, place, period, most, active, covariance, delta, memory, observation,
+):  # fmt: skip
+    """What an agent sees before it decides on the step that lies ahead (`simnav.estimators.learning.features`).
+
+    The innovations are those that the filter would see if it used none of the step's measurements.
+
+    Parameters
+    ----------
+    transition, moves, instrument, time, size, innovation, jacobian, noise, correction
+        The events of all voyages, as in `simnav.estimators.learning.reference.Linear`.
+    first, last : (b,) int arrays
+        Of each filter of the bank: its events in the step are those from ``first`` up to, not including, ``last``.
+    end : (b,) array
+        End of each filter's step [s].
+    context : (b, 11) array
+        As of `simnav.estimators.learning.features.Context`.
+    place : (k,) int array
+        Of each instrument: its place in the observation; -1 for none.
+    period : (b, p) array
+        Of each place: nominal time between two measurements [s].
+    most : int
+        Measurements a step that have room in the observation.
+    active : (b,) bool array
+        Which filters are looked at.
+    covariance, delta : (b, n, n), (b, n) arrays
+        Of the filters.
+    memory : (b, p, 6) array
+        Of the instruments; updated.
+    observation : (b, o) float32 array
+        Overwritten for the filters that are active.
+    """
+    n = delta.shape[1]
+    places = period.shape[1]
+    width = PER_INSTRUMENT + PER_MEASUREMENT * most
+    ahead, moved = np.empty(n), np.empty(n)
+    counts = np.empty(places, np.int64)
+    spread = np.empty((3, 3))
+    white = np.empty(3)
+    for b in range(first.size):
+        if not active[b]:
+            continue
+        row, P = observation[b], covariance[b]
+        for j in range(places * width):
+            row[j] = 0.0
+        for i in range(n):
+            ahead[i] = delta[b, i]
+        counts[:] = 0
+        for e in range(first[b], last[b]):
+            if moves[e]:
+                for i in range(n):
+                    x = 0.0
+                    for j in range(n):
+                        x += transition[e, i, j] * ahead[j]
+                    moved[i] = x
+                for i in range(n):
+                    ahead[i] = moved[i]
+            m = size[e]
+            at = place[instrument[e]] if m > 0 else -1
+            if at >= 0:
+                # S with the covariance of the step's start: good enough for a number that is looked at
+                for i in range(m):
+                    for k in range(i + 1):
+                        x = noise[e, i, k]
+                        for r in range(n):
+                            h = jacobian[e, i, r]
+                            if h != 0.0:
+                                for c in range(n):
+                                    x += h * P[r, c] * jacobian[e, k, c]
+                        spread[i, k] = x
+                for i in range(m):
+                    x = innovation[e, i]
+                    for r in range(n):
+                        x -= jacobian[e, i, r] * ahead[r]
+                    white[i] = x
+                base = at * width + PER_INSTRUMENT + PER_MEASUREMENT * counts[at]
+                seen = counts[at] < most
+                counts[at] += 1
+                elapsed = max(time[e] - memory[b, at, 4], 0.0)
+                gain = 1.0 - exp(-elapsed / MEMORY)
+                memory[b, at, 4] = time[e]
+                for i in range(m):
+                    x = white[i] / sqrt(spread[i, i])
+                    memory[b, at, 1 + i] += gain * (_clipped(x) - memory[b, at, 1 + i])
+                    if seen:
+                        row[base + 1 + i] = _clipped(x / WHITE)
+                # Normalised innovation squared by the Cholesky factor, in place
+                nis = 0.0
+                for i in range(m):
+                    for j in range(i):
+                        x = spread[i, j]
+                        for k in range(j):
+                            x -= spread[i, k] * spread[j, k]
+                        spread[i, j] = x / spread[j, j]
+                    x = spread[i, i]
+                    for k in range(i):
+                        x -= spread[i, k] * spread[i, k]
+                    spread[i, i] = sqrt(max(x, 1e-300))
+                    x = white[i]
+                    for k in range(i):
+                        x -= spread[i, k] * white[k]
+                    white[i] = x / spread[i, i]
+                    nis += white[i] * white[i]
+                surprise = log1p(sqrt(nis / m))
+                memory[b, at, 0] += gain * (surprise - memory[b, at, 0])
+                if seen:
+                    row[base] = _clipped(surprise)
+            for i in range(n):
+                ahead[i] -= correction[e, i]
+        for at in range(places):
+            base = at * width
+            for i in range(4):
+                row[base + i] = _clipped(memory[b, at, i])
+            x = memory[b, at, 1] ** 2 + memory[b, at, 2] ** 2 + memory[b, at, 3] ** 2
+            row[base + 4] = log1p(sqrt(x))
+            row[base + 5] = _clipped(log1p(max(end[b] - memory[b, at, 4], 0.0) / period[b, at]))
+            row[base + 6] = _clipped(counts[at] / most)
+            row[base + 7] = memory[b, at, 5]
+        base = places * width
+        row[base] = _clipped(0.5 * log10(max(P[0, 0] + P[1, 1], 1e-18)))
+        for i in range(context.shape[1]):
+            row[base + 1 + i] = _clipped(context[b, i])
+
+
+@kernel()
+def _propagate(P, delta, transition, process_noise, factor, A, B, T):  # type: ignore[no-untyped-def]
+    """``delta = Phi delta``, ``P = Phi P Phi' + factor Q`` in place; A, B, T are (n, n) work space."""
+    n = delta.size
+    for i in range(n):
+        x = 0.0
+        for j in range(n):
+            x += transition[i, j] * delta[j]
+            A[i, j] = 0.0
+            B[i, j] = 0.0
+            T[j, i] = transition[i, j]
+        B[0, i] = x
+    for i in range(n):
+        delta[i] = B[0, i]
+        B[0, i] = 0.0
+    for i in range(n):
+        for k in range(n):
+            x = transition[i, k]
+            if x != 0.0:
+                for j in range(n):
+                    A[i, j] += x * P[k, j]
+    for i in range(n):
+        for k in range(n):
+            x = A[i, k]
+            for j in range(n):
+                B[i, j] += x * T[k, j]
+    for i in range(n):
+        for j in range(i + 1):
+            x = 0.5 * (B[i, j] + B[j, i]) + factor * process_noise[i, j]
+            P[i, j] = x
+            P[j, i] = x
+
+
+@kernel(
+    "void(f8[:, :, ::1], f8[:, :, ::1], b1[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], "
+    "f8[:, ::1], i8[::1], i8[::1], i8[::1], b1[::1], f8[:, :, ::1], f8[::1], f8[:, :, ::1], f8[:, ::1])"
+)
+def take(  # type: ignore[no-untyped-def]
+    transition, process_noise, moves, instrument, size, innovation, jacobian, noise, correction,
+    first, last, place, active, scale, process_scale, covariance, delta,
+):  # fmt: skip
+    """Take each filter of a bank through its step, with the noise that its agent has set.
+
+    Parameters
+    ----------
+    transition, process_noise, moves, instrument, size, innovation, jacobian, noise, correction
+        The events of all voyages, as in `simnav.estimators.learning.reference.Linear`.
+    first, last, place, active
+        As of `observe`.
+    scale : (b, p, k) array
+        Factor on the sigma of the j-th measurement of the step by the instrument of each place, the last for those
+        beyond; not above zero: the measurement is left out.
+    process_scale : (b,) array
+        Factor on the sigma of the process noise.
+    covariance, delta : (b, n, n), (b, n) arrays
+        Updated.
+    """
+    n = delta.shape[1]
+    most = scale.shape[2]
+    A, B, T = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    correct = np.empty(n)
+    counts = np.empty(scale.shape[1], np.int64)
+    H1, H2, H3 = np.empty((1, n)), np.empty((2, n)), np.empty((3, n))
+    C1, C2, C3 = np.empty((n, 1)), np.empty((n, 2)), np.empty((n, 3))
+    S1, S2, S3 = np.empty((1, 1)), np.empty((2, 2)), np.empty((3, 3))
+    v1, v2, v3 = np.empty(1), np.empty(2), np.empty(3)
+    for b in range(first.size):
+        if not active[b]:
+            continue
+        P, d = covariance[b], delta[b]
+        factor = process_scale[b] * process_scale[b]
+        counts[:] = 0
+        for e in range(first[b], last[b]):
+            if moves[e]:
+                _propagate(P, d, transition[e], process_noise[e], factor, A, B, T)
+            m = size[e]
+            if m > 0:
+                at = place[instrument[e]]
+                sigma = 1.0
+                if at >= 0:
+                    sigma = scale[b, at, min(counts[at], most - 1)]
+                    counts[at] += 1
+                if sigma > 0.0:
+                    if m == 1:
+                        H, C, S, v = H1, C1, S1, v1
+                    elif m == 2:
+                        H, C, S, v = H2, C2, S2, v2
+                    else:
+                        H, C, S, v = H3, C3, S3, v3
+                    for i in range(m):
+                        x = innovation[e, i]
+                        for r in range(n):
+                            H[i, r] = jacobian[e, i, r]
+                            x -= jacobian[e, i, r] * d[r]
+                        v[i] = x
+                    project(P, H, C, S)
+                    for i in range(m):
+                        for k in range(m):
+                            S[i, k] += sigma * sigma * noise[e, i, k]
+                    if joseph_update(P, C, S, v, correct) >= 0.0:
+                        for r in range(n):
+                            d[r] += correct[r]
+                for r in range(n):
+                    d[r] -= correction[e, r]
+
+
+@kernel(
+    "void(i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[::1], i8[::1], b1[::1], i8[::1], b1[::1], "
+    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
+)
+def reward(  # type: ignore[no-untyped-def]
+    code, error, oracle, action, first, last, instrument, size, faulty, place, active, scale, covariance, delta, rewards
+):
+    """What each filter's step was worth; 0 where the truth is not known.
+
+    Parameters
+    ----------
+    code : int
+        Of `REWARDS`; what they are is in `simnav.estimators.learning.tasks`.
+    error : (b, 9) array
+        Of the plain filter at the end of the step: estimate minus truth.
+    oracle : (b, 2) array
+        The oracle's horizontal error and its horizontal sigma [m].
+    action : (b, 7) array
+        Corrections: north, east, down [m], the same of the velocity [m/s], heading [rad].
+    first, last, instrument, size, place, active, scale, covariance, delta
+        As of `take`.
+    faulty : (e,) bool array
+        Which measurements a fault has touched.
+    rewards : (b,) array
+        Overwritten.
+    """
+    counts = np.empty(scale.shape[1], np.int64)
+    for b in range(first.size):
+        rewards[b] = 0.0
+        if not active[b]:
+            continue
+        north, east = error[b, 0] + delta[b, 0], error[b, 1] + delta[b, 1]
+        value = 0.0
+        if code == 0:
+            square = oracle[b, 1] * oracle[b, 1]
+            value = -0.5 * log((north * north + east * east + square) / (oracle[b, 0] * oracle[b, 0] + square))
+        elif code == 1:
+            p, q, r = covariance[b, 0, 0], covariance[b, 0, 1], covariance[b, 1, 1]
+            determinant = p * r - q * q
+            square = (r * north * north - 2.0 * q * north * east + p * east * east) / determinant
+            value = -0.5 * (square + log(determinant))
+        elif code == 2:
+            counts[:] = 0
+            for e in range(first[b], last[b]):
+                at = place[instrument[e]] if size[e] > 0 else -1
+                if at < 0:
+                    continue
+                out = scale[b, at, min(counts[at], scale.shape[2] - 1)] <= 0.0
+                counts[at] += 1
+                if faulty[e]:
+                    value += 1.0 if out else -1.0
+                elif out:
+                    value -= 1.0
+        else:
+            before, after = 0.0, 0.0
+            for i in range(3):
+                x, y = error[b, i], error[b, 3 + i]
+                if x == x:
+                    before += x * x
+                    after += (x + action[b, i]) ** 2
+                if y == y:
+                    before += 100.0 * y * y
+                    after += 100.0 * (y + action[b, 3 + i]) ** 2
+            x = error[b, 8]
+            if x == x:
+                before += 2500.0 * x * x
+                after += 2500.0 * (x + action[b, 6]) ** 2
+            value = sqrt(before) - sqrt(after)
+        rewards[b] = value if value == value else 0.0

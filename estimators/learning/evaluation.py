@@ -1,0 +1,89 @@
+"""What an agent is worth on voyages that it has not seen, beside the plain filter, chance and the oracle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from simnav.environment.seeds import is_training
+from simnav.estimators.learning.features import Numbers
+from simnav.estimators.learning.vector import FilterTaskVectorEnv
+from simnav.scenario import Scenario
+from simnav.types import Array
+
+__all__ = ["Agent", "Worth", "by_chance", "interval", "plain", "scoring_envs", "worth"]
+
+#: From (b, o) observations to (b, ...) actions.
+Agent = Callable[[Numbers], Numbers]
+
+_LEVEL = 0.975
+
+
+class Worth(NamedTuple):
+    """Of each of n voyages: return of the episode, and RMS of the horizontal errors of the agent and the oracle [m]."""
+
+    returns: Array
+    error: Array
+    oracle: Array
+
+
+def plain(envs: FilterTaskVectorEnv) -> Agent:
+    """The agent that leaves the filter as it is."""
+    shape, dtype = envs.action_space.shape, envs.single_action_space.dtype
+    return lambda observation: np.zeros(shape or (), dtype)
+
+
+def by_chance(envs: FilterTaskVectorEnv, seed: int = 0) -> Agent:
+    """The agent that draws its actions."""
+    envs.action_space.seed(seed)
+    return lambda observation: np.asarray(envs.action_space.sample())
+
+
+def scoring_envs(
+    scenario: Scenario | str | Path, seeds: Sequence[int], task: str = "Tuning", **options: object
+) -> FilterTaskVectorEnv:
+    """The voyages to score on, side by side; ValueError where a seed is one of training."""
+    if wrong := [s for s in seeds if is_training(s)]:
+        raise ValueError(f"seed {wrong[0]} is one of training; scores are of seeds below it")
+    return FilterTaskVectorEnv(
+        scenario, task, len(seeds), reveal_truth=True, autoreset_mode=AutoresetMode.DISABLED, **options,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def worth(envs: FilterTaskVectorEnv, seeds: Sequence[int], agent: Agent) -> Worth:
+    """Run an agent over voyages to their ends.
+
+    Parameters
+    ----------
+    envs : FilterTaskVectorEnv
+        Of `scoring_envs`.
+    seeds : sequence of int
+    agent : callable
+    """
+    observation, _ = envs.reset(seed=list(seeds))
+    n = envs.num_envs
+    returns, squares, knowing, steps = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    over = np.zeros(n, np.bool_)
+    while not over.all():
+        observation, reward, _, truncated, info = envs.step(agent(observation))
+        active = ~over
+        returns += reward
+        squares[active] += np.nan_to_num(info["error"][active]) ** 2
+        knowing[active] += np.nan_to_num(info["oracle_error"][active]) ** 2
+        steps[active] += 1
+        over = truncated
+    return Worth(returns, np.sqrt(squares / steps), np.sqrt(knowing / steps))
+
+
+def interval(values: Array) -> tuple[float, float, float]:
+    """Mean, and the ends of its interval of 95 % (Student's t) over n independent values."""
+    from scipy.stats import t
+
+    n = len(values)
+    half = float(t.ppf(_LEVEL, n - 1) * np.std(values, ddof=1) / np.sqrt(n))
+    mean = float(np.mean(values))
+    return mean, mean - half, mean + half

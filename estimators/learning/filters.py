@@ -1,0 +1,201 @@
+"""The filters of b agents side by side: state, memory and what is decided, around the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.environment.navigation import most_samples
+from simnav.estimators.learning.bank import MEMORY_COLUMNS, REWARDS, observe, reward, take
+from simnav.estimators.learning.features import observation_size
+from simnav.estimators.learning.reference import Linear, ReferenceFilter
+from simnav.estimators.learning.tasks import Decision, Task
+from simnav.scenario import Scenario
+from simnav.types import Array, InitialState, Instruments
+
+__all__ = ["Filters", "Layout", "checked_actions", "layout_of", "layout_of_scenario"]
+
+
+class Layout:
+    """Which instruments an agent is asked about, and where they stand in its observation.
+
+    Parameters
+    ----------
+    watched : list of str
+        The instruments that the plain filter uses in any run.
+    kinds : list of str
+        Of those that the agent is asked about.
+    names : list of str
+        Those that the agent is asked about.
+    most : int
+        Room for so many measurements a step of each.
+    states : int
+        Most states of the filter.
+    events : float
+        Most measurements a step of all instruments together.
+
+    Attributes
+    ----------
+    place : (k,) int array
+        Of each watched instrument; -1 where the agent is not asked.
+    size : int
+        Length of the observation.
+    """
+
+    def __init__(self, watched: list[str], names: list[str], kinds: list[str], most: int, states: int, events: float):
+        self.watched, self.names, self.kinds, self.most = watched, names, kinds, most
+        self.states, self.events = states, events
+        self.place = np.array([names.index(name) if name in names else -1 for name in watched], dtype=np.int64)
+        self.size = observation_size(len(names), most)
+
+    def periods(self, instruments: Instruments) -> Array:
+        """(p,) array: nominal time between two measurements of each in a run [s]; 1 where it is not there."""
+        return np.array([1.0 / instruments[name].rate if name in instruments else 1.0 for name in self.names])
+
+
+def layout_of(runs: Sequence[Instruments], which: str, most: Sequence[Mapping[str, int]] | None = None) -> Layout:
+    """The layout that holds the instruments of any run.
+
+    Parameters
+    ----------
+    runs : sequence of Instruments
+        Of all that a run may have.
+    which : "all" or "fixes"
+        Whom the agent is asked about: every instrument that the filter uses, or those that give a position.
+    most : sequence of mapping, optional
+        For each, most measurements of each instrument in one step; by default of its rate.
+
+    Raises
+    ------
+    UnsuitableScenario
+        If no filter fits the instruments.
+    ValueError
+        If there is nobody to be asked about.
+    """
+    if which not in ("all", "fixes"):
+        raise ValueError(f"instruments is 'all' or 'fixes', not {which!r}")
+    # Any start does: it is the instruments that decide on the states.
+    start = InitialState(0.0, np.array([0.5, 0.5, 0.0]), np.zeros(3), np.zeros(3), np.eye(9))
+    watched: dict[str, str] = {}
+    names: dict[str, str] = {}
+    room, states, events = 1, 0, 0.0
+    for i, instruments in enumerate(runs):
+        trial = ReferenceFilter(list(instruments))
+        trial.reset(start, instruments)
+        states = max(states, trial.model.size)
+        events = max(events, instruments.step * sum(sheet.rate for sheet in instruments.values()))
+        for name in trial.watched:
+            sheet = instruments[name]
+            watched.setdefault(name, sheet.kind)
+            if which == "all" or sheet.role == "fix":
+                names.setdefault(name, sheet.kind)
+                by_rate = max(1, int(np.ceil(sheet.rate * instruments.step - 1e-6)))
+                room = max(room, by_rate if most is None else most[i][name])
+    if not names:
+        raise ValueError("there is no instrument that gives a position; say instruments='all'")
+    return Layout(list(watched), list(names), list(names.values()), room, states, events)
+
+
+_layouts: dict[tuple[str, str], Layout] = {}
+
+
+def layout_of_scenario(scenario: Scenario, which: str) -> Layout:
+    """The layout for a scenario, whatever is drawn; that of a log has room for measurements that come late."""
+    key = scenario.content_hash(), which
+    if key not in _layouts:  # a family has hundreds of extremes
+        possible = scenario.extremes()
+        _layouts[key] = layout_of([s.instruments_sheet() for s in possible], which, [most_samples(s) for s in possible])
+    return _layouts[key]
+
+
+class Filters:
+    """b filters with noise of their own, over the linear problems that they are handed.
+
+    Parameters
+    ----------
+    task : Task
+    layout : Layout
+    reward : str
+        One of the task's.
+    b, n : int
+        How many, and of how many states.
+
+    Attributes
+    ----------
+    covariance, delta : (b, n, n), (b, n) array
+        P, and the distance to the plain filter.
+    decision : Decision
+        The last.
+    observation : (b, o) float32 array
+        What the agents saw last.
+    """
+
+    def __init__(self, task: Task, layout: Layout, reward: str, b: int, n: int):
+        self.task, self.layout, self._code = task, layout, REWARDS[reward]
+        p = len(layout.names)
+        self.covariance, self.delta = np.zeros((b, n, n)), np.zeros((b, n))
+        self.memory = np.zeros((b, p, MEMORY_COLUMNS))
+        self.decision = Decision(b, p, layout.most)
+        self.observation = np.zeros((b, layout.size), np.float32)
+        self.rewards, self.period = np.zeros(b), np.ones((b, p))
+
+    def begin(self, i: int, start_covariance: Array, period: Array) -> None:
+        """Begin a voyage with the i-th filter; ``period`` as of `Layout.periods`."""
+        n = len(start_covariance)
+        self.covariance[i], self.delta[i], self.memory[i] = 0.0, 0.0, 0.0
+        self.covariance[i, :n, :n], self.period[i] = start_covariance, period
+        self.observation[i] = 0.0
+
+    def observe(
+        self, linear: Linear, first: NDArray[np.int64], last: NDArray[np.int64], end: Array, context: Array,
+        active: NDArray[np.bool_],
+    ) -> None:  # fmt: skip
+        """Fill `observation` for the active filters; the arguments as of `simnav.estimators.learning.bank.observe`."""
+        observe(
+            linear.transition, linear.moves, linear.instrument, linear.time, linear.size, linear.innovation,
+            linear.jacobian, linear.noise, linear.correction, first, last, end, context, self.layout.place,
+            self.period, self.layout.most, active, self.covariance, self.delta, self.memory, self.observation,
+        )  # fmt: skip
+
+    def decide(self, actions: Array) -> None:
+        """Take the decisions of all b agents."""
+        self.task.decide(actions, self.decision)
+
+    def step(
+        self, linear: Linear, first: NDArray[np.int64], last: NDArray[np.int64], active: NDArray[np.bool_]
+    ) -> None:
+        """Take the active filters through a step, with what was decided."""
+        decision = self.decision
+        take(
+            linear.transition, linear.process_noise, linear.moves, linear.instrument, linear.size, linear.innovation,
+            linear.jacobian, linear.noise, linear.correction, first, last, self.layout.place, active, decision.scale,
+            decision.process_scale, self.covariance, self.delta,
+        )  # fmt: skip
+        self.memory[active, :, 5] = decision.setting[active]
+
+    def reward(
+        self, linear: Linear, first: NDArray[np.int64], last: NDArray[np.int64], active: NDArray[np.bool_],
+        error: Array, oracle: Array, faulty: NDArray[np.bool_],
+    ) -> Array:  # fmt: skip
+        """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.bank.reward`."""
+        decision = self.decision
+        reward(
+            self._code, error, oracle, decision.correction, first, last, linear.instrument, linear.size, faulty,
+            self.layout.place, active, decision.scale, self.covariance, self.delta, self.rewards,
+        )  # fmt: skip
+        return self.rewards.copy()
+
+
+def checked_actions(actions: object, shape: tuple[int, ...], what: str) -> Array:
+    """Actions as an array; ValueError, in one sentence, where the shape is another or a number is not finite."""
+    try:
+        array = np.asarray(actions, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} an array of numbers of shape {shape}, not {actions!r}") from None
+    if array.shape != shape:
+        raise ValueError(f"{what} an array of shape {shape}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} finite, not {array.tolist()}")
+    return array

@@ -1,0 +1,181 @@
+"""A trained policy as a file of plain arrays: a network, what it expects, and what it was trained on.
+
+The file is an ``.npz`` without pickle: ``meta`` (JSON), ``mean`` and ``deviation`` of the observation, and
+``weight_0``, ``bias_0``, ``weight_1``, ... of the layers. Between the layers is a hyperbolic tangent, and the last is
+clipped to the bounds of the action. So networks of any library fit, and none of them is needed to use one.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simnav.environment.seeds import require_disjoint
+from simnav.estimators.learning.features import Numbers, observation_size
+from simnav.estimators.learning.filters import Layout
+from simnav.estimators.learning.tasks import CORRECTIONS, TASKS
+from simnav.types import Array
+
+__all__ = ["FORMAT", "Policy", "PolicyError"]
+
+#: Of the files; raised when they change.
+FORMAT = 1
+
+
+class PolicyError(ValueError):
+    """A file that holds no policy, or one that does not fit: one sentence that names it."""
+
+
+class Policy:
+    """A network from an observation to an action.
+
+    Parameters
+    ----------
+    layers : sequence of (weight, bias)
+        ``(m, n)`` and ``(m,)`` arrays; the first takes the observation, the last gives the action.
+    task : str
+        One of `simnav.estimators.learning.tasks.TASKS`.
+    kinds : sequence of str
+        Kinds of the instruments that the agent is asked about, in order.
+    most : int
+        Measurements a step that have room in the observation.
+    instruments : str
+        As of `simnav.estimators.learning.environment.TaskOptions`.
+    trained_on : mapping
+        What it learned from: ``scenario``, ``voyages``, ``steps``, ``algorithm``; read by people.
+    mean, deviation : (o,) array, optional
+        The observation is taken less the mean, over the deviation; by default as it is.
+    version : int, optional
+        Of the task; the present one by default.
+
+    Raises
+    ------
+    PolicyError
+        If the layers do not fit each other or the task.
+    """
+
+    def __init__(
+        self,
+        layers: Sequence[tuple[Array, Array]],
+        *,
+        task: str,
+        kinds: Sequence[str],
+        most: int,
+        instruments: str,
+        trained_on: Mapping[str, Any],
+        mean: Array | None = None,
+        deviation: Array | None = None,
+        version: int | None = None,
+        source: str = "the policy",
+    ):
+        if task not in TASKS:
+            raise PolicyError(f"{source}: it is for the task {task!r}; there are: {', '.join(TASKS)}")
+        now = TASKS[task].version
+        self.version = now if version is None else version
+        if self.version != now:
+            raise PolicyError(
+                f"{source}: it was trained on version {self.version} of {task}, but this is version {now}; "
+                "train it again"
+            )
+        self.layers = [(np.array(w, dtype=np.float64), np.array(b, dtype=np.float64)) for w, b in layers]
+        self.task, self.kinds, self.most, self.instruments = task, list(kinds), int(most), instruments
+        self.trained_on, self.source = dict(trained_on), source
+        if not self.layers:
+            raise PolicyError(f"{source}: it has no layers")
+        size = self.layers[0][0].shape[1] if self.layers[0][0].ndim == 2 else -1
+        self.mean = np.zeros(size) if mean is None else np.array(mean, dtype=np.float64)
+        self.deviation = np.ones(size) if deviation is None else np.array(deviation, dtype=np.float64)
+        for i, (w, b) in enumerate(self.layers):
+            if w.ndim != 2 or b.shape != w.shape[:1] or w.shape[1] != size:
+                raise PolicyError(
+                    f"{source}: layer {i} has a weight of shape {w.shape} and a bias of shape {b.shape}; it should "
+                    f"take {size} numbers"
+                )
+            size = w.shape[0]
+        wanted = observation_size(len(self.kinds), self.most)
+        actions = {
+            "Tuning": len(self.kinds) + 1,
+            "Correction": len(CORRECTIONS),
+            "Detection": len(self.kinds) * self.most,
+        }
+        shape = self.layers[0][0].shape[1], size
+        if shape != (wanted, actions[task]):
+            raise PolicyError(
+                f"{source}: it takes {shape[0]} numbers and gives {shape[1]}; {task} with {', '.join(self.kinds)} has "
+                f"{wanted} and {actions[task]}"
+            )
+        arrays = [self.mean, self.deviation, *(a for layer in self.layers for a in layer)]
+        if self.mean.shape != self.deviation.shape or self.mean.shape != (self.layers[0][0].shape[1],):
+            raise PolicyError(f"{source}: mean and deviation should be of the observation's length")
+        if not all(np.isfinite(a).all() for a in arrays) or not (self.deviation > 0.0).all():
+            raise PolicyError(f"{source}: its numbers should be finite, and the deviations positive")
+
+    def __call__(self, observation: Numbers) -> Numbers:
+        """The action for one observation, or for several in rows."""
+        x = (np.asarray(observation, dtype=np.float64) - self.mean) / self.deviation
+        for i, (weight, bias) in enumerate(self.layers):
+            x = x @ weight.T + bias
+            if i < len(self.layers) - 1:
+                x = np.tanh(x)
+        if self.task == "Detection":
+            return np.asarray(x > 0.0, dtype=np.int8)
+        return np.clip(x, -1.0, 1.0)
+
+    def require(self, layout: Layout) -> None:
+        """Refuse an environment with other instruments than it was trained for: PolicyError."""
+        if layout.kinds != self.kinds or layout.most != self.most:
+            raise PolicyError(
+                f"{self.source}: it was trained for {', '.join(self.kinds)} with at most {self.most} measurements a "
+                f"step of each, not for {', '.join(layout.kinds)} with {layout.most}"
+            )
+
+    def require_unseen(self, seeds: Sequence[int]) -> None:
+        """Refuse to be scored on what it learned from: ValueError."""
+        first, count = self.trained_on.get("first_seed", 0), self.trained_on.get("voyages", 0)
+        require_disjoint(range(int(first), int(first) + int(count)), seeds)
+
+    def save(self, path: str | Path) -> None:
+        """Write the file."""
+        meta = {
+            "format": FORMAT, "task": self.task, "version": self.version, "kinds": self.kinds, "most": self.most,
+            "instruments": self.instruments, "trained_on": self.trained_on,
+        }  # fmt: skip
+        arrays: dict[str, Any] = {"meta": np.array(json.dumps(meta)), "mean": self.mean, "deviation": self.deviation}
+        for i, (weight, bias) in enumerate(self.layers):
+            arrays[f"weight_{i}"], arrays[f"bias_{i}"] = weight, bias
+        with open(path, "wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Policy:
+        """Read a file.
+
+        Raises
+        ------
+        PolicyError
+            If it is no policy, is damaged, or is one of another version or shape.
+        FileNotFoundError
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+            meta = json.loads(str(arrays["meta"]))
+            form = meta["format"]
+            if form != FORMAT:
+                raise PolicyError(f"{path}: written in format {form!r} of policies; this version reads {FORMAT}")
+            count = sum(name.startswith("weight_") for name in arrays)
+            layers = [(arrays[f"weight_{i}"], arrays[f"bias_{i}"]) for i in range(count)]
+            return cls(
+                layers, task=meta["task"], kinds=meta["kinds"], most=meta["most"], instruments=meta["instruments"],
+                trained_on=meta["trained_on"], mean=arrays["mean"], deviation=arrays["deviation"],
+                version=meta["version"], source=str(path),
+            )  # fmt: skip
+        except PolicyError:
+            raise
+        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise PolicyError(f"{path}: not a policy of simnav, or damaged ({error})") from None

@@ -1,0 +1,142 @@
+"""Wrappers of `NavigationEnv` for learning agents: actions relative to the last estimate, observations of order one.
+
+For windows over the last observations take Gymnasium's own ``FrameStackObservation``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from simnav.environment.navigation import Observation
+from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.rotation import wrap_angle
+from simnav.types import KINDS, Array, InitialState, Instruments
+
+__all__ = ["NormaliseObservation", "RelativeAction"]
+
+#: What a number of 1 stands for in a relative action: position [m], velocity [m/s], attitude [rad].
+STEPS = np.array([[100.0] * 3, [10.0] * 3, [1.0] * 3])
+#: Units of a normalised observation: distance [m], speed [m/s], angular rate [rad/s], specific force [m/s^2].
+DISTANCE, SPEED, RATE, FORCE = 1000.0, 10.0, 0.1, 9.81
+#: Bound of its numbers.
+LIMIT = 100.0
+
+
+class RelativeAction(gymnasium.Wrapper[Any, NDArray[Any], Observation, Array]):
+    """Actions as steps from the last estimate, the start at first: (9,) float32 numbers in [-1, 1], clipped.
+
+    North, east, down in units of 100 m; velocity north, east, down in units of 10 m/s; roll, pitch, yaw in units of
+    1 rad. 0 says that nothing has changed.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        A `NavigationEnv`, or one around it with its actions.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any]):
+        super().__init__(env)
+        self._action_space = spaces.Box(-1.0, 1.0, (9,), dtype=np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin a run; the last estimate is the start."""
+        observation, info = super().reset(seed=seed, options=options)
+        start: InitialState = info["start"]
+        self._estimate = np.stack([start.position, start.velocity, start.attitude])
+        return observation, info
+
+    def step(self, action: NDArray[Any]) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Answer with the last estimate, moved on.
+
+        Raises
+        ------
+        ValueError
+            If the action has another shape or is not finite.
+        """
+        array = np.asarray(action, dtype=np.float64)
+        if array.shape != (9,) or not np.isfinite(array).all():
+            raise ValueError(f"a relative action is a (9,) array of finite numbers, not {action!r}")
+        change = np.clip(array, -1.0, 1.0).reshape(3, 3) * STEPS
+        before = self._estimate
+        attitude = wrap_angle(before[2] + change[2])
+        self._estimate = np.stack([displace(before[0], change[0]), before[1] + change[1], attitude])
+        return super().step(self._estimate)
+
+
+class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Observation]):
+    """Observations as a `Dict` of one level, float32, of order one, with the start in it.
+
+    ``interval`` is (seconds since the start over 3600, length of the step); of each instrument there are
+    ``<name>.age`` (end of the step less time of validity [s]), ``<name>.valid`` and ``<name>.value``, of the IMU
+    ``imu.angular_rate`` and ``imu.specific_force``. Positions are north, east, down from the start over 1000 m, speeds
+    over 10 m/s, angular rates over 0.1 rad/s, specific forces over 9.81 m/s^2; depths over 1000 m; angles in rad.
+    ``start`` is velocity over 10 m/s, attitude [rad], and the nine sigmas in metres, m/s and rad.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        A `NavigationEnv`, or one around it with its observations.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any]):
+        super().__init__(env)
+        old = env.observation_space
+        assert isinstance(old, spaces.Dict)
+        entries: dict[str, spaces.Space[Any]] = {"interval": _box(2), "start": _box(15)}
+        for name, space in old.items():
+            if not isinstance(space, spaces.Dict):
+                continue
+            for key, part in space.items():
+                assert part.shape is not None
+                if key != "length":
+                    entries[f"{name}.{'age' if key == 'time' else key}"] = _box(*part.shape)
+        self._observation_space = spaces.Dict(entries)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin a run; keep its start."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._start: InitialState = info["start"]
+        self._instruments: Instruments = info["instruments"]
+        return self.observation(observation), info
+
+    def observation(self, observation: Observation) -> Observation:
+        """The observation in the units of the class."""
+        start, end = observation["interval"].tolist()
+        told = self._start
+        sigmas = np.sqrt(np.diag(told.covariance))
+        out = {
+            "interval": np.array([end / 3600.0, end - start]),
+            "start": np.concatenate([told.velocity / SPEED, told.attitude, sigmas]),
+        }
+        for name, entry in observation.items():
+            if not isinstance(entry, dict):
+                continue
+            valid = entry["valid"]
+            out[f"{name}.valid"] = valid
+            out[f"{name}.age"] = (end - entry["time"]) * valid
+            if name == "imu":
+                out["imu.angular_rate"] = entry["angular_rate"] / RATE
+                out["imu.specific_force"] = entry["specific_force"] / FORCE
+            else:
+                out[f"{name}.value"] = self._value(name, entry["value"]) * valid[:, None]
+        return {name: np.clip(array, -LIMIT, LIMIT).astype(np.float32) for name, array in out.items()}
+
+    def _value(self, name: str, value: Array) -> Array:
+        kind = KINDS[self._instruments[name].kind] if name in self._instruments else None
+        if kind is None:
+            return value
+        if kind.geodetic:
+            position = np.concatenate([value, np.zeros((len(value), max(0, 3 - value.shape[1])))], axis=1)
+            return relative_position(position[:, :3], self._start.position)[:, : value.shape[1]] / DISTANCE
+        units = [SPEED if c.error_unit == "m_s" else DISTANCE if c.error_unit == "m" else 1.0 for c in kind.components]
+        scaled: Array = value / np.array(units)
+        return scaled
+
+
+def _box(*shape: int) -> spaces.Box:
+    return spaces.Box(-LIMIT, LIMIT, shape, dtype=np.float32)

@@ -1,0 +1,109 @@
+"""Every id of a task: Gymnasium's checker, make, make_vec, spec, pickling, statistics, pictures."""
+
+from __future__ import annotations
+
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import FrameStackObservation, RecordEpisodeStatistics, RecordVideo
+
+import simnav  # noqa: F401 (it registers)
+from simnav.catalogue import headers
+from simnav.log import LogError
+
+TASKS = ("Tuning", "Detection", "Correction", "Guidance")
+IDS = [name for name in gymnasium.registry if name.startswith("simnav/") and name.split("-")[1] in TASKS]
+
+
+def made(name, **options):
+    try:
+        return gymnasium.make(f"simnav:{name}", steps=3, **options)
+    except LogError as error:
+        pytest.skip(str(error))
+
+
+def test_every_scenario_has_every_task():
+    recorded = sum(header.recorded for header in headers())
+    assert 0 < recorded < len(headers())
+    assert len(IDS) == 4 * len(headers()) - recorded
+    assert "simnav/OpenSea-Tuning-v1" in IDS
+    assert "simnav/CarKitti-Guidance-v1" not in IDS
+
+
+@pytest.mark.filterwarnings("ignore::simnav.log.LogWarning")
+@pytest.mark.parametrize("name", IDS)
+def test_every_id(name):
+    try:
+        env = RecordEpisodeStatistics(made(name, render_mode="rgb_array", reveal_truth=True))
+        env.reset(seed=1)
+    except LogError as error:
+        pytest.skip(str(error))
+    env.action_space.seed(1)
+    rewards, over = [], False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        assert observation in env.observation_space
+        assert observation.dtype == np.float32
+        rewards.append(reward)
+        over = terminated or truncated
+    assert info["episode"]["r"] == pytest.approx(sum(rewards))
+    assert np.isfinite(rewards).all()
+    assert len(rewards) == 3
+    assert env.spec.id == name
+    again = EnvSpec.from_json(env.spec.to_json())
+    assert again.kwargs["scenario"] == env.spec.kwargs["scenario"]
+    assert pickle.loads(pickle.dumps(env.spec)).id == name
+
+
+@pytest.mark.filterwarnings("ignore::simnav.log.LogWarning")
+@pytest.mark.filterwarnings("ignore:.*not within:UserWarning")
+@pytest.mark.parametrize("name", [n for n in IDS if n.startswith(("simnav/OpenSea", "simnav/ShipTurn", "simnav/Auv"))])
+def test_gymnasiums_checker_finds_nothing(name):
+    try:
+        check_env(made(name).unwrapped, skip_render_check=True)
+    except LogError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_many_at_once_a_film_a_pickle_and_a_window(task, tmp_path):
+    name = f"simnav:simnav/GnssNoiseStep-{task}-v1"
+    envs = gymnasium.make_vec(name, num_envs=2, steps=3)
+    observation, _ = envs.reset(seed=1)
+    assert observation in envs.observation_space
+    envs.step(envs.action_space.sample())
+    env = gymnasium.make(name, steps=3)
+    env.reset(seed=1)
+    copy = pickle.loads(pickle.dumps(env))
+    action = env.action_space.sample()
+    np.testing.assert_array_equal(env.step(action)[0], copy.step(action)[0])
+    stacked = FrameStackObservation(gymnasium.make(name, steps=3), 4)
+    assert stacked.reset(seed=1)[0].shape == (4, *env.observation_space.shape)
+    pytest.importorskip("moviepy", reason="Gymnasium makes films with moviepy")
+    film = RecordVideo(gymnasium.make(name, steps=3, render_mode="rgb_array"), str(tmp_path), disable_logger=True)
+    film.reset(seed=1)
+    over = False
+    while not over:
+        *_, over, _ = film.step(film.action_space.sample())
+    film.close()
+    assert list(tmp_path.glob("*.mp4"))
+
+
+def test_a_frame_shows_the_track_a_fault_the_error_and_the_ellipse():
+    env = gymnasium.make("simnav:simnav/GnssNoiseStep-Tuning-v1", render_mode="rgb_array").unwrapped
+    env.reset(seed=1)
+    for _ in range(200):
+        env.step(np.zeros(2, np.float32))
+    frame = env.render()
+    assert frame.shape == (720, 720, 3)
+    chart = env._chart
+    outline = np.array(chart._outline.get_data())
+    assert outline.shape == (2, 49)
+    assert np.isfinite(outline).all()
+    assert len(chart._faults) > 30
+    assert len(chart._error) > 100
+    env.close()
