@@ -6,7 +6,7 @@ SITE ?= site
 DOCS ?= site-docs
 BIN := $(VENV)/bin
 
-.PHONY: help leaderboard test bench docs clean
+.PHONY: help leaderboard test bench audit docs clean
 
 help:
 	@echo "make leaderboard   set up, run the quick campaign, print the ranking, write the site"

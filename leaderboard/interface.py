@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
+    from simnav.leaderboard.campaign.verification import Verification
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.bounds import BoundReport
@@ -72,6 +73,7 @@ __all__ = [
     "scenarios_of",
     "sweep",
     "tune",
+    "verify",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -329,6 +331,8 @@ def campaign(
     retry: bool = False,
     keep_trials: bool = False,
     covariance_interval: float = 0.0,
+    confinement: str = "auto",
+    sealed: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run estimators on scenarios and seeds. Started again, the campaign continues.
@@ -354,6 +358,10 @@ def campaign(
     covariance_interval : float
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.
+    confinement : {"auto", "bubblewrap", "process", "none"}
+        How estimators are kept apart from the recording, see docs/security.md; default: the strongest that works here.
+    sealed : path, optional
+        File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
 
     Returns
     -------
@@ -361,6 +369,7 @@ def campaign(
         Of all that is in the folder.
     """
     from simnav.leaderboard.campaign.campaign import RUNS, combined
+    from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.profiles import load
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
@@ -368,16 +377,56 @@ def campaign(
     parts: list[tuple[Scenarios, Estimators, int]] = [(scenarios, estimators, runs or RUNS)]
     if profile is not None:
         parts = [(scenarios or p.scenarios, estimators or p.estimators, runs or p.runs) for p in load(profile).parts]
-    folder, summaries = absolute(output), []
+    folder, summaries, seal = absolute(output), [], None if sealed is None else read_seal(sealed)
     tracks: dict[str, str] = {}
     for wanted, those, count in parts:
         chosen, everyone = scenarios_of(wanted), requests(those, parameters)
         tracks |= {s.id: s.track for s in chosen}
         summaries.append(_run(chosen, everyone, range(seed, seed + count), folder, workers, time_limit, memory_limit,
                               progress, retry=retry, keep_trials=keep_trials,
-                              covariance_interval=covariance_interval))  # fmt: skip
+                              covariance_interval=covariance_interval, confinement=confinement, seal=seal))  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks=tracks), combined(summaries))
+
+
+def verify(
+    results: str | os.PathLike[str],
+    *,
+    key: str | os.PathLike[str] | None = None,
+    sample: int = 10,
+    scenarios: Scenarios = None,
+    estimators: Estimators = None,
+    progress: Callable[..., None] | None = None,
+) -> Verification:
+    """Check the seal of results, and repeat a sample of them: they should be the same to the bit.
+
+    Parameters
+    ----------
+    results : path
+        Folder that a campaign wrote.
+    key : path, optional
+        Published key of a sealed campaign.
+    sample : int
+        Runs that are repeated at most.
+    scenarios, estimators : optional
+        That are not in the catalogue or not registered.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the next.
+
+    Returns
+    -------
+    Verification
+    """
+    from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.leaderboard.campaign.verification import verify_results
+    from simnav.leaderboard.results.store import StoreError
+
+    given = [] if scenarios is None else scenarios_of(scenarios)
+    with mistakes(StoreError):
+        return verify_results(
+            absolute(results), None if key is None else read_seal(key), sample=sample, scenarios=given,
+            estimators=requests(estimators) if estimators else [], progress=progress,
+        )  # fmt: skip
 
 
 def sweep(

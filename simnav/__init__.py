@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         run,
         sweep,
         tune,
+        verify,
     )
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
@@ -106,6 +107,7 @@ __all__ = [
     "score",
     "sweep",
     "tune",
+    "verify",
 ]
 
 # Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
@@ -151,6 +153,7 @@ _HOMES = {
         "run",
         "sweep",
         "tune",
+        "verify",
     ),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}

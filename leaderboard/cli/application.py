@@ -30,6 +30,7 @@ from simnav.leaderboard.cli import (
     sweep,
     train,
     tune,
+    verify,
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
@@ -90,6 +91,7 @@ for _module in (
     bound,
     reproduce,
     rescore,
+    verify,
     cite,
     tune,
 ):
