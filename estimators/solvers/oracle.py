@@ -66,7 +66,7 @@ class OracleEstimator(KalmanEstimator):
         return (AID,)
 
     def reveal(self, recording: Recording) -> None:
-        """Take the labels, and the true datasheets where those that are given are wrong."""
+        """Take the labels, and what is true where datasheets or the start's covariance are wrong."""
         self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
         self._motion = true_motion(recording) if recording.instruments.imu is None else None
@@ -78,6 +78,8 @@ class OracleEstimator(KalmanEstimator):
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
+        if self._recording.actual_covariance is not None:
+            start = replace(start, covariance=self._recording.actual_covariance)
         if self._recording.actual is not None:
             instruments = self._recording.actual
         if self._motion is not None:
