@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
+    from simnav.leaderboard.campaign.verification import Verification
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.bounds import BoundReport
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.tuning.space import Range
+    from simnav.leaderboard.tuning.tuning import Method, Tuning
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
@@ -71,6 +74,8 @@ __all__ = [
     "scenario_of",
     "scenarios_of",
     "sweep",
+    "tune",
+    "verify",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -328,6 +333,8 @@ def campaign(
     retry: bool = False,
     keep_trials: bool = False,
     covariance_interval: float = 0.0,
+    confinement: str = "auto",
+    sealed: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run estimators on scenarios and seeds. Started again, the campaign continues.
@@ -352,6 +359,10 @@ def campaign(
     covariance_interval : float
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.
+    confinement : {"auto", "bubblewrap", "process", "none"}
+        How estimators are kept apart from the recording, see docs/security.md; default: the strongest that works here.
+    sealed : path, optional
+        File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
 
     Returns
     -------
@@ -359,6 +370,7 @@ def campaign(
         Of all that is in the folder.
     """
     from simnav.leaderboard.campaign.campaign import QUICK_RUNS, RUNS
+    from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
 
@@ -368,9 +380,50 @@ def campaign(
     chosen, folder = scenarios_of(scenarios, quick=quick), absolute(output)
     everyone = requests(estimators, parameters)
     summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
-                   keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
+                   keep_trials=keep_trials, covariance_interval=covariance_interval, confinement=confinement,
+                   seal=None if sealed is None else read_seal(sealed))  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
+
+
+def verify(
+    results: str | os.PathLike[str],
+    *,
+    key: str | os.PathLike[str] | None = None,
+    sample: int = 10,
+    scenarios: Scenarios = None,
+    estimators: Estimators = None,
+    progress: Callable[..., None] | None = None,
+) -> Verification:
+    """Check the seal of results, and repeat a sample of them: they should be the same to the bit.
+
+    Parameters
+    ----------
+    results : path
+        Folder that a campaign wrote.
+    key : path, optional
+        Published key of a sealed campaign.
+    sample : int
+        Runs that are repeated at most.
+    scenarios, estimators : optional
+        That are not in the catalogue or not registered.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the next.
+
+    Returns
+    -------
+    Verification
+    """
+    from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.leaderboard.campaign.verification import verify_results
+    from simnav.leaderboard.results.store import StoreError
+
+    given = [] if scenarios is None else scenarios_of(scenarios)
+    with mistakes(StoreError):
+        return verify_results(
+            absolute(results), None if key is None else read_seal(key), sample=sample, scenarios=given,
+            estimators=requests(estimators) if estimators else [], progress=progress,
+        )  # fmt: skip
 
 
 def sweep(
@@ -452,9 +505,10 @@ def rank(
     -------
     simnav.leaderboard.ranking.board.Ranking
     """
-    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
 
-    given = results_of(results) if isinstance(results, (str, os.PathLike)) else results
+    wanted = RANKED_SCORES | ({score} if score else set())
+    given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else results
     return rank(given, score=score, tracks=tracks)
 
 
@@ -611,6 +665,72 @@ def reproduce(
         if until_decided:
             return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
         return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
+
+
+def tune(
+    estimator: EstimatorLike,
+    families: Scenarios = ("training-voyages", "training-clean"),
+    vary: Sequence[str | Range] | str | None = None,
+    *,
+    runs: int = 20,
+    unseen: int = 20,
+    seed: int = 0,
+    evaluations: int = 40,
+    method: Method = "differential-evolution",
+    search_seed: int = 0,
+    progress: Callable[..., None] | None = None,
+) -> Tuning:
+    """Choose parameters of an estimator on training families.
+
+    Parameters
+    ----------
+    estimator : str, Path, type or pair
+        Parameters that it sets hold.
+    families : scenarios
+        Training families; their voyages share no random stream with any other scenario's.
+    vary : sequence of str or Range, or str, optional
+        What is varied, like ``"dof=2:50:log"``; several are a list, or a text with commas. Default: what was varied
+        for the file that ships with the row (``estimators/tuned``).
+    runs, unseen : int
+        Voyages of each family for the search, and for the comparison afterwards.
+    seed : int
+        Of the first voyage; those for the comparison follow upon those for the search.
+    evaluations : int
+        Of the objective.
+    method : str
+        ``differential-evolution`` or ``nelder-mead``.
+    search_seed : int
+        Of the search's own random numbers.
+    progress : callable, optional
+        Called with how many of how many parts are done, and ``note=`` what is next.
+
+    Returns
+    -------
+    Tuning
+
+    Raises
+    ------
+    RequestError
+        If a scenario is not for training, or a parameter cannot be varied.
+    """
+    from simnav.leaderboard.tuning.tuning import TUNED, ranges_of, read, tune_row
+
+    request = one_request(estimator)
+    with mistakes():
+        request.make()
+    chosen = scenarios_of(families)
+    if vary is None:
+        path = TUNED / f"{request.name}.json"
+        if not path.is_file():
+            raise RequestError(f"{request.label} ships without a tuning: say what to vary, like vary='dof=2:50:log'")
+        vary = ranges_of(read(path))
+    ranges = [text for text in vary.split(",") if text.strip()] if isinstance(vary, str) else list(vary)
+    if min(runs, unseen) < 2:
+        raise RequestError(f"runs = {runs}, unseen = {unseen}: both should be 2 or more")
+    return tune_row(
+        request, chosen, ranges, runs=runs, unseen=unseen, seed=seed, evaluations=evaluations, method=method,
+        search_seed=search_seed, progress=progress,
+    )  # fmt: skip
 
 
 @contextlib.contextmanager

@@ -47,7 +47,7 @@ _ORIGIN = {
     "memory_limit_bytes": "memory_limit",
 }
 _PROVENANCE = ("benchmark", "commit", "dirty", "simnav", "python", "numpy", "numba", "gtsam", "system", "cpu", "cores",
-               "confinement", "date")  # fmt: skip
+               "confinement", "seal", "date")  # fmt: skip
 
 
 @dataclass(frozen=True)
