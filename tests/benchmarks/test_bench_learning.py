@@ -3,8 +3,8 @@
 ``pytest tests/benchmarks/test_bench_learning.py --benchmark-enable -s``. The three vector forms step the same voyages
 in turn, so that the ratios hold on a machine that is busy. All is in one process on one core, but for
 ``AsyncVectorEnv``, which has a process for each of its four environments. The vector form is measured on voyages that
-are prepared; what the preparation of a voyage costs is told beside it. Targets: 20 times ``SyncVectorEnv``; 50 000 steps
-a second.
+are prepared; what the preparation of a voyage costs is told beside it. Targets: 20 times ``SyncVectorEnv``; 50 000
+steps a second.
 """
 
 from __future__ import annotations
