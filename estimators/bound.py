@@ -1,4 +1,4 @@
-"""The posterior Cramer-Rao bound of a scenario: how accurate any real-time estimator can be, by epoch.
+"""The posterior Cramer-Rao bound of a scenario: the best possible accuracy of a real-time estimator, by epoch.
 
 For a state that moves with Phi and Q and is measured with H and R, Jacobians at the truth, the information obeys ::
 
@@ -66,7 +66,9 @@ class Bound:
     scenario : str
         Its id.
     kind : str
+        Which bound it is.
     runs : int
+        Number of simulated runs that it is the mean of.
     time : (T,) array
         Ends of the steps [s].
     covariance : (T, 9, 9) array
@@ -129,6 +131,7 @@ def information(recording: Recording, kind: Kind = "flags", smoothed: bool = Fal
     recording : Recording
         From `simnav.simulator.ideal`.
     kind : str
+        Which bound is computed.
     smoothed : bool
         What all measurements say, not only those so far.
 

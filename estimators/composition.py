@@ -1,4 +1,4 @@
-"""How a row is declared: a solver, and the pieces that it works with; their parameters become the row's.
+"""Declaration of rows: a solver and its pieces, whose parameters become those of the row.
 
 A row is a class without a body::
 
@@ -31,7 +31,7 @@ __all__ = ["Piece", "Row", "Solver", "piece"]
 
 
 class Solver(Estimator):
-    """Base of the estimators that are put together from pieces.
+    """Base of the estimators that are composed of pieces.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class Row(Estimator):
         return self.solver.smooth()
 
     def reveal(self, recording: Recording) -> None:
-        """Let a solver that is told the truth have it."""
+        """Pass the truth to a solver that is a reference."""
         self.solver.reveal(recording)
 
     def __getattr__(self, name: str) -> Any:

@@ -1,4 +1,4 @@
-"""A door for filters of filterpy; it is in `simnav.estimators.solvers.filterpy_adapter`."""
+"""Adapter for filters of filterpy, from `simnav.estimators.solvers.filterpy_adapter`."""
 
 from simnav.estimators.solvers.filterpy_adapter import FilterpyEstimator
 

@@ -1,10 +1,10 @@
-"""What a caller gives to `simnav.leaderboard.interface`, made into what the rest works with: scenarios, results."""
+"""Conversion of the arguments of `simnav.leaderboard.interface`: scenarios and results."""
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -31,7 +31,7 @@ def scenario_of(given: ScenarioLike) -> Scenario:
 
 
 def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str], None] | None = None) -> list[Scenario]:
-    """The scenarios that were asked for; where none was, those of the catalogue.
+    """The requested scenarios; without a request, those of the catalogue.
 
     Of the catalogue, families for training are left out, and logs whose files are not here.
 
@@ -85,14 +85,25 @@ def quick_estimators(note: Callable[[str], None] | None = None) -> list[str]:
     return [name for name in names() if name not in slow]
 
 
-def results_of(folder: str | os.PathLike[str], *, series: bool = False) -> list[Result]:
-    """The current results of a folder, all of one version of the benchmark; ``series`` are what charts need."""
+def results_of(
+    folder: str | os.PathLike[str], *, series: bool = False, scores: Collection[str] | None = None
+) -> list[Result]:
+    """The current results of a folder, all of one version of the benchmark.
+
+    Parameters
+    ----------
+    folder : path
+    series : bool
+        With the series that charts need; they stay on disk until they are asked for.
+    scores : collection of str, optional
+        Only these scores. Default: all.
+    """
     from simnav.leaderboard.results.provenance import benchmark_of
     from simnav.leaderboard.results.store import StoreError, load
 
     path = absolute(folder)
     with mistakes(StoreError):
-        results = load(path, series=series)
+        results = load(path, series=series, scores=scores)
     if not results:
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
     benchmark_of(r.provenance for r in results)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
+    from simnav.leaderboard.campaign.verification import Verification
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.bounds import BoundReport
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.tuning.space import Range
+    from simnav.leaderboard.tuning.tuning import Method, Tuning
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
@@ -71,6 +74,8 @@ __all__ = [
     "scenario_of",
     "scenarios_of",
     "sweep",
+    "tune",
+    "verify",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -83,6 +88,7 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     Parameters
     ----------
     estimator : str, Path, type or pair
+        Name, file or class, also with parameters.
     **parameters
         Of its constructor; texts are converted as on the command line.
 
@@ -105,7 +111,9 @@ def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     seed : int
+        Seed of the run.
 
     Raises
     ------
@@ -212,14 +220,16 @@ def run(
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> RunReport:
-    """Run estimators once over one scenario, in this process, and score them.
+    """Run estimators once on one scenario, in this process, and score them.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     estimators : estimators, optional
         Default: all registered ones.
     seed : int
+        Seed of the run.
     parameters : mapping, optional
         Of the estimators; of several each gets those that it has.
     progress : callable, optional
@@ -249,13 +259,14 @@ def evaluate(
     results: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> EvaluationReport:
-    """Run estimators beside the baselines on the same seeds, and say where they stand.
+    """Compare estimators with the baselines on the same seeds.
 
     Parameters
     ----------
     estimators : estimators
         Those in question.
     scenarios : scenarios
+        One scenario or several, by name, file or themselves.
     runs : int
         Seeds a scenario.
     seed : int
@@ -322,9 +333,11 @@ def campaign(
     retry: bool = False,
     keep_trials: bool = False,
     covariance_interval: float = 0.0,
+    confinement: str = "auto",
+    sealed: str | os.PathLike[str] | None = None,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
-    """Run scenarios x estimators x seeds; started again, it goes on where it was.
+    """Run estimators on scenarios and seeds. Started again, the campaign continues.
 
     Parameters
     ----------
@@ -346,6 +359,10 @@ def campaign(
     covariance_interval : float
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.
+    confinement : {"auto", "bubblewrap", "process", "none"}
+        How estimators are kept apart from the recording, see docs/security.md; default: the strongest that works here.
+    sealed : path, optional
+        File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
 
     Returns
     -------
@@ -353,6 +370,7 @@ def campaign(
         Of all that is in the folder.
     """
     from simnav.leaderboard.campaign.campaign import QUICK_RUNS, RUNS
+    from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
 
@@ -362,9 +380,50 @@ def campaign(
     chosen, folder = scenarios_of(scenarios, quick=quick), absolute(output)
     everyone = requests(estimators, parameters)
     summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
-                   keep_trials=keep_trials, covariance_interval=covariance_interval)  # fmt: skip
+                   keep_trials=keep_trials, covariance_interval=covariance_interval, confinement=confinement,
+                   seal=None if sealed is None else read_seal(sealed))  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
+
+
+def verify(
+    results: str | os.PathLike[str],
+    *,
+    key: str | os.PathLike[str] | None = None,
+    sample: int = 10,
+    scenarios: Scenarios = None,
+    estimators: Estimators = None,
+    progress: Callable[..., None] | None = None,
+) -> Verification:
+    """Check the seal of results, and repeat a sample of them: they should be the same to the bit.
+
+    Parameters
+    ----------
+    results : path
+        Folder that a campaign wrote.
+    key : path, optional
+        Published key of a sealed campaign.
+    sample : int
+        Runs that are repeated at most.
+    scenarios, estimators : optional
+        That are not in the catalogue or not registered.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the next.
+
+    Returns
+    -------
+    Verification
+    """
+    from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.leaderboard.campaign.verification import verify_results
+    from simnav.leaderboard.results.store import StoreError
+
+    given = [] if scenarios is None else scenarios_of(scenarios)
+    with mistakes(StoreError):
+        return verify_results(
+            absolute(results), None if key is None else read_seal(key), sample=sample, scenarios=given,
+            estimators=requests(estimators) if estimators else [], progress=progress,
+        )  # fmt: skip
 
 
 def sweep(
@@ -446,9 +505,10 @@ def rank(
     -------
     simnav.leaderboard.ranking.board.Ranking
     """
-    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
 
-    given = results_of(results) if isinstance(results, (str, os.PathLike)) else results
+    wanted = RANKED_SCORES | ({score} if score else set())
+    given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else results
     return rank(given, score=score, tracks=tracks)
 
 
@@ -514,11 +574,12 @@ def bound(
     smoothed: bool = False,
     progress: Callable[..., None] | None = None,
 ) -> BoundReport:
-    """The posterior Cramer-Rao bound of a simulated scenario: no estimator can be better.
+    """The posterior Cramer-Rao bound of a simulated scenario: a lower limit of the error.
 
     Parameters
     ----------
     scenario : str, Path or Scenario
+        Name, file or the scenario itself.
     runs : int
         Seeds over which it is averaged.
     smoothed : bool
@@ -604,6 +665,72 @@ def reproduce(
         if until_decided:
             return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
         return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
+
+
+def tune(
+    estimator: EstimatorLike,
+    families: Scenarios = ("training-voyages", "training-clean"),
+    vary: Sequence[str | Range] | str | None = None,
+    *,
+    runs: int = 20,
+    unseen: int = 20,
+    seed: int = 0,
+    evaluations: int = 40,
+    method: Method = "differential-evolution",
+    search_seed: int = 0,
+    progress: Callable[..., None] | None = None,
+) -> Tuning:
+    """Choose parameters of an estimator on training families.
+
+    Parameters
+    ----------
+    estimator : str, Path, type or pair
+        Parameters that it sets hold.
+    families : scenarios
+        Training families; their voyages share no random stream with any other scenario's.
+    vary : sequence of str or Range, or str, optional
+        What is varied, like ``"dof=2:50:log"``; several are a list, or a text with commas. Default: what was varied
+        for the file that ships with the row (``estimators/tuned``).
+    runs, unseen : int
+        Voyages of each family for the search, and for the comparison afterwards.
+    seed : int
+        Of the first voyage; those for the comparison follow upon those for the search.
+    evaluations : int
+        Of the objective.
+    method : str
+        ``differential-evolution`` or ``nelder-mead``.
+    search_seed : int
+        Of the search's own random numbers.
+    progress : callable, optional
+        Called with how many of how many parts are done, and ``note=`` what is next.
+
+    Returns
+    -------
+    Tuning
+
+    Raises
+    ------
+    RequestError
+        If a scenario is not for training, or a parameter cannot be varied.
+    """
+    from simnav.leaderboard.tuning.tuning import TUNED, ranges_of, read, tune_row
+
+    request = one_request(estimator)
+    with mistakes():
+        request.make()
+    chosen = scenarios_of(families)
+    if vary is None:
+        path = TUNED / f"{request.name}.json"
+        if not path.is_file():
+            raise RequestError(f"{request.label} ships without a tuning: say what to vary, like vary='dof=2:50:log'")
+        vary = ranges_of(read(path))
+    ranges = [text for text in vary.split(",") if text.strip()] if isinstance(vary, str) else list(vary)
+    if min(runs, unseen) < 2:
+        raise RequestError(f"runs = {runs}, unseen = {unseen}: both should be 2 or more")
+    return tune_row(
+        request, chosen, ranges, runs=runs, unseen=unseen, seed=seed, evaluations=evaluations, method=method,
+        search_seed=search_seed, progress=progress,
+    )  # fmt: skip
 
 
 @contextlib.contextmanager

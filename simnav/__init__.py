@@ -34,6 +34,8 @@ if TYPE_CHECKING:
         rescore,
         run,
         sweep,
+        tune,
+        verify,
     )
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
@@ -104,6 +106,8 @@ __all__ = [
     "run_trial",
     "score",
     "sweep",
+    "tune",
+    "verify",
 ]
 
 # Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
@@ -148,6 +152,8 @@ _HOMES = {
         "rescore",
         "run",
         "sweep",
+        "tune",
+        "verify",
     ),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}

@@ -3,7 +3,7 @@
 A pack is an importable package that holds scenario files (``*.toml``, and those of families in ``families/*.toml``);
 installing it is all it takes. Only the heads of the files are read here, because ``import simnav`` asks for them to
 register its Gymnasium ids. A broken pack or file is named in a warning and
-harms nobody else.
+does not affect the others.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """How classes and functions of others become known: by a decorator, from entry points of packages, from single files.
 
-A `Registry` holds those of one sort, by name. Entry points are loaded when they are first needed; one that fails
-is named in a warning and harms nobody else. simnav's own classes are registered by the same decorators, and first, so
-that a plug-in cannot take their names.
+A `Registry` holds those of one sort, by name. Entry points are loaded when they are first needed; one that fails is
+named in a warning and does not affect the others. simnav's own classes are registered by the same decorators, and
+first, so that a plug-in cannot take their names.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Declarative specifications: SI in memory, usual units in TOML, errors that name the key.
 
 A `Spec` is a frozen pydantic model whose fields hold SI units. A field declared with a `unit` is
-written in TOML under its name with the unit as suffix, so that nobody has to guess::
+written in TOML under its name with the unit as suffix, so that the unit is always clear::
 
     class Gyroscope(Spec):
         random_walk: NonNegative = quantity("deg_sqrt_h", 0.0)     # rad/sqrt(s) in memory

@@ -1,4 +1,4 @@
-"""Compile every kernel ahead, once, so that nobody waits for it in the middle of a run."""
+"""Compile every kernel in advance, so that no run has to wait for it."""
 
 from __future__ import annotations
 

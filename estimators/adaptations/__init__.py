@@ -1,1 +1,1 @@
-"""How the noise is adapted: pieces that any solver takes."""
+"""Adaptations: pieces that choose the noise of each measurement, for any solver."""

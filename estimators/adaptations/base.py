@@ -1,4 +1,4 @@
-"""What an adaptation is: it sees each innovation before it is used, and decides on its noise."""
+"""Base of the adaptations: an adaptation receives each innovation before it is used, and chooses its noise."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ __all__ = ["Adaptation", "Innovation"]
 
 
 class Innovation(NamedTuple):
-    """One innovation of m components, with what is believed of it.
+    """One innovation of m components, with its predicted covariance and its noise.
 
     Attributes
     ----------
     measurement : Measurement
+        The measurement that the innovation belongs to.
     residual : (m,) array
         Measured minus predicted, in the units of ``KINDS[kind].errors``.
     predicted : (m, m) array
@@ -36,7 +37,7 @@ class Innovation(NamedTuple):
 
 
 class Adaptation:
-    """Uses every measurement with the noise that the model says; the base of all adaptations.
+    """Base of all adaptations: uses every measurement with the noise of the model.
 
     One that gates by a chi-square test::
 

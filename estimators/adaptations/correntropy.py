@@ -1,4 +1,4 @@
-"""Maximum correntropy: a Gaussian kernel on the residuals in the place of their square."""
+"""Maximum correntropy: a Gaussian kernel of the residuals in place of their square."""
 
 from __future__ import annotations
 
@@ -24,10 +24,13 @@ def correntropy_noise(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     innovation : (m,) array
+        Measurement minus its prediction.
     predicted, nominal : (m, m) arrays
         H P H' and R.
     bandwidth, smallest : float
+        Bandwidth of the kernel in sigma, and the least weight of a measurement.
     iterations : int
+        Number of fixed-point iterations.
     from_update : bool
         Begin with the residual after the plain update, not with the innovation.
     noise : (m, m) array

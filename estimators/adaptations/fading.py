@@ -1,4 +1,4 @@
-"""Fading memory: P is inflated, so that old information counts for less."""
+"""Fading memory: the covariance is inflated, so that old information has less weight."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Chi-square gating, with a way back."""
+"""Chi-square gating, with a recovery after repeated rejections."""
 
 from __future__ import annotations
 

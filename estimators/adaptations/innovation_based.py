@@ -16,7 +16,7 @@ __all__ = ["FixedWindow", "InnovationBased", "adaptive_window"]
 
 @kernel("i8(f8, f8, f8, f8, i8, i8)")
 def adaptive_window(variance, nominal, low, high, shortest, longest):  # type: ignore[no-untyped-def]
-    """Length of the window after paper 001, eq. 20: the more the innovations scatter, the longer.
+    """Length of the window after Mao, Wang and Fu (2025), eq. 20: the more the innovations scatter, the longer.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class _Window:
 class InnovationBased(EstimatedNoise):
     """R as the mean over a window, of fixed or adaptive length.
 
-    Mehra (1970), Mohamed and Schwarz (1999); paper 001, eqs. 16-20. For the M last innovations v::
+    Mehra (1970), Mohamed and Schwarz (1999); Mao, Wang and Fu (2025), eqs. 16-20. For the M last innovations v::
 
         innovation:  R = 1/M sum(v v') - H P H'           (eqs. 16-17)
         residual:    R = 1/M sum(e e' + H P+ H')          e: residual after the update; positive definite always
@@ -117,6 +117,7 @@ class InnovationBased(EstimatedNoise):
     Parameters
     ----------
     source : "innovation" or "residual"
+        What the noise is estimated from: innovations, or residuals after the update.
     shortest, longest : int
         M_min and M_max; equal for a fixed window.
     low, high : float
@@ -185,7 +186,7 @@ class InnovationBased(EstimatedNoise):
 
 
 class FixedWindow(InnovationBased):
-    """R as the mean over a fixed number of innovations: paper 001's IAE-FGO-Fix in a graph.
+    """R as the mean over a fixed number of innovations; in a graph, IAE-FGO-Fix of Mao, Wang and Fu (2025).
 
     Parameters
     ----------

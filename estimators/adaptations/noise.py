@@ -1,4 +1,4 @@
-"""What adaptations of the noise share: the report of the sigma in use, bounds on an estimate, and the posterior."""
+"""Base classes of adaptations of the noise: report of the sigma in use, bounds of an estimate, and the posterior."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ def posterior(innovation, predicted, noise, residual, after):  # type: ignore[no
     Parameters
     ----------
     innovation : (m,) array
+        Measurement minus its prediction.
     predicted, noise : (m, m) arrays
         H P H' and R.
     residual : (m,) array
@@ -86,20 +87,23 @@ def _sigmas(noise):  # type: ignore[no-untyped-def]
 
 
 class Posterior:
-    """What using a measurement with noise R would give, in the measurement's own m components.
+    """The result of an update with noise R, in the m components of the measurement.
 
     See `posterior`.
 
     Parameters
     ----------
     innovation : Innovation
+        The innovation that is used.
     noise : (m, m) array
+        Covariance of the measurement noise R.
 
     Attributes
     ----------
     nis : float
         -1 where S is singular; then nothing is corrected.
     residual : (m,) array
+        Measurement minus its prediction after the update.
     predicted : (m, m) array
         H P+ H'.
     """
@@ -155,11 +159,11 @@ class NoiseAdaptation(Adaptation):
         """The (m, m) noise to use, or None to leave the measurement out."""
 
     def report(self, label: str, value: float) -> None:
-        """Set a diagnostic; it stands until it is set again."""
+        """Set a diagnostic; it keeps its value until it is set again."""
         self._report[label] = value
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """`choose`, with its sigma noted; an instrument without noise stays as it is."""
+        """Call `choose` and record its sigma; an instrument without noise keeps its noise."""
         self.inflation = 1.0
         name = innovation.measurement.instrument
         if innovation.noise is not self._noisy.get(name):
@@ -178,17 +182,17 @@ class NoiseAdaptation(Adaptation):
         return noise
 
     def diagnostics(self) -> dict[str, float | Array]:
-        """The sigmas last used, and what else was reported."""
+        """The sigmas last used, and other reported values."""
         return self._report
 
 
 class EstimatedNoise(NoiseAdaptation):
-    """An adaptation that estimates R; holds its bounds and says whose R is estimated. A subclass gives `estimate`.
+    """Base of adaptations that estimate R: keeps the estimate within bounds. A subclass gives `estimate`.
 
-    An innovation of covariance ``H P H' + R`` says little of R where the prediction is less certain than the
-    measurement, as after a start from a poor heading, in an outage, or with centimetre positions. There the noise that
-    was used last stands, and the estimate does not see the innovation. Without this rule, random clean voyages cost
-    ``iae-fgo`` up to twice the error of ``sw-fgo``.
+    An innovation has the covariance ``H P H' + R``. It says little about R if the prediction is less certain than the
+    measurement: after a start with a poor heading, in an outage, or with positions of centimetre accuracy. Then the
+    noise used last is kept, and the innovation is not used for the estimate. Without this rule ``iae-fgo`` has up to
+    twice the error of ``sw-fgo`` on random voyages without faults.
 
     Parameters
     ----------
@@ -200,7 +204,7 @@ class EstimatedNoise(NoiseAdaptation):
         False: variances only, with the nominal correlations. An instrument's components err independently by its
         datasheet, and m (m - 1)/2 covariances that are zero cost accuracy to estimate.
     scope : "fixes" or "all"
-        Whose noise is estimated: GNSS positions and terrain fixes (as in paper 001), or every instrument's.
+        Whose noise is estimated: GNSS positions and terrain fixes (as in Mao, Wang and Fu 2025), or every instrument's.
 
     Raises
     ------
@@ -234,6 +238,7 @@ class EstimatedNoise(NoiseAdaptation):
         Parameters
         ----------
         estimate, nominal : (m, m) array
+            The estimated and the datasheet's covariance of the noise.
         """
         low, high = self.lowest * self.lowest, self.highest * self.highest
         m = len(nominal)

@@ -1,4 +1,4 @@
-"""Whose fault it is: where instruments of two kinds disagree with the prediction together, it is the prediction's."""
+"""Test of the prediction: if fixes and velocities disagree with it together, the prediction is wrong."""
 
 from __future__ import annotations
 
@@ -26,16 +26,17 @@ def standardised(residual, predicted, noise):  # type: ignore[no-untyped-def]
 
 
 class PredictionTest:
-    """Chi-square tests of the fixes and of the logs, which fail together when the prediction is wrong.
+    """Chi-square tests of fixes and logs, which fail together if the prediction is wrong.
 
-    An adaptation that gives less weight to what does not fit the prediction is lost when it is the prediction that is
-    wrong (a disturbed IMU): nothing fits, nothing is believed, and nothing brings the filter back. Paper 003 tells the
-    two cases apart by the chi-square tests of GNSS and DVL: one fails, that instrument is wrong; both fail, the
-    prediction. Gross errors of both that coincide are no such case, so that both must fail ``together`` times running.
+    An adaptation gives less weight to measurements that do not fit the prediction. If the prediction itself is wrong (a
+    disturbed IMU), no measurement fits, and the filter does not recover. Zhan et al. (2026) separate the two cases by
+    the chi-square tests of GNSS and DVL: if one of them fails, that instrument is wrong; if both fail, the prediction
+    is. Gross errors of both may coincide by chance, so both tests must fail ``together`` times in a row.
 
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
     together : int
         0: never.
     probability : float
@@ -56,7 +57,7 @@ class PredictionTest:
         self._blamed = 0
 
     def fails(self, innovation: Innovation) -> bool:
-        """Whether this instrument and one of the other group have failed often enough running, this time included.
+        """Whether this instrument and one of the other group have failed often enough in a row, this time included.
 
         The statistic is the sum of the squared standardised components of the innovation.
         """
@@ -77,9 +78,10 @@ class PredictionTest:
         )
 
     def inflation(self, innovation: Innovation) -> float:
-        """What to multiply P by, now that the prediction has failed: once for every ``together`` rounds of failures.
+        """Factor of P after a failure of the prediction: once for every ``together`` failures.
 
-        The root of the mean squared standardised component, over 2 (eqs. 28 and 34 of paper 003), within `limited`.
+        The root of the mean squared standardised component, over 2 (eqs. 28 and 34 of Zhan et al. 2026), within
+        `limited`.
         """
         self._blamed += 1
         if (self._blamed - 1) % (self.together * len(self._group)):
@@ -88,7 +90,7 @@ class PredictionTest:
         return self.limited(0.5 * sqrt(sum(u * u for u in components) / len(innovation.residual)), innovation)
 
     def limited(self, inflation: float, innovation: Innovation) -> float:
-        """An inflation that leaves P sound: what nothing observes would else grow without end.
+        """A limited inflation: without it, variances that no measurement observes would grow without bound.
 
         At most `LARGEST` at a time, and no variance beyond `TOTAL` times what it was at the first of them.
         """

@@ -1,4 +1,4 @@
-"""Equivalent weights: a measurement whose innovation is too large counts with more noise."""
+"""Equivalent weights: a measurement with a large innovation gets more noise."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class EquivalentWeights(NoiseAdaptation):
     ``R_ij`` becomes ``R_ij / sqrt(w(u_i) w(u_j))``, which keeps the correlations (the two-factor form of Yang, Song and
     Xu 2002). S and not R standardises, so that a filter that knows itself to be uncertain does not doubt good
     measurements. A weight is never less than ``smallest``, so that a filter that is wrong
-    itself is pulled back, if slowly, and not locked out.
+    itself is still corrected, though slowly.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class EquivalentWeights(NoiseAdaptation):
 
 
 class HuberWeights(EquivalentWeights):
-    """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
+    """Huber's equivalent weights: the influence of an innovation is bounded at k sigma.
 
     Huber's k = 1.345 keeps 95 % of the efficiency for each component; it cost up to 8 % of RMSE on clean data.
 

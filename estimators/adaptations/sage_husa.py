@@ -23,16 +23,17 @@ class SageHusa(EstimatedNoise):
     """Recursive maximum-a-posteriori estimate of R from all innovations so far, with or without fading.
 
     Sage and Husa (1969), "Adaptive filtering with unknown prior statistics", Joint Automatic Control Conference;
-    the rival of paper 001. For the k-th innovation v of an instrument::
+    Mao, Wang and Fu (2025) compare with it. For the k-th innovation v of an instrument::
 
         R_k = (1 - d_k) R_(k-1) + d_k (v v' - H P H'),    d_k = (1 - b) / (1 - b^(k + 1)),
 
     and d_k = 1 / (k + 1) for b = 1. The estimate may leave the positive definite matrices; the recursion goes on with
     it as it is, which keeps it unbiased, and what the filter uses is brought within bounds. Only R is estimated: Q
-    and R together are not identifiable from one innovation sequence, and paper 001 needs R.
+    and R together are not identifiable from one innovation sequence, and the comparison of
+    Mao, Wang and Fu needs R.
 
-    Paper 001 does not print b. Its figures come out with a filter that does not forget (b = 1, the row
-    ``sage-husa-paper``); a fading one is the fair rival.
+    Mao, Wang and Fu do not print b. Their figures agree with a filter that does not forget (b = 1, the row
+    ``sage-husa-paper``); a fading one is the fair comparison.
 
     Parameters
     ----------

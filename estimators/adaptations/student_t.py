@@ -42,10 +42,13 @@ def student_weight(innovation, predicted, noise, dof, iterations):  # type: igno
     Parameters
     ----------
     innovation : (m,) array
+        Measurement minus its prediction.
     predicted, noise : (m, m) arrays
         H P H' and R.
     dof : float
+        Degrees of freedom of the t distribution.
     iterations : int
+        Number of iterations between state and weight.
     """
     m = innovation.size
     residual, after, used = np.empty(m), np.empty((m, m)), np.empty((m, m))

@@ -1,4 +1,4 @@
-"""The oracles' adaptations: what each of them is told of the noise and the faults of a measurement.
+"""The adaptations of the oracles: what each of them knows of the noise and the faults of a measurement.
 
 A fault is known by its statistics, not by the value that it took. Of those that act on a measurement
 
@@ -151,7 +151,7 @@ class NominalNoise(TrueNoise):
 
 
 class MixtureNoise(TrueNoise):
-    """Knows how often gross errors come and how large they are, not which measurements they hit: the oracle O3.
+    """The rate and size of gross errors are known, but not which measurements have them: the oracle O3.
 
     Each measurement may have been hit by any of the gross errors that are about at its time. Weighed by Bayes' rule,
     with the innovation, the hypotheses give the noise ``R^-1 = sum w_j R_j^-1``, the information that is expected.
@@ -241,6 +241,7 @@ def fisher_information(probability: Array, variance: Array) -> Array:
     Parameters
     ----------
     probability : (c,) array
+        Probabilities of the components of the mixture.
     variance : (c, d) array
         Of each component under each hypothesis.
 

@@ -23,11 +23,13 @@ def variational_noise(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     innovation : (m,) array
+        Measurement minus its prediction.
     predicted, nominal : (m, m) arrays
         H P H' and R.
     shape : float
         Of the inverse gamma densities, this measurement included.
     iterations : int
+        Number of iterations between state and noise.
     lowest, highest : float
         Of the estimated variances over the nominal ones.
     scales : (m,) array

@@ -173,16 +173,21 @@ def solve_chain(  # type: ignore[no-untyped-def]
     error : (K - 1, n) array
         e, newer node less the motion of the older one.
     motion_weight : (K - 1,) array
+        Weights of the motion factors, which divide their noise.
     node : (M,) int array
         In ascending order; the first node is number ``base``.
     base : int
+        Number of the first node.
     components : (M,) int array
         0 for a factor that says nothing.
     jacobian : (M, 3, n) array
+        Jacobians of the measurements with respect to their nodes.
     residual : (M, 3) array
         Measured less predicted.
     aid_noise : (M, 3, 3) array
+        Covariances of the measurements.
     aid_weight : (M,) array
+        Weights of the measurements, which divide their noise.
     damping : float
         lambda, 0 for a Gauss-Newton step.
     first : int
@@ -192,8 +197,9 @@ def solve_chain(  # type: ignore[no-untyped-def]
     predicted_shift, filtered_shift : (K, n) arrays
         Overwritten with their means less the node.
     cross, white : (M, 3, n) arrays
+        Overwritten with ``L^-1 H P`` and ``L^-1 H`` of each measurement at its turn, ``L L'`` being S.
     innovation : (M, 3) array
-        Overwritten with ``L^-1 H P``, ``L^-1 H`` and ``L^-1 (r - H d)`` at its turn, ``L L'`` being S.
+        Overwritten with ``L^-1 (r - H d)``.
     used : (M,) int array
         Overwritten with 1 where a measurement counts, else 0.
     step : (K, n) array
@@ -336,6 +342,7 @@ def whiten(first, error, whitener, whitened, norm):  # type: ignore[no-untyped-d
     first : int
         Row to begin with.
     error : (N, n) array
+        Errors to be whitened.
     whitener : (N, n, n) array
         Lower triangular.
     whitened : (N, n) array
@@ -363,6 +370,7 @@ def keep_weights(before, norm, weight, node, base, aid_before, aid_norm, aid_wei
     node, base
         As for `solve_chain`.
     tolerance : float
+        Largest change of a weight that is ignored.
 
     Returns
     -------

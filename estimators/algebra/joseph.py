@@ -65,6 +65,7 @@ def joseph_update(covariance, cross, innovation_covariance, residual, correction
     innovation_covariance : (m, m) array
         S.
     residual : (m,) array
+        Measurement minus its prediction.
     correction : (n,) array
         Overwritten with K times the residual.
 

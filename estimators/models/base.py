@@ -1,4 +1,4 @@
-"""What a model is to a solver: a state with a local error, that moves, is observed and is corrected."""
+"""Base of the models: a state with a local error that is propagated, observed and corrected."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Linearised(NamedTuple):
     noise: Array
 
     def project(self, covariance: Array) -> Observation:
-        """What it says of a state with an (n, n) ``covariance``."""
+        """The Jacobian times an (n, n) ``covariance``: ``P H'`` and ``H P H'``."""
         d, n = self.jacobian.shape
         cross, predicted = np.empty((n, d)), np.empty((d, d))
         project(covariance, np.ascontiguousarray(self.jacobian, dtype=np.float64), cross, predicted)
@@ -75,6 +75,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         instruments : Instruments
+            Datasheets of the run's instruments.
         name : str
             Of the estimator, for the message.
 
@@ -147,6 +148,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         measurement : Measurement
+            The measurement to be used.
         covariance : (n, n) array
             Updated.
         correction : (n,) array

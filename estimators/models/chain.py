@@ -191,8 +191,9 @@ class Chain(ABC):
     ahead : float
         Time from the newest node to the front [s].
     prior : (n, n) array
+        Covariance of the first node without its own measurements.
     prior_shift : (n,) array
-        Of the first node without its measurements: covariance, and mean less the node.
+        Mean of the first node without its own measurements, minus the node.
     """
 
     def __init__(self, front: ErrorModel):
@@ -403,6 +404,7 @@ class Chain(ABC):
         Parameters
         ----------
         first : int
+            Index of the first measurement to be predicted.
         row : (M,) int array
             Of each aid in ``states``; -1 for those to be left alone.
         states : Columns

@@ -32,6 +32,7 @@ def with_correlated_fixes(instruments: Instruments, slow: float, slow_time: floa
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
     slow : float
         Least sigma of the slow error over that of the white noise.
     slow_time : float

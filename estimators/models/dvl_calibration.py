@@ -1,4 +1,4 @@
-"""The 23-state model of paper 003: the 15 inertial states, and eight errors of the DVL.
+"""The 23-state model of Zhan et al. (2026): the 15 inertial states and eight errors of the DVL.
 
 The eight are constants, after the DVL's datasheet: misalignment eta (3) [rad], lever-arm error dl (3) [m], scale-factor
 error k [-] and delay tau [s]. A DVL measurement that is stamped t reads ::
@@ -15,7 +15,7 @@ With M = (1 + k) D and errors that are estimate minus truth, the Jacobian is
 
 All other instruments have no states: their biases and in-run errors count as white noise.
 
-Source: Zhan et al. 2026 (paper 003), eqs. 1-2 and 13-21. Where it is unclear, this holds here:
+Source: Zhan et al. 2026, PLoS One 21(2) e0342016, eqs. 1-2 and 13-21. Where it is unclear, this holds here:
 
 - Eq. 19 has ``v - v x eta``, but eq. 17 with the DCM C_b^d of a small turn eta is ``v - eta x v = v + v x eta``. Here
   eta is the rotation vector by which the instrument's axes are turned from the body's, hence the latter;

@@ -30,6 +30,7 @@ class FaultState(NamedTuple):
     Attributes
     ----------
     instrument : str
+        Name of the instrument.
     sigma : (d,) array
         Of each component; no state where it is zero.
     correlation_time : float
@@ -52,6 +53,7 @@ class FaultStateModel(ErrorModel):
     inner : ErrorModel
         One that can `carry` an error along.
     faults : sequence of FaultState
+        The faults that become states.
     """
 
     def __init__(self, inner: ErrorModel, faults: Sequence[FaultState]):

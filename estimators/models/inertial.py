@@ -72,8 +72,11 @@ class InertialModel(ErrorModel):
     Attributes
     ----------
     position, velocity : (3,) array
+        Latitude, longitude [rad] and height [m]; velocity north, east, down [m/s].
     dcm : (3, 3) array
+        Rotation from body to north-east-down.
     bias : (6,) array
+        Biases of gyroscopes [rad/s] and accelerometers [m/s^2].
     calibration : (n - 15,) array
         Of the aiding instruments.
     bias_at, scale_at : dict of str to int

@@ -10,8 +10,8 @@ force's double and single integral in north-east-down, which stand in F (its blo
 - attitude: the rotation vector of ``exp(F_phi,phi phi) exp(F_phi,b b)``
 
 F and its bias columns turn with the node (``F_pb = C B`` with B in body axes): these are the body-frame increments and
-bias Jacobians of preintegration (Forster et al. 2017, eqs. 38-44; paper 001's eqs. 8-10 with its slip settled: gravity
-is outside of the integral). Curvature and rotation of the Earth are in y' and in F, to first order in the shift.
+bias Jacobians of preintegration (Forster et al. 2017, eqs. 38-44; eqs. 8-10 of Mao, Wang and Fu 2025, but with gravity
+outside of the integral). Curvature and rotation of the Earth are in y' and in F, to first order in the shift.
 """
 
 from __future__ import annotations

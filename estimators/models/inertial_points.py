@@ -57,11 +57,13 @@ def propagate_points(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     position, velocity : (3,) arrays
+        Position (latitude, longitude, height) and velocity (north, east, down) at the start of the piece.
     dcm : (3, 3) array
-        The state at the start of the piece.
+        Rotation from body to north-east-down at the start.
     next_velocity : (3,) array
+        Velocity at the end.
     next_dcm : (3, 3) array
-        At its end.
+        Rotation at the end.
     interval : float
         Length [s].
     gyro_decay, accelerometer_decay : float

@@ -1,6 +1,7 @@
 """One measurement of the inertial state in few kernels: observed, weighed and corrected for.
 
-Two of them where somebody may doubt the noise between (an adaptation), one where nobody does.
+With an adaptation there are two kernels, because it may change the noise between them; without one there is a single
+kernel.
 """
 
 from __future__ import annotations

@@ -82,12 +82,15 @@ def observe_inertial(  # type: ignore[no-untyped-def]
     value : (d,) array
         As measured.
     position, velocity : (3,) arrays
+        Latitude, longitude [rad] and height [m]; velocity north, east, down [m/s].
     dcm : (3, 3) array
+        Rotation from body to north-east-down.
     rate : (3,) array
         Body rate relative to the inertial frame, as measured [rad/s].
     bias : (k,) array, k >= 3
         The gyroscopes' first.
     calibration : (n - 15,) array
+        Calibration states of the instruments.
     innovation : (d,) array
         Filled: measured minus predicted, in the units of ``KINDS[kind].errors``.
     jacobian : (d, n) array

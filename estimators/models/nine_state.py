@@ -1,14 +1,14 @@
-"""The 9-state model of paper 000: position, velocity and attitude, with fixed sigmas and no biases.
+"""The 9-state model of Guo et al. (2026): position, velocity and attitude, with fixed sigmas and no biases.
 
-The paper's motion constraint between epochs (eq. 3) is the strapdown integration, and is done as such
-(`simnav.strapdown`), at IMU rate and on the rotating Earth. Printed, it lost brackets and a square; meant is
-``dp = p' - p - v dt - (C f + g) dt^2 / 2``, ``dv = v' - v - (C f + g) dt``, and the attitude on SO(3). Its noise is as
-in eq. 25: fixed sigmas of position, velocity and attitude for a second of motion, whatever the IMU. (Eq. 4 takes the
-residual as its own sigma.) Likewise those of GNSS and DVL (below eq. 5); other instruments count as their datasheets
-say. ``C v`` of eq. 5 is ``C' v``, as in eq. 6.
+The paper's motion constraint between epochs (eq. 3) is the strapdown integration. Here it is done as such
+(`simnav.strapdown`), at IMU rate and on the rotating Earth. The printed equation lacks brackets and a square; it should
+be ``dp = p' - p - v dt - (C f + g) dt^2 / 2``, ``dv = v' - v - (C f + g) dt``, and the attitude on SO(3). Its noise is
+as in eq. 25: fixed sigmas of position, velocity and attitude for a second of motion, for any IMU. (Eq. 4 takes the
+residual as its own sigma.) GNSS and DVL have the fixed sigmas given below eq. 5; other instruments have those of their
+datasheets. ``C v`` in eq. 5 is ``C' v``, as in eq. 6.
 
-Source: paper 000, eqs. 1-6 and 25. It prints no sigmas of the motion; ours cover the biases of a tactical-grade IMU for
-a second.
+Source: Guo et al. (2026), eqs. 1-6 and 25. The paper prints no sigmas of the motion; ours cover the biases of a
+tactical-grade IMU for a second.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ __all__ = ["NineStateModel"]
 
 
 class NineStateModel(InertialModel):
-    """The model of the module.
+    """Nine states with fixed sigmas (see the module).
 
     Parameters
     ----------
     sigma_position, sigma_velocity, sigma_attitude_deg : float
-        Of one second of motion [m], [m/s], [deg]; variances grow in proportion to time.
+        Standard deviations of one second of motion [m], [m/s], [deg]; variances grow in proportion to time.
     sigma_gnss_horizontal, sigma_gnss_vertical : float
-        Of a GNSS position [m]; 0 for the datasheet's.
+        Standard deviations of a GNSS position, per component [m]; 0 takes those of the datasheet.
     sigma_dvl : float
-        Of a DVL velocity [m/s]; 0 for the datasheet's.
+        Standard deviation of a DVL velocity, per component [m/s]; 0 takes that of the datasheet.
     """
 
     fused = False

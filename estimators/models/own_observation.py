@@ -74,9 +74,11 @@ class OwnObservation:
         Parameters
         ----------
         point : NavigationPoint
+            The state at which the reading is predicted.
         value : (d,) array
             As measured.
         calibration : (size - 15,) array
+            Calibration states of the instruments.
         size : int
             n, of the error state.
         bias_at : int
@@ -107,9 +109,11 @@ class OwnObservation:
         Parameters
         ----------
         point : NavigationPoint
+            The state that the k states are compared with.
         errors : (k, n) array
             Of the states with respect to the point, by the rule of `simnav.estimators.models.base.ErrorModel.correct`.
         bias_at : int
+            Index of the instrument's first bias state; negative if it has none.
 
         Returns
         -------

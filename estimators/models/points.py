@@ -26,6 +26,7 @@ class PointModel(ErrorModel):
         errors : (k, n) array
             Of the points with respect to the state; overwritten by their errors with respect to the advanced state.
         until : float
+            Time to which the points are moved [s].
 
         Returns
         -------
@@ -42,6 +43,7 @@ class PointModel(ErrorModel):
         measurement : Measurement
             One that `measure` says something of.
         errors : (k, n) array
+            Offsets of the points from the centre.
 
         Returns
         -------

@@ -261,7 +261,9 @@ def advance_inertial(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     position, velocity : (3,) arrays
+        Latitude, longitude [rad] and height [m]; velocity north, east, down [m/s]; overwritten.
     dcm : (3, 3) array
+        Rotation from body to north-east-down; overwritten.
     memory : (6,) array
         Increments of the last whole sample.
     bias : (6,) array
@@ -273,11 +275,13 @@ def advance_inertial(  # type: ignore[no-untyped-def]
         rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
         old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
     time, interval : (k,) arrays
+        Times and intervals of the IMU samples [s].
     rate, force : (k, 3) arrays
         The samples at hand.
     first : int
         Index of the first that is not used up.
     until : float
+        Time to which the state is moved [s].
     noise : (9,) array
         As in `accumulate_error`.
     blocks : (m, 22) array
@@ -380,6 +384,7 @@ def propagate_covariance(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     covariance : (n, n) array
+        Covariance of the errors; overwritten.
     transition, process_noise : (m, m) arrays
         Of the first m states.
     calibration : (n - m,) array

@@ -12,7 +12,7 @@ and carry the position through an outage. Height, roll and pitch are not estimat
 alone, and what heel does to it is noise. Sideways motion through the water (waves, leeway) is noise on measured
 velocities and in the estimate's velocity.
 
-After paper 002 (GNSS/DR integrated navigation for ships): position, speed, heading, log bias, compass bias, 1 Hz; the
+After Jiang et al. (2026), J. Mar. Sci. Eng. 14(5), 472: position, speed, heading, log bias, compass bias, 1 Hz; the
 turn rate and the current are ours, since a log measures through the water.
 """
 

@@ -4,9 +4,9 @@ There is nothing to preintegrate. The motion is a closed form, and a motion fact
 time, taken again from wherever the older node is now: exact at any distance, without a shift. Its noise is the one with
 which the front ran ahead.
 
-In the terms of paper 002 (section 2): the part of a motion factor that moves position and heading is its DR factor, the
-Gauss-Markov transition of log and compass biases its DR error factor (eqs. 4-6, a random walk), and the prior of the
-first node its marginalization factor (eqs. 12-17).
+In the terms of Jiang et al. (2026), section 2: the part of a motion factor that moves position and heading is its DR
+factor, the Gauss-Markov transition of log and compass biases its DR error factor (eqs. 4-6, a random walk), and the
+prior of the first node its marginalization factor (eqs. 12-17).
 """
 
 from __future__ import annotations
@@ -141,6 +141,7 @@ class ShipChain(Chain):
     Parameters
     ----------
     front : ShipModel
+        The model that runs ahead and leaves the nodes behind.
     """
 
     front: ShipModel

@@ -127,8 +127,11 @@ def advance_ship(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     position : (3,) array
+        Latitude, longitude [rad] and height [m].
     x : (n,) array
+        The state (see the module).
     covariance : (n, n) array
+        Covariance of the errors of position and states.
     transition : (n, n) array
         Overwritten.
     rate, density : (n,) arrays
@@ -262,10 +265,13 @@ def observe_ship(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     code : (3,) array of int
+        The instrument: kind, and indices of its first bias and its scale factor (see the module).
     aid : (7,) array
         The instrument (see the module).
     position : (3,) array
+        Latitude, longitude [rad] and height [m].
     x : (n,) array
+        The state (see the module).
     first, second : float
         The value measured; the second is not looked at where there is one component.
     residual : (m,) array
@@ -326,7 +332,9 @@ def describe_ship(x, covariance, sway, velocity, out):  # type: ignore[no-untype
     Parameters
     ----------
     x : (n,) array
+        The state (see the module).
     covariance : (n, n) array
+        Covariance of the errors of position and states.
     sway : float
         Sigma of the sideways velocity [m/s].
     velocity : (3,) array

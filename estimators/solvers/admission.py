@@ -19,6 +19,7 @@ class Admission:
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
     observed : iterable of str
         Names of the instruments that are used at all; others are passed over without a word.
 

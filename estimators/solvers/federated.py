@@ -29,12 +29,13 @@ reset keeps what a local filter knows of them given the common states: with ``G 
 b along by G, and leaves the conditional covariance of b as it is.
 
 Between two fusions the estimate is the reference, propagated: measurements wait for the master. That wait is the
-federated filter's loss in paper 004, which fuses when the slowest sensor has delivered; so does the default here. A
-sensor that is away needs no reconfiguration: its local filter predicts, and its share is its prediction. All
-measurements are linearised about the shared reference.
+federated filter's loss in the AUV smoothing paper (2022), which fuses when the slowest sensor has delivered; so does
+the default here. A sensor that is away needs no reconfiguration: its local filter predicts, and its share is its
+prediction. All measurements are linearised about the shared reference.
 
 Source: N. A. Carlson, *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and
-Electronic Systems 26(3), 1990; paper 004 (the rival that it measures itself against, without equations).
+Electronic Systems 26(3), 1990; *Post-processing algorithm based on factor graph optimization for AUV integrated
+navigation*, 2022, doi:10.1177/01423312221109880, which compares with such a filter and prints no equations.
 """
 
 from __future__ import annotations
@@ -75,7 +76,9 @@ class FederatedEstimator(KalmanEstimator):
     Parameters
     ----------
     model : InertialModel
+        The model of the shared reference.
     adaptation : Adaptation, optional
+        Chooses the noise of each measurement; default: the datasheet's.
     fusion_period : float, optional
         Time between fusions [s]; 0 fuses after every measurement; None: the period of the slowest sensor.
     reset_locals : bool

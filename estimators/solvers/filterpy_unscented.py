@@ -39,6 +39,7 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
     Parameters
     ----------
     model : ShipPoints
+        The model whose states are estimated.
     alpha, beta, kappa : float
         Of the sigma points, as for `simnav.estimators.solvers.sigma_point.SigmaPointEstimator`.
     """

@@ -95,8 +95,11 @@ class Observation(NamedTuple):
     Attributes
     ----------
     measurement : Measurement
+        The measurement.
     noise : (m, m) array
+        Covariance of its noise.
     node : int
+        Index of the node that it belongs to.
     rate : (3,) array
         Body rate there, as measured [rad/s].
     """
@@ -113,6 +116,7 @@ class InertialGraph:
     Attributes
     ----------
     frame : TangentFrame
+        The local frame of the graph.
     motion : Preintegration
         From the newest node on.
     node : int

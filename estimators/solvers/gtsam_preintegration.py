@@ -61,7 +61,9 @@ def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, n
     bias : (6,) array
         Gyroscopes, accelerometers: taken off for coning and sculling, and put on again.
     time, interval : (k,) arrays
+        Times and intervals of the IMU samples [s].
     rate, force : (k, 3) arrays
+        Angular rates [rad/s] and specific forces [m/s^2].
     first : int
         The first that is not used up.
     until, nominal : float
@@ -119,12 +121,14 @@ class Preintegration:
     variance : (6,) array
         Initial variances of the biases, gyroscopes first.
     frame : TangentFrame
+        The local frame of the graph.
     time : float
         At which it begins [s].
 
     Attributes
     ----------
     state : gtsam.NavState
+        State at the start of the integration.
     bias : gtsam.imuBias.ConstantBias
         Of the node at which it begins.
     elapsed : float

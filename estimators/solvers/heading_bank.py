@@ -120,6 +120,7 @@ class HeadingBank(Solver):
     Parameters
     ----------
     model : ErrorModel or ModelChoice
+        The model of each filter.
     above_deg : float
         With an initial heading known better than this [deg], one sigma, there is one filter only.
     spacing_deg : float

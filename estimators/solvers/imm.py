@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, hypot, log, sqrt
+from math import ceil, exp, hypot, log, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -152,7 +152,12 @@ class ImmEstimator(KalmanEstimator):
     model, smoother
         As for `KalmanEstimator`.
     levels : tuple of float
-        Sigmas in units of the nominal one, the first 1.
+        Sigmas in units of the nominal one, the first 1. Empty: as ``highest`` and ``ratio`` say.
+    highest : float
+        The highest level, where they are not given.
+    ratio : float
+        Largest ratio of neighbouring levels, where they are not given. Levels that are near each other stand for a
+        continuous distribution of the size, uniform in its logarithm: no size lies between them.
     stay : float
         Probability to stay on the lowest level from one measurement to the next.
     stay_high : float
@@ -171,13 +176,19 @@ class ImmEstimator(KalmanEstimator):
         model: ModelChoice,
         smoother: Smoother | None = None,
         *,
-        levels: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0),
+        levels: tuple[float, ...] = (),
+        highest: float = 30.0,
+        ratio: float = 1.5,
         stay: float = 0.99,
         stay_high: float = 0.8,
     ):
         super().__init__(model, smoother=smoother)
         if self._stepwise:
             raise ValueError(f"{type(smoother).__name__} needs one noise of a measurement; here it is a mixture")
+        if not levels:
+            if not (np.isfinite(highest) and highest > 1.0 and ratio > 1.0):
+                raise ValueError(f"highest = {highest:g}, ratio = {ratio:g}: both must be above 1")
+            levels = tuple(np.geomspace(1.0, highest, 1 + ceil(log(highest) / log(ratio) - 1e-9)).tolist())
         if len(levels) < 2 or list(levels) != sorted(set(levels)) or not levels[0] > 0.0:
             raise ValueError(f"levels = {', '.join(f'{x:g}' for x in levels)}: two or more, above 0 and rising")
         for name, p in (("stay", stay), ("stay_high", stay_high)):

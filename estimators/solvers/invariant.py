@@ -62,6 +62,7 @@ class InvariantKalmanEstimator(KalmanEstimator):
     model : InertialModel
         Or another with position, velocity and attitude as the first nine components of its error.
     adaptation : Adaptation, optional
+        Chooses the noise of each measurement; default: the datasheet's.
     error : "left" or "right"
         Which error is invariant.
     """

@@ -92,7 +92,9 @@ def absorb_iterated(
     Parameters
     ----------
     model : ErrorModel
+        The model whose state is corrected.
     measurement : Measurement
+        The measurement to be used.
     observation : tuple
         The measurement as linearised at the state, with the noise that is to be used.
     covariance : (n, n) array
@@ -100,6 +102,7 @@ def absorb_iterated(
     correction : (n,) array
         Overwritten with what was added to the state.
     iteration : Iteration
+        When the iteration ends.
 
     Returns
     -------

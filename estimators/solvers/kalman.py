@@ -35,6 +35,7 @@ class KalmanEstimator(Solver):
     Parameters
     ----------
     model : ErrorModel or ModelChoice
+        What is estimated, how it moves and how it is observed.
     adaptation : Adaptation, optional
         None: every measurement counts with its nominal noise.
     iteration : Iteration, optional

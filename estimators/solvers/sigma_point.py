@@ -16,7 +16,7 @@ is lost to rounding, and the covariance is positive semi-definite by its form wh
 third-degree cubature filter (I. Arasaratnam and S. Haykin, *Cubature Kalman filters*, IEEE Trans. Automatic Control 54,
 2009) has alpha = 1, beta = 0, kappa = 0: there the covariance is a mean of squares about the mean.
 
-Choices (``ALGORITHMS.md`` leaves them open; paper 000 compares with a UKF and gives neither points nor weights):
+Choices (Guo et al. (2026) compare with a UKF and give neither points nor weights):
 
 - The mean is taken about the propagated centre, in one step, not by iteration on the manifold: the form above needs the
   centre, and the step is exact but for the attitude, where what is left out is of third order in its uncertainty.
@@ -56,6 +56,7 @@ def draw_points(covariance, spread, points):  # type: ignore[no-untyped-def]
     covariance : (n, n) array
         Positive semi-definite; a pivot of zero, or below it by rounding, gives a column of zeros.
     spread : float
+        Distance of the points from the mean, in columns of the square root.
     points : (2 n, n) array
         Overwritten.
     """
@@ -74,7 +75,9 @@ class SigmaPointEstimator(KalmanEstimator):
     Parameters
     ----------
     model : PointModel
+        What is estimated, how it moves and how it is observed.
     adaptation : Adaptation, optional
+        Chooses the noise of each measurement; default: the datasheet's.
     alpha : float
         Scale of the points, above 0: they lie ``alpha sqrt(n + kappa)`` sigma out. Small values see the neighbourhood
         only, as an EKF does.

@@ -17,7 +17,8 @@ state like any correction. In the bracket both terms are positive semi-definite,
 The gain is solved for in units of the predicted sigmas, which keeps metres and radians per second apart.
 
 Source: H. E. Rauch, F. Tung and C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal
-3(8), 1965. The forward-backward smoothing of paper 004 (eqs. 24-25) is the same estimate in two-filter form
+3(8), 1965. The forward-backward smoothing of the AUV
+smoothing paper (2022, doi:10.1177/01423312221109880, eqs. 24-25) is the same estimate in two-filter form
 (`simnav.estimators.solvers.two_filter`), which is its test.
 """
 

@@ -9,13 +9,17 @@ the right model the separation d has the covariance
 which gives the threshold of the test, component by component of the position, velocity and heading:
 ``T_i = K_fa sqrt(P_i - P_0)``. Where a test fails, an instrument is excluded: of those with a large separation, the one
 whose sub-filter is in the best agreement with the instruments that it uses (the least mean NIS of its worst instrument
-over `_RECENT` seconds; residual monitoring after Young and McGraw). Where several agree (a mean NIS of up to
-`_AGREEMENT`), it is one on probation (see below), else that of the largest separation. Its sub-filter becomes the main
-one, so that what the fault has done so far is undone, too.
+over `_RECENT` seconds; residual monitoring after Young and McGraw). Where several agree alike (within `_TIED`, or with
+a mean NIS of up to `_AGREEMENT`), it is one on probation (see below), else a fix, since without the log a vessel is
+lost sooner, else that of the largest separation. Its sub-filter becomes the main one, so that what the fault has done
+so far is undone, too.
 
 Where a fix is excluded, the sub-filter without the log is kept beside, and the other way round: the hypothesis that was
 not chosen. If the instrument that was believed fails a test in its turn, and the one excluded agrees with all others in
 that filter, the two change places.
+
+A datasheet may be wrong. Whatever is said here of a NIS is said of its ratio to the mean of the last ``horizon``
+seconds, where this is above 1.
 
 Single gross errors are none of this: a measurement that the main filter finds improbable (`_NOT_GROSS`) is left out of
 all filters, unless its instrument goes on so for `_PATIENCE` seconds.
@@ -76,6 +80,12 @@ _LINEARISATION = 0.1
 _RECENT = 10.0
 #: A mean NIS by component up to this is no disagreement: two sigma above 1 for ten measurements of one component.
 _AGREEMENT = 1.6
+#: Disagreements within this ratio are the same.
+_TIED = 1.3
+#: A NIS by component counts in the long-term mean as no more than this multiple of it.
+_UNUSUAL = 10.0
+#: Time for which the datasheet counts in it [s].
+_PRIOR = 20.0
 #: Where a test fails, an instrument is suspected if its separation is more than this part of the largest, each over
 #: its threshold. Were there two sources only, both would be the same.
 _SUSPECT = 0.3
@@ -98,6 +108,7 @@ class _Exclusion(Adaptation):
         self.excluded: set[str] = set()
         self.agrees_since: dict[str, float] = {}
         self.gross: set[tuple[str, float]] = set()
+        self.usual: dict[str, float] = {}
         self._failing: dict[str, float] = {}
         self._agrees, self._gross = chi_square_limits(_AGREES), chi_square_limits(_NOT_GROSS)
 
@@ -105,6 +116,7 @@ class _Exclusion(Adaptation):
         """The nominal noise, or None."""
         name, time = innovation.measurement.instrument, innovation.measurement.time
         nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
+        nis /= max(self.usual.get(name, 1.0), 1.0)
         m = len(innovation.residual)
         if name in self.excluded:
             if nis <= self._agrees[m]:
@@ -158,6 +170,7 @@ class SolutionSeparation(Solver):
     Parameters
     ----------
     model : ErrorModel or ModelChoice
+        The model of each filter.
     false_alarm : float
         Probability of each test to fail where nothing is wrong, in (0, 1).
     horizon : float
@@ -251,6 +264,13 @@ class SolutionSeparation(Solver):
         estimate = self._main.update(measurements)
         fading = exp(-max(measurements.time - self._time, 0.0) / _RECENT)
         self._main.watch(estimate, self._components, fading)
+        since = measurements.time - self._begin_with[0].time
+        slow = min((measurements.time - self._time) / min(self.horizon, since + _PRIOR), 1.0)
+        for name in self._names:
+            nis = float(estimate.diagnostics.get(f"nis.{name}", np.nan)) / self._components[name]
+            if nis == nis:
+                before = self._exclusion.usual.get(name, 1.0)
+                self._exclusion.usual[name] = before + slow * (min(nis, _UNUSUAL * before) - before)
         self._time = measurements.time
         self._heard.update({m.instrument: m.time for m in measurements.aids if m.instrument in self._heard})
         running = [(sub, {sub.name, *out}) for name in self._names if name not in out for sub in self._pairs[name]]
@@ -278,23 +298,21 @@ class SolutionSeparation(Solver):
         return estimate
 
     def _disagreement(self, sub: _Without, out: Collection[str]) -> float:
-        """The largest mean NIS of an instrument in a sub-filter."""
-        means = sub.filter.mean_nis
-        return max((v for n, v in means.items() if n != sub.name and n not in out), default=1.0)
+        """The largest mean NIS of an instrument in a sub-filter, over what is usual for it."""
+        usual = self._exclusion.usual
+        means = sub.filter.mean_nis.items()
+        return max((v / max(usual.get(n, 1.0), 1.0) for n, v in means if n != sub.name and n not in out), default=1.0)
 
     def _guilty(self, suspects: list[str], ratios: Mapping[str, float]) -> str:
         """Of the suspects and the instruments on probation, the one to exclude."""
         probation = {
             name for name, since in self._readmitted.items() if self._time - since < self.horizon and name in ratios
         }
-        return min(
-            {*suspects, *probation},
-            key=lambda n: (
-                max(self._disagreement(self._elder(n), self._exclusion.excluded), _AGREEMENT),
-                n not in probation,
-                -ratios[n],
-            ),
-        )
+        out = self._exclusion.excluded
+        apart = {name: self._disagreement(self._elder(name), out) for name in {*suspects, *probation}}
+        least = max(min(apart.values()), _AGREEMENT)
+        tied = [name for name in self._names if apart.get(name, np.inf) <= _TIED * least]
+        return min(tied, key=lambda n: (n not in probation, not self._group.get(n, False), -ratios[n]))
 
     def _elder(self, name: str) -> _Without:
         return min(self._pairs[name], key=lambda sub: sub.begun)

@@ -70,9 +70,13 @@ def _forward(  # type: ignore[no-untyped-def]
     sizes : (j,) array of int
         Components of each measurement; its other arrays are padded to the largest.
     jacobians : (j, 3, n) array
+        Jacobians of the measurements, in order of time.
     known : (j, 3) array
+        ``v + H p`` of each measurement: in the tangent space of the filter's trajectory.
     noises : (j, 3, 3) array
+        Covariances of the measurements.
     weights : (j,) array
+        Weights of the measurements, which divide their noise.
     before, after : (k + 1, n) array
         delta before the corrections of a stop, predicted; and what it is after them, minus d.
     predicted, covariance : (k + 1, n, n) array

@@ -162,6 +162,7 @@ class TangentFrame:
         rotation : (3, 3) array
             Body to frame.
         place, speed : (3,) arrays
+            Position and velocity in the local frame [m], [m/s].
 
         Returns
         -------

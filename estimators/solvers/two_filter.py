@@ -6,10 +6,11 @@ the measurements after that time and no other, are independent, and so
 - ``P^-1 = Pf^-1 + Pb^-1``
 - ``P^-1 x = Pf^-1 xf + Pb^-1 xb``
 
-which are eqs. 24-25 of paper 004. The backward filter begins without information, so Pb^-1 is singular until enough
-has been measured; it is never inverted. As printed, the paper's step 3 starts the backward pass with the forward
-result instead: every measurement then counts twice, and the smoother promises up to sqrt(2) more than it holds.
-``seed_backward`` does that.
+which are eqs. 24-25 of the AUV smoothing paper (*Post-processing algorithm based on factor graph optimization for AUV
+integrated navigation*, 2022, doi:10.1177/01423312221109880). The backward filter starts without information, so Pb^-1
+is singular until enough has been measured; it is never inverted. As printed, step 3 of the paper starts the backward
+pass with the forward result. Every measurement then counts twice, and the standard deviations are too small by up to
+sqrt(2). ``seed_backward`` does this.
 
 Both filters share one linearisation, the forward filter's: what it saw of each measurement (innovation, H, R) and of
 each stretch (Phi, and Q as what M has beyond Phi P Phi'). So the result equals the Rauch-Tung-Striebel smoother's

@@ -42,7 +42,9 @@ class WeightedKalmanEstimator(KalmanEstimator):
     Parameters
     ----------
     model : ErrorModel or ModelChoice
+        What is estimated, how it moves and how it is observed.
     weighting : Weighting
+        Sets the weight of each measurement.
     limit : int
         Most iterations of a measurement.
     threshold : float

@@ -25,12 +25,13 @@ A window that cannot explain its measurements says so (`simnav.estimators.solver
 What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
 innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
 
-Sources: paper 000, section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); paper 001, section 2;
+Sources: Guo et al. (2026), section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); Mao, Wang and
+Fu (2025), section 2;
 for the test of convergence by contraction (the step that linearising anew leads to over those before it; an epoch
 inherits it, with a doubt: a factor of 2), E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996,
 section IV.8.
-Eq. 15 of paper 001 takes the inverse of the window's prior for the newest covariance; it is that of the oldest state.
-The newest one is the last block of the elimination.
+Eq. 15 of Mao, Wang and Fu (2025) takes the inverse of the window's prior for the newest covariance; it is that of the
+oldest state. The newest one is the last block of the elimination.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """What the ANFIS of `simnav.estimators.adaptations.anfis` learns from: voyages of its own, on seeds never scored.
 
-A reconstruction: of how paper 002 trained its network nothing is known. Here ships sail three voyages, with receivers
-of different quality, in five kinds of weather for GNSS: healthy; noise that grows; gross errors; multipath; all of
-them. Each trouble comes and goes at random, so that about seven fixes in ten are healthy. They are no scenarios of the
-catalogue, whose faults come at fixed times: a network that had seen those could learn when, instead of how.
+This is a reconstruction: how Jiang et al. (2026) trained their network is not known. Here ships sail three voyages,
+with receivers of different quality, in five kinds of weather for GNSS: healthy; noise that grows; gross errors;
+multipath; all of them. Faults start and end at random, so that about seven fixes in ten are healthy. These are no
+scenarios of the catalogue, whose faults have fixed times: a network could learn the times instead of the signs of a
+fault.
 
 What is learnt for each fix is ``ln(true variance / datasheet's)``, mean of north and east. The true variance is the
 white noise that the measurement really had, and of the faults that touched it the variance of multipath and the second
@@ -212,6 +213,7 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
     Parameters
     ----------
     seeds : iterable of int
+        Seeds of the voyages.
     told : callable, optional
         Called after each run with the number of runs so far.
 
@@ -262,6 +264,7 @@ def train(
     features : str
         Key of `FEATURES`.
     data, validation : Data
+        Inputs and targets for training and for validation.
     passes : int
         At most so many.
     told : callable, optional

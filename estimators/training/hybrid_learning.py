@@ -42,8 +42,11 @@ def fit_consequents(network: Sugeno, x: Array, y: Array, ridge: float = RIDGE) -
     Parameters
     ----------
     network : Sugeno
+        The network whose rules are fitted.
     x : (k, n) array
+        Inputs.
     y : (k,) array
+        Targets.
     ridge : float
         In units of the largest eigenvalue.
     """

@@ -2,8 +2,8 @@
 
 A weighting that gives less weight to what does not fit is lost when it is the motion that is wrong (a disturbed IMU):
 nothing fits, nothing is believed, and nothing brings the window back. As in a filter
-(`simnav.estimators.adaptations.prediction`, after paper 003), suspicion falls on the motion where fixes and logs fail
-their chi-square tests together, several times running. But a filter cannot tell that from two instruments that are
+(`simnav.estimators.adaptations.prediction`, after Zhan et al. 2026), suspicion falls on the motion where fixes and logs
+fail their chi-square tests together, several times running. But a filter cannot tell that from two instruments that are
 wrong at once. A window can ask: with the motion of that time all but taken away for one iteration, measurements that
 are right agree with each other, and measurements that are wrong still do not. Only those that agree are then believed
 in full.
@@ -42,6 +42,7 @@ class MotionTest:
     Parameters
     ----------
     instruments : Instruments
+        Datasheets of the run's instruments.
     together : int
         Failures running, of a fix and of a log, that make the motion suspect.
     recent : float
@@ -55,7 +56,7 @@ class MotionTest:
         self._limits = np.array(chi_square_limits(probability))
         self._is_fix = fixes_and_logs(instruments)
         if len(set(self._is_fix.values())) < 2:
-            self._is_fix = {}  # nobody to ask
+            self._is_fix = {}  # the test needs instruments of both groups
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
         self._tested = -np.inf

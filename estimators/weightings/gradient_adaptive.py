@@ -1,32 +1,32 @@
-"""Gradient-adaptive weights of paper 000: residuals over their own robust scale, for motion, GNSS and DVL.
+"""Gradient-adaptive weights of Guo et al. (2026): residuals over their own robust scale, for motion, GNSS and DVL.
 
 For each type of factor (an instrument, or motion) over the window (eqs. 19-21),
 
     ``r~ = |r| / (s + epsilon)``,  ``s = kappa median(|r|)``,  ``w = clip(a / (1 + r~^2 / c^2), w_min, 1)``,
 
-and the information is multiplied by w (eq. 24; the print's eqs. 22 and 23 do not agree with it). The window is every
-epoch that holds a measurement (eqs. 18 and 25 differ). The paper names three types; instruments other than GNSS count
-as its DVL.
+and the information is multiplied by w (eq. 24; eqs. 22 and 23 contradict it). The window consists of all epochs that
+hold a measurement (eqs. 18 and 25 differ). The paper names three types; here, instruments other than GNSS have the
+constants of its DVL.
 
-What is settled otherwise than printed, unless the preset is ``"paper"``:
+Deviations from the print, unless the preset is ``"paper"``:
 
-- |r| is the whitened norm. The print's unwhitened norm of a GNSS residual is mostly that of the Down axis.
-- The print calls ``1.4826 median(|r|)`` MAD and consistent. That holds for one component; of three, it is 2.28 sigma.
-  Here kappa makes s consistent whatever the number of components: 1.4826, 0.849 and 0.650 for 1, 2 and 3.
-- c of the DVL is 2: in units of the consistent scale the print's 1 costs 15 % of the efficiency on Gaussian noise,
-  which in the print's units of 2.28 sigma it does not.
-- epsilon is in units of sigma. The print's 0.1 has the unit of the residual, whichever it is.
-- s is never less than 1, the datasheet's noise. The residuals of a window are smaller than its noise where they fitted
-  it, and a median of few means nothing: with fewer than ``fewest`` s is 1.
-- A motion residual of n components counts by the mean square of its blocks of three (position, velocity, ...), which
-  eq. 25 adds up, so that the same constants fit. In the print, it is the plain norm of metres, m/s and radians.
+- |r| is the whitened norm. The printed, unwhitened norm of a GNSS residual is mostly that of the Down axis.
+- The paper calls ``1.4826 median(|r|)`` the MAD, and consistent. This holds for one component; for three it is 2.28
+  sigma. Here kappa makes s consistent: 1.4826, 0.849 and 0.650 for 1, 2 and 3 components.
+- c of the DVL is 2. In units of the consistent scale the printed value of 1 costs 15 % of the efficiency on Gaussian
+  noise; in the printed units of 2.28 sigma it does not.
+- epsilon is in units of sigma. The printed 0.1 has the unit of the residual.
+- s is at least 1, the datasheet's noise. The residuals of a window are smaller than the noise of the measurements that
+  it was fitted to, and a median of few values is not reliable: with fewer than ``fewest`` residuals s is 1.
+- For a motion residual the mean square of its blocks of three components (position, velocity, ...) is used, so that the
+  same constants fit. The print uses the plain norm of metres, m/s and radians.
 
 ``a / (1 + r~^2 / c^2)`` is Cauchy's weight, not Geman and McClure's as the text has it; with a > 1 and the clip it is
 1 up to ``r~ = c sqrt(a - 1)``. With ``w_min > 0`` the influence w r is *not* bounded, so the breakdown point of eq. 30
-does not hold: a GNSS outlier of any size keeps half its information. And since the scale is estimated again at each
-iteration, the cost need not fall (eq. 28). A fault that fills the window becomes the scale, and is not suppressed.
+does not hold: a GNSS outlier of any size keeps half of its information. The scale is estimated again at each iteration,
+so the cost does not always fall (eq. 28). A fault that fills the window determines the scale and is not suppressed.
 
-Source: M. Guo et al. 2026 (paper 000), section 3.
+Source: M. Guo et al. 2026, doi:10.20944/preprints202601.1976.v1, section 3.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ def medians(values, group, fewest, out):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     values : (M,) array
+        Values of all groups.
     group : (M,) array of int
         Of each value, below G.
     fewest : int
@@ -93,17 +94,17 @@ def _adapt(norm, kappa, kind, group, shapes, epsilon, floor, fewest, scales, wei
 
 
 class GradientAdaptive(Weighting):
-    """The weighting of the module.
+    """Gradient-adaptive weights (see the module).
 
     Parameters
     ----------
     preset : "default" or "paper"
-        Whether the norms and scales are as printed.
+        With "paper", norms and scales are as printed.
     gnss, motion, other : (a, c, w_min)
-        Of eq. 21, for GNSS, the IMU, and the DVL with all other instruments; of the last, None: ``(2, 2, 0.3)``, or
-        ``(2, 1, 0.3)`` with the preset "paper".
+        Constants of eq. 21 for GNSS, for the IMU, and for the DVL and all other instruments. None for the last means
+        ``(2, 2, 0.3)``, or ``(2, 1, 0.3)`` with the preset "paper".
     epsilon : float
-        Of eq. 19; in sigma, or with the preset "paper" in the residual's unit.
+        Constant of eq. 19, in sigma; with the preset "paper" in the unit of the residual.
     fewest : int
         With fewer residuals of a type its scale is the nominal one.
     """

@@ -19,8 +19,9 @@ Huber's cost alone is convex. The others redescend, and what the iteration finds
 the weights of the epoch before, with new measurements at full weight (`RobustWeighting`).
 
 Source: P. J. Huber, *Robust Statistics*, 1981; Z. Zhang, "Parameter estimation techniques: a tutorial with application
-to conic fitting", *Image and Vision Computing* 15, 1997, table 1. Eq. 21 of paper 000 calls Geman-McClure what is
-Cauchy's; it is in `simnav.estimators.weightings.gradient_adaptive` as printed.
+to conic fitting", *Image and Vision Computing* 15, 1997, table 1. Eq. 21 of Guo et al.
+(2026) is called Geman-McClure there but is Cauchy's weight; it is in
+`simnav.estimators.weightings.gradient_adaptive` as printed.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 With measurements alone being weighed, a motion that is wrong (a disturbed IMU) is not seen as such: no measurement
 fits, none is believed, and the window follows the IMU to wherever it goes. In a graph, motion is a factor like any
-other, and is weighed too, as in paper 000 (`weigh_motion`). And where fixes and logs contradict the motion together,
-they are asked whether they agree with each other (`simnav.estimators.weightings.fault_isolation`).
+other, and is weighed too, as in Guo et al. (2026) (`weigh_motion`). And where fixes and logs contradict the motion
+together, they are asked whether they agree with each other (`simnav.estimators.weightings.fault_isolation`).
 """
 
 from __future__ import annotations

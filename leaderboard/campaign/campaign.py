@@ -12,33 +12,27 @@ import contextlib
 import importlib
 import importlib.util
 import os
-import re
-import sys
 import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from simnav.estimator import EstimatorError, find
-from simnav.estimator.registry import is_own_reference, point_of
-from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement, describe, prepare
-from simnav.leaderboard.campaign.confinement.session import Limits
+from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import (
-    estimator_source,
-    named_files,
     recording_digest,
     simulator_version,
-    variant,
 )
-from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
+from simnav.leaderboard.campaign.plan import Plan
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
-from simnav.leaderboard.campaign.session_class import carry, is_session
+from simnav.leaderboard.campaign.resolution import resolve, variant_of
+from simnav.leaderboard.campaign.seal import Seal
+from simnav.leaderboard.campaign.sources import digest
 from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -144,6 +138,7 @@ def run_campaign(
     backend: str = "loky",
     scheduler: str | None = None,
     confinement: str = "auto",
+    seal: Seal | None = None,
 ) -> Summary:
     """Run estimators on scenarios and seeds, and store the results.
 
@@ -178,6 +173,8 @@ def run_campaign(
         Address of the Dask scheduler; default: a cluster on this machine.
     confinement : {"auto", "bubblewrap", "process", "none"}
         How estimators are kept apart from the recording, see docs/security.md; ``auto`` is the strongest that works.
+    seal : Seal, optional
+        Derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
 
     Returns
     -------
@@ -196,7 +193,8 @@ def run_campaign(
     """
     started = time.monotonic()
     report = progress or (lambda p: None)
-    seeds = list(dict.fromkeys(seeds))
+    if not isinstance(seeds, range):
+        seeds = list(dict.fromkeys(seeds))
     if workers < 1:
         raise RequestError(f"workers = {workers}: at least one is wanted")
     if timeout is not None and not timeout > 0.0:
@@ -205,7 +203,7 @@ def run_campaign(
         raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
     if not covariance_interval >= 0.0:
         raise RequestError(f"covariance_interval = {covariance_interval:g} s should not be negative")
-    for seed in seeds:
+    for seed in (min(seeds), max(seeds)) if seeds else ():
         if not 0 <= seed < 2**63:
             raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
     _unique("scenario", [s.id for s in scenarios])
@@ -220,77 +218,71 @@ def run_campaign(
     path = store.create(Path(folder).resolve())
     endings = store.keys(path)
     simulator = simulator_version()
-    entrants = [_resolve(request, chosen, path, workers == 1 and backend == "loky") for request in estimators]
+    entrants = [resolve(request, chosen, path, workers == 1 and backend == "loky") for request in estimators]
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
+    if seal is not None:
+        recordings = {name: digest(known, "sealed", seal.hash) for name, known in recordings.items()}
     variants = {
-        s.id: {e.label: _variant(e, recordings[s.id]) for e in entrants} for s in scenarios
+        s.id: {e.label: variant_of(e, recordings[s.id]) for e in entrants} for s in scenarios
     }  # scenario -> label -> variant
     current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
     store.select(path, current)
 
     scores, scoring = own_scores(), scoring_code()
+    owners = {v: s for s in scenarios for v in variants[s.id].values()}  # scenario of each variant
+    wanted = frozenset(seeds) if not isinstance(seeds, range) else seeds
+
+    def asked(key: str) -> bool:
+        """Whether a result is one of this campaign."""
+        name, _, seed = key.rpartition("-")
+        return name in owners and seed.isdecimal() and int(seed) in wanted
+
     stale = {
         key
-        for labels in variants.values()
-        for key in (f"{v}-{seed}" for v in labels.values() for seed in seeds)
-        if key in endings and scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
+        for key in filter(asked, endings)
+        if scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
     }
     if stale:  # a score was edited: the trials that were kept have all that it needs
         rescore_results(path, scenarios=scenarios, keys=stale)
         endings = store.keys(path)
-    units: list[Unit] = []
-    again: set[str] = set()
-    for seed in seeds:
-        for scenario in scenarios:
-            limit = time_limit(scenario) if timeout is None else timeout
-            keyed = [(e, f"{variants[scenario.id][e.label]}-{seed}") for e in entrants]
-            missing = tuple(
-                (e, k)
-                for e, k in keyed
-                if k not in endings
-                or _again(endings[k], limit, memory, retry)
-                or scoring_differs(endings[k].scoring, scoring)
-            )
-            again.update(key for _, key in missing if key in endings)
-            if missing:
-                units.append(
-                    Unit(
-                        scenario,
-                        seed,
-                        missing,
-                        recordings[scenario.id],
-                        simulator,
-                        path,
-                        limit,
-                        memory,
-                        os.getpid(),
-                        scores,
-                        scoring,
-                        keep_trials,
-                        covariance_interval,
-                        chosen,
-                    )
-                )
-    total = len(seeds) * len(scenarios) * len(entrants)
-    skipped = total - sum(len(u.entrants) for u in units)
+
+    def limit(scenario: Scenario) -> float:
+        return time_limit(scenario) if timeout is None else timeout
+
+    mine = list(filter(asked, endings))
+    again = {
+        key
+        for key in mine
+        if _again(endings[key], limit(owners[key.rpartition("-")[0]]), memory, retry)
+        or scoring_differs(endings[key].scoring, scoring)
+    }
+    plan = Plan(scenarios, entrants, seeds, variants, set(mine) - again)
+
+    def unit(scenario: Scenario, seed: int, missing: tuple[tuple[Entrant, str], ...]) -> Unit:
+        return Unit(
+            scenario, seed, missing, recordings[scenario.id], simulator, path, limit(scenario), memory, os.getpid(),
+            scores, scoring, keep_trials, covariance_interval, chosen, seal,
+        )  # fmt: skip
+
+    total, skipped = plan.total, len(plan.there)
     statuses: Counter[str] = Counter()
-    if units:
+    if skipped < total:
         if again:
             store.drop(path, again)
             for key in again:
                 trials.discard(path, key)
         _compile(report)
         run_started = time.monotonic()
-        weight, left = 0.0, sum(u.weight for u in units)
+        weight, left = 0.0, plan.weight
         report(Progress("run", skipped, total))
-        with contextlib.closing(_outcomes(units, workers, backend, scheduler)) as outcomes:
-            for unit, outcome in outcomes:
+        with contextlib.closing(_outcomes(plan.units(unit), path, workers, backend, scheduler)) as outcomes:
+            for done_unit, outcome in outcomes:
                 statuses.update(outcome)
-                weight, left = weight + unit.weight, left - unit.weight
+                weight, left = weight + done_unit.weight, left - done_unit.weight
                 elapsed = time.monotonic() - run_started
                 failed = Summary(path, total, skipped, statuses, 0.0).failed
                 done = skipped + statuses.total()
-                note = f"{unit.scenario.id}, seed {unit.seed}"
+                note = f"{done_unit.scenario.id}, seed {done_unit.seed}"
                 report(Progress("run", done, total, failed, elapsed, elapsed / weight * left, note))
         store.select(path, current)  # another campaign in the same folder may have had the last word
         store.compact(path)
@@ -319,78 +311,7 @@ def _unique(what: str, labels: list[str]) -> None:
         raise RequestError(f"the {what} {twice[0]!r} was asked for twice{hint}")
 
 
-def _variant(entrant: Entrant, recording: str) -> str:
-    # Of a file only the name of the class counts, not the folder: its sources have a digest.
-    return variant(recording, entrant.label, os.path.basename(entrant.name), entrant.parameters, entrant.source)
-
-
 # --- before the run -----------------------------------------------------------------------------------
-
-
-def _resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bool) -> Entrant:
-    """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
-    name, source = request.name, ""
-    file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
-    parameters = {key: _absolute(value) for key, value in request.parameters.items()}
-    if file:
-        name = f"{Path(file[1]).resolve()}{file[2] or ''}"
-        entrant = Entrant(name, parameters, request.label, False, "")
-    else:
-        _import_estimators()
-        with mistakes(EstimatorError):
-            cls = request.cls or find(name)
-        entrant = Entrant(name, parameters, request.label, False, "", point=point_of(cls.name))
-        if _is_ours(cls):
-            with mistakes(EstimatorError):
-                request.make()
-            return replace(entrant, reference=is_own_reference(cls.name), source=estimator_source(cls))
-        with contextlib.suppress(Exception):  # the other process says what is wrong
-            source = estimator_source(cls)  # here, where the text of a session is known
-        if request.cls is not None or is_session(cls.__module__):
-            entrant = replace(entrant, code=carry(cls))
-    if confinement == "none":
-        outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=MEMORY)
-        found, why = outcome.value, outcome.reason
-    else:
-        try:
-            server = prepare(confinement, folder, loaded=alone)
-            found, why = describe(server, entrant, Limits(_IMPORT_TIME, MEMORY)), ""
-        except ValueError as error:
-            found, why = None, str(error)
-    if found is None:
-        reason = re.sub(r"^(Estimator|Request)Error: ", "", why)
-        raise RequestError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
-    if found["reference"]:
-        raise RequestError(
-            f"estimator {request.name!r} declares itself a reference; in a campaign only simnav's own references are "
-            "told the truth"
-        )
-    return replace(entrant, source=source or found["source"])
-
-
-def _is_ours(cls: type) -> bool:
-    """Whether a class comes with simnav."""
-    module = sys.modules.get(cls.__module__)
-    return cls.__module__.startswith("simnav.estimators.") and getattr(module, cls.__qualname__, None) is cls
-
-
-def _absolute(value: Any) -> Any:
-    """A parameter; the name of a file as an absolute path, for estimators run in another folder."""
-    if isinstance(value, (str, Path)) and re.search(r"[/.\\]", str(value)) and named_files([value]):
-        return str(Path(value).expanduser().resolve())
-    return value
-
-
-def _describe(entrant: Entrant) -> dict[str, Any]:
-    """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
-    cls = type(entrant.make())
-    return {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
-
-
-def _import_estimators() -> None:
-    """Our own estimators, imported once here, so that forked processes need not do it."""
-    with contextlib.suppress(ImportError):
-        importlib.import_module("simnav.estimators")
 
 
 def _compile(report: Callable[[Progress], None]) -> None:
@@ -409,21 +330,27 @@ def _compile(report: Callable[[Progress], None]) -> None:
 
 
 def _outcomes(
-    units: list[Unit], workers: int, backend: str, scheduler: str | None
+    units: Iterator[Unit], folder: Path, workers: int, backend: str, scheduler: str | None
 ) -> Generator[tuple[Unit, Counter[str]], None, None]:
     """Run the units and yield what became of them, in the order in which they end."""
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
-    left = dict(enumerate(units))
+    source = enumerate(units)
+    left: dict[int, Unit] = {}  # those that a worker has, or had
+
+    def dispatched() -> Iterator[tuple[int, Unit]]:
+        yield from list(left.items())
+        for index, unit in source:
+            left[index] = unit
+            yield index, unit
+
     for _ in range(1 + _RESTARTS):
-        if not left:
-            return
         try:
-            for index, outcome in _parallel(left, workers, backend, scheduler):
+            for index, outcome in _parallel(dispatched(), workers, backend, scheduler):
                 yield left.pop(index), outcome
             return
         except BrokenProcessPool:
-            endings = store.keys(units[0].folder)  # some of it was finished, and could not be told any more
+            endings = store.keys(folder)  # some of it was finished, and could not be told any more
             for index, unit in list(left.items()):
                 finished = tuple(entrant for entrant in unit.entrants if entrant[1] in endings)
                 if finished:
@@ -438,7 +365,7 @@ def _outcomes(
 
 
 def _parallel(
-    units: Mapping[int, Unit], workers: int, backend: str, scheduler: str | None
+    units: Iterator[tuple[int, Unit]], workers: int, backend: str, scheduler: str | None
 ) -> Iterator[tuple[int, Counter[str]]]:
     from joblib import Parallel, delayed, parallel_config
 
@@ -460,7 +387,7 @@ def _parallel(
         for message in (".*tasks which were still being processed.*", "A worker stopped while some jobs.*"):
             warnings.filterwarnings("ignore", message, UserWarning)
         parallel = Parallel(return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-        outcomes = parallel(delayed(run_unit)(index, unit) for index, unit in list(units.items()))
+        outcomes = parallel(delayed(run_unit)(index, unit) for index, unit in units)
         stack.callback(outcomes.close)
         yield from outcomes
 

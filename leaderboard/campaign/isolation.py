@@ -27,6 +27,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from simnav.leaderboard.campaign.confinement.limits import out_of_memory_kills
+
 __all__ = ["Outcome", "isolate"]
 
 _LINUX: bool = sys.platform == "linux"
@@ -84,7 +86,7 @@ def isolate(
     -------
     Outcome
     """
-    started = time.monotonic()
+    started, kills = time.monotonic(), out_of_memory_kills()
     run = _fork if (method or ("fork" if os.name == "posix" else "spawn")) == "fork" else _spawn
     message, verdict, death, peak = run(function, args, timeout, memory)
     seconds = time.monotonic() - started
@@ -95,7 +97,8 @@ def isolate(
         }[verdict]
         return Outcome(verdict, reason, None, seconds, peak)
     if message is None:
-        if death == "SIGKILL" or (death.startswith("SIG") and peak > 0.9 * memory):
+        by_kernel = death == "SIGKILL" and out_of_memory_kills() > kills
+        if by_kernel or (death.startswith("SIG") and death != "SIGKILL" and peak > 0.9 * memory):
             return Outcome("out-of-memory", f"killed ({death}) for want of memory", None, seconds, peak)
         return Outcome("error", f"the process died ({death}) without an answer", None, seconds, peak)
     try:

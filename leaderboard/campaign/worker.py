@@ -19,6 +19,7 @@ from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import OwnScores
+from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
@@ -62,6 +63,8 @@ class Unit:
         Least time between two covariances that are kept [s].
     confinement : str
         ``process``, ``bubblewrap`` or ``none``.
+    seal : Seal, optional
+        From which the seed is derived; `seed` is then the number of the run.
     """
 
     scenario: Scenario
@@ -78,6 +81,7 @@ class Unit:
     keep_trials: bool = False
     covariance_interval: float = 0.0
     confinement: str = "process"
+    seal: Seal | None = None
 
     @property
     def weight(self) -> float:
@@ -103,7 +107,7 @@ class Unit:
             scoring="{}",  # nothing is scored yet
             scenario_digest=self.scenario.content_hash(),
             estimator_digest=entrant.source,
-            provenance=here(confinement),
+            provenance=here(confinement, self.seal.hash if self.seal is not None else ""),
         )
 
 
@@ -147,7 +151,8 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
     try:
-        recording = record(unit.scenario, unit.seed)
+        seed = unit.seed if unit.seal is None else unit.seal.seed(unit.scenario.id, unit.seed)
+        recording = record(unit.scenario, seed)
     except Exception as error:
         reason = f"no recording: {' '.join(str(error).split()) or type(error).__name__}"
         for entrant, key in unit.entrants:

@@ -29,6 +29,8 @@ from simnav.leaderboard.cli import (
     simulate,
     sweep,
     train,
+    tune,
+    verify,
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
@@ -89,7 +91,9 @@ for _module in (
     bound,
     reproduce,
     rescore,
+    verify,
     cite,
+    tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
 train.register(app)

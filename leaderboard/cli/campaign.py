@@ -43,10 +43,16 @@ def command(
     covariance_interval: Annotated[
         float, typer.Option(min=0.0, help="Least seconds between two covariances that are kept. 0 keeps all.")
     ] = 0.0,
+    confinement: Annotated[
+        str, typer.Option(help="How estimators are kept from the truth: auto, bubblewrap, process, none.")
+    ] = "auto",
+    sealed: Annotated[
+        Path | None, typer.Option("--sealed", metavar="KEYFILE", help="Derive the seeds from the secret in this file.")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Run scenarios x estimators x seeds; started again, it goes on where it was."""
+    """Run estimators on scenarios and seeds. Started again, the campaign continues."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking import tables
@@ -60,7 +66,8 @@ def command(
             report = interface.campaign(
                 chosen, estimator, runs=runs, seed=seed, output=output, quick=quick, parameters=parameters(set_),
                 workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
-                covariance_interval=covariance_interval, progress=campaign_progress(bar),
+                covariance_interval=covariance_interval, confinement=confinement, sealed=sealed,
+                progress=campaign_progress(bar),
             )  # fmt: skip
         summary = report.summary
         out.document(report.to_dict())

@@ -1,4 +1,4 @@
-"""How the `simnav` command talks: tables for people, one JSON document for machines, short errors.
+"""Output of the `simnav` command: tables, one JSON document for other programs, and short errors.
 
 Results go to standard output; progress, warnings and errors go to standard error. With ``--json``
 standard output holds exactly one JSON document, whatever estimators or libraries print meanwhile.
@@ -35,6 +35,7 @@ class ProgressBar:
     console : rich.console.Console
         Of standard error.
     text : str
+        The text beside the bar.
     total : int or None
         None while it is not known.
     """
@@ -112,7 +113,7 @@ def _clock(seconds: float | None) -> str:
 
 
 class Output:
-    """What a command prints.
+    """The output of a command.
 
     Attributes
     ----------
@@ -135,18 +136,18 @@ class Output:
         return Console(stderr=stderr, width=width)
 
     def print(self, *what: RenderableType) -> None:
-        """Show people something; nothing under ``--json``."""
+        """Print text; nothing with ``--json``."""
         if not self.json:
             console = self._console(stderr=False)
             for item in what:
                 console.print(item, highlight=False, markup=False)
 
     def note(self, text: str) -> None:
-        """Say something on standard error."""
+        """Print a message on standard error."""
         self._console(stderr=True).print(text, highlight=False, markup=False, soft_wrap=True)
 
     def remark(self, text: str) -> None:
-        """Say something in the command's name."""
+        """Print a message with the name of the command."""
         self.note(f"simnav: {text}")
 
     def progress(self, text: str, total: int | None = None) -> ProgressBar:
@@ -158,7 +159,7 @@ class Output:
         self._document = value
 
     def flush(self) -> None:
-        """Print the JSON document, where one was asked for."""
+        """Print the JSON document, with ``--json``."""
         if self.json:
             sys.stdout.write(json.dumps(plain(self._document), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
             sys.stdout.flush()
@@ -188,7 +189,7 @@ def _quiet_stdout(active: bool) -> Iterator[None]:
 
 @contextlib.contextmanager
 def session(json: bool, debug: bool) -> Iterator[Output]:
-    """Around the body of every command: prints what it leaves, turns exceptions into exit codes.
+    """Context of every command: prints its output and turns exceptions into exit codes.
 
     Raises
     ------

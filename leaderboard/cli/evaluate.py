@@ -42,7 +42,7 @@ def command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Run estimators beside the baselines on the same seeds and show where they stand."""
+    """Compare estimators with the baselines on the same seeds."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking.failures import failure_table

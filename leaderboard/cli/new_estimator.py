@@ -24,7 +24,7 @@ def command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Write a small estimator that works, to start from."""
+    """Write a small working estimator as a starting point."""
     with session(json, debug) as out:
         kebab, path = write_estimator(name, output)
         out.document({"name": kebab, "file": str(path)})

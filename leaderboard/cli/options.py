@@ -1,4 +1,4 @@
-"""Options that several commands have, and what is typed made into what a call takes."""
+"""Options that several commands have, and their conversion to arguments of a call."""
 
 from __future__ import annotations
 

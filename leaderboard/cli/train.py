@@ -1,4 +1,4 @@
-"""``simnav train``: learns the parameters of a trained estimator anew."""
+"""``simnav train``: trains the parameters of an estimator."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def _command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Train the network of anfis-fgo (a reconstruction of paper 002), and draw what it has learnt."""
+    """Train the network of anfis-fgo (a reconstruction of Jiang et al. 2026), and draw the result."""
     with session(json, debug) as out:
         run(out, features.value, seeds, passes, output)
 
 
 def run(out: Output, features: str, seeds: int, passes: int, output: Path | None) -> None:
-    """Gather, learn, and write the parameter file with two figures beside it."""
+    """Simulate the training data, train, and write the parameter file and two figures."""
     from simnav.estimators.training.anfis_training import (
         FIRST_TRAINING_SEED,
         FIRST_VALIDATION_SEED,
@@ -129,7 +129,7 @@ def _show(out: Output, parameters: Parameters, learned: Learned, path: Path, fig
     shown = {learned.best, *np.unique(np.linspace(0, last, min(_ROWS, last + 1)).astype(int)).tolist()}
     out.print(
         tables.table(
-            f"ANFIS (reconstruction of paper 002), features {parameters.features!r}: "
+            f"ANFIS (reconstruction of Jiang et al. 2026), features {parameters.features!r}: "
             "RMSE of ln(variance / datasheet's)",
             ["pass", "training", "validation", ""],
             [

@@ -36,14 +36,16 @@ _DECADES = 30.0  # largest over smallest value, from where on they do not go int
 
 @dataclass(frozen=True, eq=False)
 class Bar:
-    """A figure with its interval, the runs behind it, and the paper's.
+    """A figure with its interval, the values of the runs, and the paper's figure.
 
     Attributes
     ----------
     label : str
+        Name of the method.
     value, low, high : float
         NaN where there is none.
     runs : sequence of float
+        Values of the single runs.
     paper : pair of float
         Least and most; NaN where the paper has none.
     """
@@ -63,16 +65,18 @@ def curves_over_time(
     outages: Sequence[tuple[float, float, str]] = (),
     title: str = "",
 ) -> Figure:
-    """Series of one run, a panel each; where a series has no values for a while, its curve is broken.
+    """Series of one run, one panel each. A curve is interrupted where its series has no values.
 
     Parameters
     ----------
     panels : mapping of str to sequence of Curve
         Label of the vertical axis, with its unit -> curves.
     style : Style
+        Colours and line styles of the methods.
     outages : sequence of (start, end, name)
         Shaded [s].
     title : str
+        Title of the figure.
     """
     with styled():
         fig = figure(7.6, 1.0 + 1.75 * len(panels))
@@ -102,7 +106,7 @@ def _layer(curve: Curve) -> tuple[bool, float]:
 
 
 def broken(time: Array, values: Array) -> tuple[Array, Array]:
-    """A series without its missing values, with one NaN where it was away for long.
+    """A series without its missing values, with one NaN in each long gap.
 
     >>> broken(np.array([0.0, 1.0, 2.0, 9.0]), np.array([5.0, 6.0, 7.0, 8.0]))[1].tolist()
     [5.0, 6.0, 7.0, nan, 8.0]
@@ -119,7 +123,7 @@ def broken(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _frame(ax: Axes, series: Sequence[Array]) -> None:
-    """Around zero, or from zero on; whoever diverges from the better half leaves the frame rather than flatten them."""
+    """Limits around zero, or from zero on. Curves that are far beyond the better half leave the frame."""
     if not series:
         return
     spans = sorted(float(np.abs(v).max()) for v in series)
@@ -143,7 +147,9 @@ def bars(panels: Mapping[str, Sequence[Bar]], style: Style, *, title: str = "", 
     panels : mapping of str to sequence of Bar
         Label of the horizontal axis, with its unit -> one bar a method, the same methods in all panels.
     style : Style
+        Colours and line styles of the methods.
     title : str
+        Title of the figure.
     zero : bool
         Mark zero, and never use a logarithmic axis: these are gains.
     """

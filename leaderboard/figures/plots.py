@@ -166,13 +166,16 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One error over time, with the three-sigma bound that was claimed for it.
+    """One error over time, with the estimator's own three-sigma bound.
 
     Attributes
     ----------
     label : str
+        Name of the estimator.
     time, values : (n,) array
+        Times [s] and values.
     bound : (n,) array or None
+        The estimator's own three-sigma bound, if it has one.
     """
 
     label: str
@@ -197,8 +200,11 @@ class Dot:
     Attributes
     ----------
     label : str
+        Name of the estimator.
     value, low, high : float
+        The value and its interval.
     runs : sequence of float
+        Values of the single runs.
     hollow : bool
         Reference rows.
     note : str
@@ -215,7 +221,7 @@ class Dot:
 
 
 def figure(width: float, height: float) -> Figure:
-    """An empty figure in the house style; ``width`` and ``height`` in inches."""
+    """An empty figure in the common style; ``width`` and ``height`` in inches."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -224,7 +230,7 @@ def figure(width: float, height: float) -> Figure:
 
 
 def styled() -> Any:
-    """The house style, for the time of a ``with`` block."""
+    """The common style, inside a ``with`` block."""
     import matplotlib as mpl
 
     return mpl.rc_context(_RC)
@@ -236,9 +242,11 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
     Parameters
     ----------
     fig : matplotlib.figure.Figure
+        The figure.
     path : Path
         Its suffix is replaced by the format's.
     formats : sequence of str
+        Endings of the files, such as ``png``.
     dpi : int
         Of pixel formats.
 
@@ -300,7 +308,7 @@ def trajectory(
     fixes: Mapping[str, Track] | None = None,
     title: str = "",
 ) -> Figure:
-    """Chart of one run: truth, fixes and estimates. The frame is the truth's; what diverges leaves it."""
+    """Chart of one run: truth, fixes and estimates. The frame is that of the truth; estimates that diverge leave it."""
     with styled():
         width, height = _frame(truth)
         fig = figure(7.2, min(max(5.4 * height / width, 3.0), 7.5))
@@ -360,9 +368,11 @@ def error_over_time(
     panels : mapping of str to sequence of Band
         Label of the vertical axis, with its unit -> one band for each estimator.
     style : Style
+        Colours and line styles of the estimators.
     outages : sequence of (start, end, name)
         Shaded [s].
     title : str
+        Title of the figure.
     """
     with styled():
         fig = figure(7.6, 1.0 + 2.15 * len(panels))
@@ -431,7 +441,7 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
 
 
 def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log: bool = True) -> Figure:
-    """One line an estimator: the runs as faint points, the figure with its interval in front.
+    """One line for each estimator: the runs as faint points, and the figure with its interval.
 
     What is more than `FAR_OFF` times the median estimator stands at the edge, as a number.
     """
@@ -493,10 +503,13 @@ def run_chart(
     Parameters
     ----------
     truth : Track
+        The true track.
     tracks : sequence of Track
+        The estimated tracks.
     errors : mapping of str to sequence of Curve
         Label of the vertical axis, with its unit -> one curve for each estimator.
     style : Style
+        Colours and line styles of the estimators.
     fixes : mapping of str to Track, optional
         Instrument -> its position fixes.
     outages : sequence of (start, end, name)
@@ -504,6 +517,7 @@ def run_chart(
     diagnostics : mapping of str to sequence of Curve, optional
         Label of the vertical axis -> curves.
     title : str
+        Title of the figure.
     """
     below = diagnostics or {}
     top, rows = max(len(errors), 1), -(-len(below) // 2)

@@ -82,6 +82,7 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
     Parameters
     ----------
     recording : Recording
+        The run.
     trials : sequence of (label, Trial)
         Those without any epoch are left out.
     references : sequence of str

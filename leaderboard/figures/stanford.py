@@ -30,6 +30,7 @@ def stanford_diagrams(diagrams: Mapping[str, Stanford], *, title: str = "") -> F
     diagrams : mapping of str to Stanford
         By label; at least one.
     title : str
+        Title of the figure.
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""Figures of ``simnav train anfis``: membership functions before and after, and the learning curve."""
+"""Figures of ``simnav train anfis``, membership functions and the learning curve, and of ``simnav tune``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from simnav.types import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["learning_curve", "membership_functions", "write"]
+__all__ = ["learning_curve", "membership_functions", "objective_curve", "write"]
 
 #: Axis label of each input, and what it is multiplied by.
 LABELS: dict[str, tuple[str, float]] = {
@@ -58,6 +59,20 @@ def membership_functions(parameters: Parameters, learned: Learned) -> Figure:
         axes[0].set_ylabel("Grade of membership")
         axes[0].set_title(f"ANFIS (reconstruction), features {parameters.features!r}")
         legend_below(fig, axes[0])
+    return fig
+
+
+def objective_curve(objectives: Sequence[float], before: float, title: str) -> Figure:
+    """The objective of every evaluation of a search, the best so far, and that of the values before."""
+    with styled():
+        fig = figure(6.0, 3.2)
+        ax = fig.add_subplot()
+        count = np.arange(1, len(objectives) + 1)
+        ax.plot(count, objectives, color=PALETTE[4][0], marker=".", ls="", label="evaluations")
+        ax.plot(count, np.minimum.accumulate(objectives), color=PALETTE[0][0], label="best so far")
+        ax.axhline(before, color=GREY, lw=0.8, ls=(0, (1.2, 1.2)), label="before")
+        ax.set(xlabel="Evaluation", ylabel="Mean log ratio of errors", title=title)
+        legend_below(fig, ax)
     return fig
 
 

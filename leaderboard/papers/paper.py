@@ -194,6 +194,7 @@ class Figure:
     draw : str
         How (see `Draw`).
     scenario : str
+        Scenario of the catalogue, or a variant of the paper.
     methods : tuple of str
         For ``gains`` the first is the one that is compared with each of the others.
     series : mapping of str to str
@@ -256,8 +257,11 @@ class Paper:
     full : int
         Number of runs in the paper, or the number that decides most rows.
     methods : tuple of Method
+        The methods that the paper compares, and ours beside them.
     tables : tuple of Table
+        Tables with the rows to be compared.
     figures : tuple of Figure
+        Figures to be drawn.
     not_shown : tuple of NotShown
         Together with tables and figures all that the paper has.
     notes : tuple of str

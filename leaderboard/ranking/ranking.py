@@ -58,13 +58,18 @@ from simnav.scoring import badge
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["PROVISIONAL", "rank"]
+__all__ = ["PROVISIONAL", "RANKED_SCORES", "rank"]
 
 Array = NDArray[np.float64]
 Unit = tuple[str, Any]  # scenario, and seed or recording
 
 #: Fewer seeds or recordings than this are provisional.
 PROVISIONAL = 10
+
+#: All scores that a ranking reads, unless it is asked for another one.
+RANKED_SCORES = frozenset({"horizontal_rmse", "smoothed_horizontal_rmse", "update_median"}) | {
+    f"{name}{part}" for name in ("nees_horizontal", "coverage_95") for part in ("_clean", "_faulty")
+}
 
 _CAP = math.log(FAILURE)
 _LEAST = math.log(1e-9)  # of an error of zero

@@ -25,6 +25,7 @@ class Citation:
     key : str
         Of the BibTeX entry.
     year, version : str
+        Year and version of the software.
     note : str
         Version of the benchmark; of results also the commit, the days of the runs and how many runs there are.
     """

@@ -1,4 +1,4 @@
-"""What was asked for cannot be done: one class of error, and exceptions as sentences."""
+"""Errors of requests: one class of error, and exceptions as sentences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["RequestError", "mistakes", "sentence"]
 
 
 class RequestError(ValueError):
-    """What the user asked for cannot be done; the message is one sentence that says what would be right."""
+    """A request cannot be carried out; the message is one sentence that says what would be right."""
 
 
 @contextlib.contextmanager

@@ -47,7 +47,7 @@ _ORIGIN = {
     "memory_limit_bytes": "memory_limit",
 }
 _PROVENANCE = ("benchmark", "commit", "dirty", "simnav", "python", "numpy", "numba", "gtsam", "system", "cpu", "cores",
-               "confinement", "date")  # fmt: skip
+               "confinement", "seal", "date")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,7 @@ class Document:
     Attributes
     ----------
     results : sequence of Result
+        The results.
     ranking : mapping
         Of the same results, plain (``Ranking.to_dict``).
     scenarios : sequence of mapping

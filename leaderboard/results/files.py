@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files that are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["write_whole"]
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:
-    """Write a file beside its place, then move it there: whoever reads it never sees half of it.
+    """Write a temporary file and move it to its place, so that a reader never sees a part of it.
 
     Raises
     ------

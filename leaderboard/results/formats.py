@@ -48,9 +48,11 @@ def write(kind: Kind, name: str, thing: Any, path: Path) -> list[Path]:
     Parameters
     ----------
     kind : {"results", "recording"}
+        What is written.
     name : str
         One of `formats`.
     thing : Document or Recording
+        The object to be written.
     path : Path
         Of the file; for a recording as ``csv`` of a folder, which is made where it is missing.
 

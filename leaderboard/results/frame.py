@@ -9,7 +9,7 @@ __all__ = ["frame"]
 
 
 def frame(rows: Sequence[Mapping[str, Any]]) -> Any:
-    """A ``pandas.DataFrame`` where pandas is installed; otherwise a ``pyarrow.Table`` with the same columns.
+    """A ``pandas.DataFrame`` if pandas is installed; otherwise a ``pyarrow.Table`` with the same columns.
 
     simnav does not need pandas, and does not install it.
 

@@ -53,6 +53,8 @@ class Provenance:
         That the process may use; 0 where it is not known.
     confinement : str
         How estimators were kept apart from the recording.
+    seal : str
+        Hash of the key of sealed seeds; empty where seeds are public.
     date : str
         Day of the run (UTC), as ``2026-11-22``.
     identity : str
@@ -71,6 +73,7 @@ class Provenance:
     cpu: str = ""
     cores: int = 0
     confinement: str = ""
+    seal: str = ""
     date: str = ""
     identity: str = ""
 
@@ -79,7 +82,8 @@ class Provenance:
         """Short id: a digest of all fields; empty where nothing is known."""
         if self.identity or self == Provenance():
             return self.identity
-        text = json.dumps(asdict(self), sort_keys=True)
+        content = {name: value for name, value in asdict(self).items() if name != "seal" or value}
+        text = json.dumps(content, sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
@@ -102,19 +106,21 @@ class Provenance:
         return found
 
 
-def here(confinement: str = "") -> Provenance:
+def here(confinement: str = "", seal: str = "") -> Provenance:
     """The provenance of what this process computes now.
 
     Parameters
     ----------
     confinement : str
         How estimators are kept apart from the recording.
+    seal : str
+        Hash of the key of sealed seeds.
     """
-    return _on(datetime.now(UTC).strftime("%Y-%m-%d"), confinement)
+    return _on(datetime.now(UTC).strftime("%Y-%m-%d"), confinement, seal)
 
 
 @lru_cache(maxsize=8)
-def _on(date: str, confinement: str) -> Provenance:
+def _on(date: str, confinement: str, seal: str) -> Provenance:
     from importlib.metadata import PackageNotFoundError, version
 
     versions = {}
@@ -131,6 +137,7 @@ def _on(date: str, confinement: str) -> Provenance:
         cpu=_cpu(),
         cores=_cores(),
         confinement=confinement,
+        seal=seal,
         date=date,
         **versions,
     )

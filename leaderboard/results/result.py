@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -51,6 +52,7 @@ class Result:
     scenario : str
         Versioned id.
     seed : int
+        Seed of the run.
     estimator : str
         Label, unique in a campaign.
     parameters : mapping
@@ -61,7 +63,7 @@ class Result:
         As in `simnav.trial`, and ``timeout``, ``out-of-memory``, ``no-recording``.
     scores : dict of str to float
         As in `simnav.scoring.SCORES`.
-    series : dict of str to array
+    series : mapping of str to array
         As from `simnav.scoring.series`, in single precision.
     note : str
         The recording's, e.g. which of several logs it is.
@@ -97,7 +99,7 @@ class Result:
     status: str
     reason: str
     scores: dict[str, float]
-    series: dict[str, Series] = field(default_factory=dict)
+    series: Mapping[str, Series] = field(default_factory=dict)
     note: str = ""
     seconds: float = 0.0
     peak_memory: int = 0
@@ -172,7 +174,7 @@ def to_table(result: Result) -> pa.Table:
 
 
 def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
-    """The contents of a file, checked, a few hundred results at a time.
+    """The contents of a file, checked, a row group (a few hundred results) at a time.
 
     Raises
     ------
@@ -191,8 +193,8 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
             raise ValueError("it was not written by this version of simnav")
         wanted = names if columns is None else columns
         there = [n for n in wanted if n in found.names]
-        for batch in file.iter_batches(batch_size=BATCH, columns=there, use_threads=False):
-            table = pa.Table.from_batches([batch])
+        for group in range(file.num_row_groups):
+            table = file.read_row_group(group, columns=there, use_threads=False)
             for name in (n for n in names if n in wanted and n not in there):
                 unknown = pa.array([_SINCE[name][1]] * len(table), schema().field(name).type)
                 table = table.append_column(schema().field(name), unknown)
@@ -208,31 +210,84 @@ def write_tables(file: BinaryIO, tables: Iterator[pa.Table]) -> None:
             writer.write_table(table)
 
 
-def rows(table: pa.Table, provenances: Mapping[str, Provenance]) -> Iterator[Result]:
+def rows(
+    table: pa.Table,
+    provenances: Mapping[str, Provenance],
+    *,
+    scores: Collection[str] | None = None,
+    series: Callable[[int], Mapping[str, Series]] | None = None,
+) -> Iterator[Result]:
     """Results of a table; the column of series may be missing.
 
     Parameters
     ----------
     table : pyarrow.Table
+        Part of a file of results.
     provenances : mapping of str to Provenance
         By id. A result whose provenance is not among them keeps the id alone.
+    scores : collection of str, optional
+        Only these are read. Default: all.
+    series : callable, optional
+        Gives the series of a row of the table, where the column is missing.
     """
-    series: list[dict[str, Series]] = [{} for _ in range(len(table))]
+    columns: dict[str, list[Any]] = {}
+    for name in table.column_names:
+        if name in ("scores", "series"):
+            continue
+        convert = _CONVERTED.get(name)
+        if name == "provenance":
+            columns[name] = _shared(table.column(name), lambda t: provenances.get(t) or Provenance(identity=t))
+        elif convert is not None or table.schema.field(name).type == "string":
+            columns[name] = _shared(table.column(name), convert)
+        else:
+            columns[name] = table.column(name).to_pylist()
+    columns["scores"] = _scores(table.column("scores"), scores)
     if "series" in table.column_names:
-        lists = table.column("series").combine_chunks()
-        first = lists.offsets.to_numpy()
-        items = lists.values
-        names, shapes = items.field("name").to_pylist(), items.field("shape").to_pylist()
-        edges = items.field("values").offsets.to_numpy()
-        values = items.field("values").values.to_numpy(zero_copy_only=False)
-        for i in range(len(table)):
-            series[i] = {
-                names[j]: values[edges[j] : edges[j + 1]].reshape(shapes[j]) for j in range(first[i], first[i + 1])
-            }
-        table = table.drop_columns(["series"])
-    for row, arrays in zip(table.to_pylist(), series, strict=True):
-        row["parameters"] = json.loads(row["parameters"])
-        row["draws"] = json.loads(row["draws"])
-        row["scores"] = dict(row["scores"])
-        row["provenance"] = provenances.get(row["provenance"]) or Provenance(identity=row["provenance"])
-        yield Result(**row, series=arrays)
+        columns["series"] = list(decoded_series(table.column("series")))
+    elif series is not None:
+        columns["series"] = [series(k) for k in range(len(table))]
+    names = list(columns)
+    for values in zip(*columns.values(), strict=True):
+        yield Result(**dict(zip(names, values, strict=True)))
+
+
+_CONVERTED: dict[str, Callable[[str], Any]] = {"parameters": json.loads, "draws": json.loads}
+
+
+def _shared(column: pa.ChunkedArray, convert: Callable[[str], Any] | None) -> list[Any]:
+    """The values of a column of texts, each text made and converted once."""
+    encoded = column.combine_chunks().dictionary_encode()
+    texts = encoded.dictionary.to_pylist()
+    values = texts if convert is None else [convert(t) for t in texts]
+    return [values[k] for k in encoded.indices.to_numpy(zero_copy_only=False).tolist()]
+
+
+def _scores(column: pa.ChunkedArray, wanted: Collection[str] | None) -> list[dict[str, float]]:
+    """The scores of each row, by name."""
+    maps = column.combine_chunks()
+    edges = maps.offsets.to_numpy()
+    first, last = int(edges[0]), int(edges[-1])
+    encoded = maps.keys.slice(first, last - first).dictionary_encode()
+    names = encoded.dictionary.to_pylist()
+    code = encoded.indices.to_numpy(zero_copy_only=False)
+    value = maps.items.slice(first, last - first).to_numpy(zero_copy_only=False)
+    edges = edges - first
+    if wanted is not None:
+        kept = np.flatnonzero(np.array([n in wanted for n in names], dtype=bool)[code]) if len(code) else code
+        edges = np.searchsorted(kept, edges)
+        code, value = code[kept], value[kept]
+    pairs = list(zip([names[c] for c in code.tolist()], value.tolist(), strict=True))
+    cut = edges.tolist()
+    return [dict(pairs[a:b]) for a, b in pairwise(cut)]
+
+
+def decoded_series(column: pa.ChunkedArray) -> Iterator[dict[str, Series]]:
+    """The series of each row, by name."""
+    lists = column.combine_chunks()
+    first = lists.offsets.to_numpy()
+    items = lists.values
+    names, shapes = items.field("name").to_pylist(), items.field("shape").to_pylist()
+    edges = items.field("values").offsets.to_numpy()
+    values = items.field("values").values.to_numpy(zero_copy_only=False)
+    for i in range(len(lists)):
+        yield {names[j]: values[edges[j] : edges[j + 1]].reshape(shapes[j]) for j in range(first[i], first[i + 1])}

@@ -28,6 +28,7 @@ import uuid
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeVar
 
@@ -43,6 +44,7 @@ from simnav.leaderboard.results.result import (
     to_table,
     write_tables,
 )
+from simnav.leaderboard.results.stored_series import StoredSeries
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -68,7 +70,7 @@ __all__ = [
 _MARKER = "simnav-results.json"
 _LOOSE, _COMPACTED, _TRIALS, _PROVENANCE = "results", "compacted", "trials", "provenance"
 _MOST_PARTS = 16  # more are merged into one
-_STALE = 3600.0  # a temporary file of this age belongs to nobody [s]
+_STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
 T = TypeVar("T")
@@ -80,6 +82,7 @@ class Ending(NamedTuple):
     Attributes
     ----------
     status : str
+        Status of the run.
     time_limit : float
         That it ran under [s]; 0 where it is not known.
     memory_limit : int
@@ -194,6 +197,7 @@ def select(folder: str | os.PathLike[str], current: Mapping[str, tuple[str, Mapp
     Parameters
     ----------
     folder : path
+        Folder of the results.
     current : mapping
         Versioned id of a scenario -> (``Result.recording``, {label: ``Result.variant``}). Other estimators
         of the scenario stay current if they were run on the same recordings.
@@ -271,8 +275,10 @@ def _parts(path: Path) -> list[Path]:
     return sorted((path / _COMPACTED).glob("part-*.parquet"))
 
 
-def _scan(path: Path, columns: list[str] | None = None) -> Iterator[list[pa.Table]]:
-    """The contents of every whole file.
+def _scan(
+    path: Path, columns: list[str] | None = None, loose: list[str] | None = None
+) -> Iterator[tuple[Path, list[pa.Table]]]:
+    """The contents of every whole file; of files with one result the columns ``loose``, by default the same.
 
     Raises
     ------
@@ -282,7 +288,7 @@ def _scan(path: Path, columns: list[str] | None = None) -> Iterator[list[pa.Tabl
     files = _files(path)
     for file in files:
         with contextlib.suppress(_DamagedError):
-            yield list(_read(file, columns))
+            yield file, list(_read(file, columns if loose is None or file.parent.name == _COMPACTED else loose))
     if not set(_parts(path)).issubset(files):
         raise FileNotFoundError
 
@@ -373,7 +379,8 @@ def keys(folder: str | os.PathLike[str]) -> dict[str, Ending]:
 
     def scan() -> dict[str, Ending]:
         found: dict[str, Ending] = {}
-        for tables in _scan(path):  # all columns: to know that the file is whole
+        # A loose file is read as a whole, to know that it is; of a part the series, nearly all of it, are left out.
+        for _, tables in _scan(path, [n for n in schema().names if n != "series"], schema().names):
             for table in tables:
                 key, *columns = (table.column(name).to_pylist() for name in ("key", *Ending._fields))
                 found = dict(zip(key, map(Ending._make, zip(*columns, strict=True)), strict=True)) | found
@@ -390,7 +397,9 @@ def drop(folder: str | os.PathLike[str], keys: Collection[str]) -> None:
     Parameters
     ----------
     folder : path
+        Folder of the results.
     keys : collection of str
+        Keys of the results.
 
     Raises
     ------
@@ -417,6 +426,7 @@ def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, fl
     Parameters
     ----------
     folder : path
+        Folder of the results.
     scores : mapping of str to mapping
         By key: all scores of the result.
     scoring : str
@@ -456,14 +466,19 @@ def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.
                 write_tables(target, iter(tables))
 
 
-def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]:
+def load(folder: str | os.PathLike[str], *, series: bool = True, scores: Collection[str] | None = None) -> list[Result]:
     """The current results of a folder, each once, in order of scenario, estimator and seed.
+
+    Only the columns that are needed are read, so that a hundred thousand results take seconds.
 
     Parameters
     ----------
     folder : path
+        Folder of the results.
     series : bool
-        False leaves the series out, which is quicker.
+        False leaves the series out. Otherwise they stay in their files until they are asked for.
+    scores : collection of str, optional
+        Only these are read. Default: all.
 
     Raises
     ------
@@ -472,19 +487,22 @@ def load(folder: str | os.PathLike[str], *, series: bool = True) -> list[Result]
     """
     path = _opened(folder)
     current = _read_marker(path)["current"]
-    columns = None if series else [n for n in schema().names if n != "series"]
+    columns = [n for n in schema().names if n != "series"]
     known = provenances(path)
     found: dict[str, Result] = {}
     others: set[tuple[str, str]] = set()
+    variants = {(s, e): v for s, entry in current.items() for e, v in entry.get("estimators", {}).items()}
 
     def scan() -> None:
-        for tables in _scan(path, columns):
-            for result in (r for table in tables for r in rows(table, known)):
-                variant = current.get(result.scenario, {}).get("estimators", {}).get(result.estimator)
-                if variant == result.variant:
-                    found.setdefault(result.key, result)
-                elif variant is None:
-                    others.add((result.scenario, result.estimator))
+        for file, tables in _scan(path, columns):
+            for group, table in enumerate(tables):
+                stored = partial(StoredSeries, str(file), group) if series else None
+                for result in rows(table, known, scores=scores, series=stored):
+                    variant = variants.get((result.scenario, result.estimator))
+                    if variant == result.variant:
+                        found.setdefault(result.key, result)
+                    elif variant is None:
+                        others.add((result.scenario, result.estimator))
 
     _steadily(scan)
     if others:

@@ -2,7 +2,7 @@
 
 One file a trial, ``trials/KEY.parquet`` in the folder of the results, a row an array. Estimates are kept as the
 difference to the truth, in single precision: what is rounded then is the error, to seven digits, and not the position
-on the Earth. The truth itself is not kept; whoever reads a trial makes the recording again.
+on the Earth. The truth itself is not kept; the recording is computed again when a trial is read.
 """
 
 from __future__ import annotations
@@ -67,6 +67,7 @@ def write(
     key : str
         Of its result.
     trial : Trial
+        The trial to be kept.
     recording : Recording
         That it was run on.
     covariance_interval : float
@@ -114,7 +115,9 @@ def read(folder: str | os.PathLike[str], key: str, recording: Recording) -> tupl
     Parameters
     ----------
     folder : path
+        Folder of the results.
     key : str
+        Key of the result.
     recording : Recording
         That it was run on, made again.
 

@@ -41,7 +41,7 @@ class LogSource:
 
     Time 0 is the first epoch of the reference that the IMU covers (after ``log.skip``). The run is as long as the
     scenario says, or as the recording reaches. White noise labels (``AidStream.sigma``) of real measurements are those
-    of the datasheet, since nobody knows the true ones.
+    of the datasheet, since the true ones are not known.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ A score is a function of a `ScoringInput`, beside its title, unit and direction:
         return np.nanquantile(given.horizontal, 0.99)
 
 The scores of simnav are made in the same way, in the modules of this package (`simnav.scoring.standard`). A file of
-somebody else is loaded by ``simnav --plugin my_scores.py`` or `simnav.load_plugin`; a package names its module in the
+a third party is loaded by ``simnav --plugin my_scores.py`` or `simnav.load_plugin`; a package names its module in the
 entry-point group ``simnav.scores``.
 """
 

@@ -23,7 +23,7 @@ def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None
     Parameters
     ----------
     trial : Trial
-        One that failed is scored over what it produced; whoever ranks must look at its status.
+        A failed trial is scored over its estimates so far; a ranking must consider its status.
     recording : Recording
         The one that it was run on.
     names : iterable of str, optional

@@ -222,7 +222,7 @@ class _Traced:
     """What Python and NumPy hold [B], from entry to exit."""
 
     def __enter__(self) -> None:
-        self._others = tracemalloc.is_tracing()  # whoever began it goes on after us
+        self._others = tracemalloc.is_tracing()  # it was already on and stays on
         if not self._others:
             tracemalloc.start()
         tracemalloc.reset_peak()

@@ -1,4 +1,5 @@
-"""A ship's sliding window against its full graph: paper 002 has 23.8 s against 381.4 s, a factor of 16.
+"""A ship's sliding window against its full graph: Jiang et al. (2026) print 23.8 s and 381.4 s.
+
 
 Run with ``pytest tests/benchmarks/test_bench_ship_graphs.py --benchmark-enable`` (``make bench``); the factors are
 printed with ``-s`` and kept in the benchmark's ``extra_info``.

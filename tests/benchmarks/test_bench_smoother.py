@@ -72,7 +72,7 @@ def test_smoother_alone(benchmark, steps, name: str):
 
 @pytest.mark.parametrize("name", ["fgo-simplified", "fgo-unsimplified"])
 def test_equivalent_imu_factor(benchmark, name: str):
-    """Paper 004: 15 one-second epochs of the AUV's survey, in a window of 5, with and without."""
+    """The AUV smoothing paper (2022): 15 one-second epochs of the AUV's survey, in a window of 5, with and without."""
     benchmark.group = "15 epochs, window of 5: a node per measurement, or per IMU sample"
     recording = record(load("auv-survey").model_copy(update={"duration": 15.0}), 0)
     steps = list(recording.steps())

@@ -1,7 +1,7 @@
 """What an epoch of the sliding window costs: beside GTSAM's, with weights, and against the length of the window.
 
 The open sea with every aid on the second, so that an epoch is one node of 15 states: IMU at 100 Hz, GNSS position and
-velocity, DVL, gyrocompass. Papers 000 and 001 have 11.8 and 12.3 ms for such an epoch of SW-FGO and GA-FGO.
+velocity, DVL, gyrocompass. Guo et al. (2026) print 11.8 and 12.3 ms for an epoch of SW-FGO and GA-FGO.
 
 Run with ``pytest tests/benchmarks/test_bench_window.py --benchmark-enable`` (``make bench``); with ``-s`` the factors
 and the cost of each length are printed. Comparisons are of processor time, side by side in one process.
@@ -142,7 +142,7 @@ def test_ours_costs_a_fifth_of_gtsams(benchmark, recording: Recording):
 
 @pytest.mark.parametrize("place", ["open-sea", "coastal-voyage"])
 def test_weightings_cost_at_most_half_more(benchmark, recording: Recording, place: str):
-    """Every aid on the second at sea, and paper 000's voyage as it is; means of the epochs, one by each in turn."""
+    """Every aid on the second at sea, and the voyage of Guo et al. (2026); means over the epochs, in turns."""
     if place != "open-sea":
         recording = record(load(place).model_copy(update={"duration": 120.0}), 1)
 

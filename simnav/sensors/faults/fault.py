@@ -342,7 +342,7 @@ def register_fault(cls: type[F]) -> type[F]:
 
 
 def effect_of(kind: str) -> Effect:
-    """What a kind of fault does to a measurement; "other" where nobody knows it."""
+    """What a kind of fault does to a measurement; "other" if it is not known."""
     cls = FAULTS.get(kind)
     return "other" if cls is None else cls.effect
 

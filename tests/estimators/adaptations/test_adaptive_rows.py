@@ -1,4 +1,4 @@
-"""The adaptive rows as whole estimators: gross errors, a disturbed IMU, paper 001's table, bad input.
+"""The adaptive rows as whole estimators: gross errors, a disturbed IMU, a paper's table, bad input.
 
 What they cost on clean data is in `test_clean_cost.py`.
 """
@@ -25,7 +25,7 @@ ROBUST = ("adkf", "igg3", "huber-kf", "gated-ekf", "vb-akf", "mckf", "imm")
 
 
 def sigma_rmse(trial, recording) -> np.ndarray:
-    """Paper 001, eq. 21: RMSE of the estimated sigma, north and east."""
+    """Mao, Wang and Fu (2025), eq. 21: RMSE of the estimated sigma, north and east."""
     stream = recording.data.aids["gnss"]
     at = np.searchsorted(stream.time, trial.time + 1e-6) - 1
     found = np.stack([trial.diagnostics[f"sigma_{c}.gnss"] for c in ("north", "east")], axis=1)
@@ -34,7 +34,7 @@ def sigma_rmse(trial, recording) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def noise_step():
-    """Mean sigma RMSE (north, east) over seeds of paper 001's simulation."""
+    """Mean sigma RMSE (north, east) over seeds of the simulation of Mao, Wang and Fu (2025)."""
     rows = {name: [] for name in ("sage-husa", "sage-husa-paper", "iae", "iae-fixed", "imm")}
     for seed in range(5):
         recording = record(load("gnss-noise-step"), 40 + seed)

@@ -50,7 +50,7 @@ def open_sea() -> Scenario:
 
 
 def uuv() -> Scenario:
-    """The UUV of paper 003 without faults; its DVL draws a scale factor and a misalignment."""
+    """The UUV of Zhan et al. (2026) without faults; its DVL draws a scale factor and a misalignment."""
     s = load("uuv-surface")
     dvl = s.instruments["dvl"].model_copy(update={"speed_noise": 0.0, "bias": (0.0, 0.0, 0.0)})
     changes = {"faults": (), "duration": DURATION, "instruments": {**s.instruments, "dvl": dvl}}

@@ -86,7 +86,7 @@ def test_it_is_never_surer_than_it_is_right(survey, run_over, name: str, paramet
 
 
 def test_waiting_costs(recording_of, run_over):
-    """Paper 004's loss: what has been measured counts only at the next fusion."""
+    """The federated filter's loss: a measurement counts only at the next fusion."""
     aids = (GNSS, DVL, DEPTH)
     squares = {0.0: [], 20.0: []}
     for seed in range(4):

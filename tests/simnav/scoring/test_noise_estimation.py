@@ -64,7 +64,7 @@ def test_in_an_outage_there_is_nothing_to_estimate(make_recording, make_trial):
 
 
 def test_a_noise_step_is_in_the_truth():
-    """What paper 001 sets out: 10 m between 160 and 240 s, 1 m else."""
+    """The simulation of Mao, Wang and Fu (2025): 10 m between 160 and 240 s, and 1 m at other times."""
     recording = record(load("gnss-noise-step"), 0)
     stream = recording.data.aids["gnss"]
     inside = (stream.time >= 160.0) & (stream.time < 240.0)

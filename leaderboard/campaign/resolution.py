@@ -1,0 +1,99 @@
+"""From what was asked for to an estimator that takes part: found, looked at where it can do no harm, and digested."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from simnav.estimator import EstimatorError, find
+from simnav.estimator.registry import is_own_reference, point_of
+from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
+from simnav.leaderboard.campaign.confinement.session import Limits
+from simnav.leaderboard.campaign.entrant import Entrant
+from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, variant
+from simnav.leaderboard.campaign.isolation import isolate
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.session_class import carry, is_session
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+__all__ = ["resolve", "variant_of"]
+
+_IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
+_MEMORY = 2 << 30  # likewise [bytes]
+
+
+def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bool) -> Entrant:
+    """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
+    name, source = request.name, ""
+    file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
+    parameters = {key: _absolute(value) for key, value in request.parameters.items()}
+    if file:
+        name = f"{Path(file[1]).resolve()}{file[2] or ''}"
+        entrant = Entrant(name, parameters, request.label, False, "")
+    else:
+        _import_estimators()
+        with mistakes(EstimatorError):
+            cls = request.cls or find(name)
+        entrant = Entrant(name, parameters, request.label, False, "", point=point_of(cls.name))
+        if _is_ours(cls):
+            with mistakes(EstimatorError):
+                request.make()
+            return replace(entrant, reference=is_own_reference(cls.name), source=estimator_source(cls))
+        with contextlib.suppress(Exception):  # the other process says what is wrong
+            source = estimator_source(cls)  # here, where the text of a session is known
+        if request.cls is not None or is_session(cls.__module__):
+            entrant = replace(entrant, code=carry(cls))
+    if confinement == "none":
+        outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=_MEMORY)
+        found, why = outcome.value, outcome.reason
+    else:
+        try:
+            server = prepare(confinement, folder, loaded=alone)
+            found, why = describe(server, entrant, Limits(_IMPORT_TIME, _MEMORY)), ""
+        except ValueError as error:
+            found, why = None, str(error)
+    if found is None:
+        reason = re.sub(r"^(Estimator|Request)Error: ", "", why)
+        raise RequestError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
+    if found["reference"]:
+        raise RequestError(
+            f"estimator {request.name!r} declares itself a reference; in a campaign only simnav's own references are "
+            "told the truth"
+        )
+    return replace(entrant, source=source or found["source"])
+
+
+def _is_ours(cls: type) -> bool:
+    """Whether a class comes with simnav."""
+    module = sys.modules.get(cls.__module__)
+    return cls.__module__.startswith("simnav.estimators.") and getattr(module, cls.__qualname__, None) is cls
+
+
+def _absolute(value: Any) -> Any:
+    """A parameter; the name of a file as an absolute path, for estimators run in another folder."""
+    if isinstance(value, (str, Path)) and re.search(r"[/.\\]", str(value)) and named_files([value]):
+        return str(Path(value).expanduser().resolve())
+    return value
+
+
+def _describe(entrant: Entrant) -> dict[str, Any]:
+    """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
+    cls = type(entrant.make())
+    return {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
+
+
+def _import_estimators() -> None:
+    """Our own estimators, imported once here, so that forked processes need not do it."""
+    with contextlib.suppress(ImportError):
+        importlib.import_module("simnav.estimators")
+
+
+def variant_of(entrant: Entrant, recording: str) -> str:
+    """The key of an estimator's results without the seed: of a file the name counts, not the folder."""
+    return variant(recording, entrant.label, os.path.basename(entrant.name), entrant.parameters, entrant.source)

@@ -1,0 +1,74 @@
+"""Sealed seeds: runs that nobody can simulate before the key is published, and anybody can repeat afterwards.
+
+The seed of a run is a keyed hash (BLAKE2b) of the scenario's id and the run's number. Results name the number and the
+hash of the key, never the key or the seed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from simnav.leaderboard.results.errors import RequestError
+
+__all__ = ["Seal", "read_seal"]
+
+_LEAST, _MOST = 16, 4096  # bytes of a key file
+
+
+@dataclass(frozen=True)
+class Seal:
+    """The key of a sealed campaign.
+
+    Attributes
+    ----------
+    key : bytes
+        32 bytes, from the content of the file.
+    """
+
+    key: bytes
+
+    def __repr__(self) -> str:
+        return f"Seal({self.hash})"  # a key in a traceback would be a key that is published
+
+    @property
+    def hash(self) -> str:
+        """What results carry: a hash of the key from which it cannot be found."""
+        return hashlib.blake2b(self.key, digest_size=16, person=b"simnav seal").hexdigest()
+
+    def seed(self, scenario: str, number: int) -> int:
+        """The seed of a run.
+
+        Parameters
+        ----------
+        scenario : str
+            Versioned id.
+        number : int
+            That takes the place of a seed in the results.
+        """
+        h = hashlib.blake2b(f"{scenario}/{number}".encode(), digest_size=8, key=self.key, person=b"simnav seed")
+        return int.from_bytes(h.digest()) >> 1
+
+
+def read_seal(path: str | os.PathLike[str]) -> Seal:
+    """The seal of a key file; white space at its ends does not count.
+
+    Raises
+    ------
+    RequestError
+        If there is none, or it is too short to be a secret: one sentence.
+    """
+    file = Path(path).expanduser()
+    try:
+        with open(file, "rb") as opened:
+            content = opened.read(_MOST + 1).strip()
+    except OSError as error:
+        hint = f"; 'openssl rand -hex 32 > {file}' makes one" if isinstance(error, FileNotFoundError) else ""
+        raise RequestError(f"the key file {file} cannot be read: {error.strerror}{hint}") from None
+    if not _LEAST <= len(content) <= _MOST:
+        raise RequestError(
+            f"the key file {file} holds {len(content)} bytes; a key has {_LEAST} to {_MOST}, drawn at random"
+        )
+    return Seal(hashlib.blake2b(content, digest_size=32, person=b"simnav key").digest())

@@ -1,0 +1,143 @@
+"""Verify results: is their seal that of the published key, and do runs that are repeated give the same bits?"""
+
+from __future__ import annotations
+
+import random
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.scenario import load
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.seal import Seal
+    from simnav.leaderboard.results.result import Result
+    from simnav.scenario import Scenario
+
+__all__ = ["Verification", "verify_results"]
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What came of repeating a sample of results.
+
+    Attributes
+    ----------
+    folder : str
+    results : int
+        In the folder.
+    seal : str
+        Hash of the key; empty for public seeds.
+    other_seals : int
+        Results that were not made under this key.
+    repeated : int
+        Runs that were repeated.
+    different : tuple of str
+        Those that gave other scores.
+    not_repeatable : tuple of str
+        Those that could not be repeated, and why: other code, or an estimator that is not here.
+    """
+
+    folder: str
+    results: int
+    seal: str
+    other_seals: int
+    repeated: int
+    different: tuple[str, ...]
+    not_repeatable: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all that was looked at is as it should be, and something was."""
+        return bool(self.repeated) and not (self.other_seals or self.different or self.not_repeatable)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain."""
+        return asdict(self) | {"passed": self.passed}
+
+
+def verify_results(
+    folder: Path,
+    seal: Seal | None = None,
+    *,
+    sample: int = 10,
+    scenarios: Sequence[Scenario] = (),
+    estimators: Sequence[EstimatorRequest] = (),
+    progress: Callable[..., None] | None = None,
+) -> Verification:
+    """Check the seal of all results, and repeat a sample drawn at random.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    seal : Seal, optional
+        Of the published key; none for public seeds.
+    sample : int
+        How many runs are repeated at most.
+    scenarios, estimators : sequence
+        That are not in the catalogue or not registered.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the next.
+
+    Returns
+    -------
+    Verification
+    """
+    found = store.load(folder, series=False)
+    if not found:
+        raise RequestError(f"there are no results in {folder}")
+    wanted = seal.hash if seal is not None else ""
+    mine = [r for r in found if r.provenance.seal == wanted]
+    tried = [r for r in mine if r.status == "ok"]
+    chosen = random.SystemRandom().sample(tried, min(sample, len(tried)))
+    known = {s.id: s for s in scenarios}
+    requests = {e.label: e for e in estimators}
+    report = progress or (lambda *_, **__: None)
+    different, without = [], []
+    with tempfile.TemporaryDirectory(prefix="simnav-verify-") as name:
+        for k, result in enumerate(chosen):
+            what = f"{result.estimator} on {result.scenario}, run {result.seed}"
+            report(k, len(chosen), note=what)
+            try:
+                again = _repeat(result, Path(name) / str(k), seal, known, requests)
+            except (RequestError, ValueError) as error:
+                without.append(f"{what}: {sentence(error)}")
+                continue
+            if again.key != result.key:
+                without.append(f"{what}: simulator, scenario, estimator or parameters are not those of the result")
+            elif (again.status, _plain(again.scores)) != (result.status, _plain(result.scores)):
+                different.append(what)
+        report(len(chosen), len(chosen))
+    return Verification(
+        str(folder), len(found), wanted, len(found) - len(mine), len(chosen), tuple(different), tuple(without)
+    )
+
+
+def _repeat(
+    result: Result,
+    folder: Path,
+    seal: Seal | None,
+    known: Mapping[str, Scenario],
+    requests: Mapping[str, EstimatorRequest],
+) -> Result:
+    scenario = known.get(result.scenario) or load(result.scenario)
+    request = requests.get(result.estimator)
+    if request is None:
+        request = EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
+    run_campaign(
+        [scenario], [request], [result.seed], folder, workers=1, timeout=result.time_limit or None,
+        memory=result.memory_limit or 2 << 30, seal=seal,
+    )  # fmt: skip
+    return store.load(folder, series=False)[0]
+
+
+def _plain(scores: Mapping[str, float]) -> dict[str, str]:
+    """Scores but for wall times, so that NaN is equal to NaN."""
+    return {name: float(value).hex() for name, value in scores.items() if not name.startswith("update_")}

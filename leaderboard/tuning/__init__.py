@@ -1,0 +1,1 @@
+"""Choosing the parameters of an estimator on training families, and nowhere else."""

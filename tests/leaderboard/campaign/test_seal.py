@@ -1,0 +1,121 @@
+"""Sealed seeds: secret before the key is published, repeated to the bit afterwards; and plans of any length."""
+
+from __future__ import annotations
+
+import json
+import os
+import tracemalloc
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import simnav
+from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.entrant import Entrant
+from simnav.leaderboard.campaign.plan import Plan
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.seal import Seal, read_seal
+from simnav.leaderboard.campaign.verification import verify_results
+from simnav.leaderboard.campaign.worker import Unit
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError
+from simnav.scenario import load
+from simnav.warmup import warmup
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
+
+
+@pytest.fixture
+def key(tmp_path: Path) -> Path:
+    path = tmp_path / "key"
+    path.write_text("0123456789abcdef0123456789abcdef\n")
+    return path
+
+
+def test_a_sealed_campaign_is_repeated_by_whoever_has_the_key(tmp_path: Path, key: Path) -> None:
+    warmup(load=False)
+    scenario = load("harbour-multipath").model_copy(update={"duration": 20.0})
+    request, out = EstimatorRequest("gnss-only"), tmp_path / "out"
+    seal = read_seal(key)
+    run_campaign([scenario], [request], range(2), out, workers=1, seal=seal)
+    run_campaign([scenario], [request], range(2), tmp_path / "public", workers=1)
+    found = store.load(out)
+    assert [r.seed for r in found] == [0, 1]
+    assert {r.provenance.seal for r in found} == {seal.hash}
+    public = store.load(tmp_path / "public")
+    assert {r.key for r in found}.isdisjoint({r.key for r in public})
+    assert [r.scores["horizontal_rmse"] for r in found] != [r.scores["horizontal_rmse"] for r in public]
+    everything = b"".join(p.read_bytes() for p in out.rglob("*") if p.is_file())
+    secrets = [key.read_bytes().strip(), seal.key, seal.key.hex().encode()]
+    secrets += [str(seal.seed(scenario.id, n)).encode() for n in range(2)]
+    assert not any(secret in everything for secret in secrets)
+
+    good = verify_results(out, seal, scenarios=[scenario])
+    assert good.passed
+    assert (good.repeated, good.different, good.not_repeatable) == (2, (), ())
+    assert verify_results(tmp_path / "public", scenarios=[scenario], sample=1).passed
+    other = verify_results(out, Seal(bytes(32)), scenarios=[scenario])
+    assert (other.passed, other.other_seals, other.repeated) == (False, 2, 0)
+
+
+def test_a_changed_score_is_found(tmp_path: Path, key: Path) -> None:
+    scenario = load("harbour-multipath").model_copy(update={"duration": 20.0})
+    run_campaign([scenario], [EstimatorRequest("gnss-only")], [3], tmp_path / "out", workers=1, seal=read_seal(key))
+    (result,) = store.load(tmp_path / "out")
+    store.rescore(tmp_path / "out", {result.key: result.scores | {"horizontal_rmse": 0.1}}, result.scoring)
+    report = verify_results(tmp_path / "out", read_seal(key), scenarios=[scenario])
+    assert (report.passed, len(report.different)) == (False, 1)
+    assert simnav.verify(tmp_path / "out", key=key).to_dict()["not_repeatable"]  # the catalogue's is longer
+
+
+def test_a_key_is_a_secret_and_stays_one(tmp_path: Path, key: Path) -> None:
+    seal = read_seal(key)
+    assert seal.hash not in str(seal.seed("a-v1", 0))
+    assert seal.key.hex() not in repr(seal)
+    seeds = {seal.seed(name, n) for name in ("a-v1", "b-v1") for n in range(50)}
+    assert len(seeds) == 100
+    assert all(0 <= s < 2**63 for s in seeds)
+    assert read_seal(key).seed("a-v1", 7) == seal.seed("a-v1", 7)
+    with pytest.raises(RequestError, match="absent cannot be read: No such file or directory; 'openssl rand -hex 32"):
+        read_seal(tmp_path / "absent")
+    (tmp_path / "short").write_text("secret")
+    with pytest.raises(RequestError, match="holds 6 bytes; a key has 16 to 4096"):
+        read_seal(tmp_path / "short")
+
+
+def test_a_thousand_million_runs_cost_no_memory() -> None:
+    scenario = load("harbour-multipath")
+    entrants = [Entrant(n, {}, n, False, n) for n in ("a", "b")]
+    there = {"v-a-5", "v-a-7", "v-b-7"}
+    plan = Plan([scenario], entrants, range(10**9), {scenario.id: {"a": "v-a", "b": "v-b"}}, there)
+    assert plan.total == 2 * 10**9
+    assert plan.weight == pytest.approx(scenario.duration * (2e9 - 3.0))
+    made: Counter[str] = Counter()
+
+    def unit(chosen: object, seed: int, missing: tuple[tuple[Entrant, str], ...]) -> Unit:
+        made.update(key for _, key in missing)
+        return missing  # type: ignore[return-value]
+
+    tracemalloc.start()
+    units = plan.units(unit)
+    for _ in range(7):
+        next(units)
+    assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    tracemalloc.stop()
+    assert sum(made.values()) == 13  # of eight seeds: one is done, of another half
+    assert not there & set(made)
+
+
+def test_a_campaign_of_a_thousand_million_runs_begins_at_once(tmp_path: Path) -> None:
+    class EnoughError(Exception):
+        pass
+
+    def stop(progress: object) -> None:
+        if getattr(progress, "done", 0) and getattr(progress, "stage", "") == "run":
+            raise EnoughError
+
+    scenario = load("harbour-multipath").model_copy(update={"duration": 5.0})
+    with pytest.raises(EnoughError):
+        run_campaign([scenario], [EstimatorRequest("gnss-only")], range(10**9), tmp_path, workers=1, progress=stop)
+    assert json.dumps([r.seed for r in store.load(tmp_path)])[:2] == "[0"
