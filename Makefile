@@ -6,13 +6,14 @@ SITE ?= site
 DOCS ?= site-docs
 BIN := $(VENV)/bin
 
-.PHONY: help leaderboard test bench docs clean
+.PHONY: help leaderboard test bench audit docs clean
 
 help:
 	@echo "make leaderboard   set up, run the quick campaign, print the ranking, write the site"
 	@echo "make test          set up and run all tests (lint, types and floors included)"
 	@echo "make bench         set up and run the benchmarks, one table"
 	@echo "make docs          set up and build the documentation as a site in $(DOCS)"
+	@echo "make audit         measure what the benchmark promises, one table"
 	@echo "make clean         remove the environment, results and site"
 
 $(VENV)/pyvenv.cfg:
@@ -30,7 +31,7 @@ $(VENV)/installed-test: $(VENV)/pyvenv.cfg pyproject.toml
 
 leaderboard: $(VENV)/installed
 	$(BIN)/simnav warmup
-	$(BIN)/simnav campaign --quick --output $(RESULTS)
+	$(BIN)/simnav campaign --profile quick --output $(RESULTS)
 	$(BIN)/simnav leaderboard $(RESULTS) --output $(SITE)
 
 test: $(VENV)/installed-test
@@ -46,6 +47,9 @@ $(VENV)/installed-docs: $(VENV)/pyvenv.cfg pyproject.toml
 
 docs: $(VENV)/installed-docs
 	$(BIN)/python -m mkdocs build --strict --site-dir $(DOCS)
+
+audit: $(VENV)/installed-test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.audit
 
 clean:
 	rm -rf $(VENV) $(RESULTS) $(SITE) $(DOCS) build dist *.egg-info

@@ -55,6 +55,7 @@ class OracleEstimator(KalmanEstimator):
         self.truth, self.restore = adaptation, restore
         self._imu_faults: tuple[Array, Array] | None = None
         self._actual: Instruments | None = None
+        self._actual_covariance: Array | None = None
         self._revealed = False
 
     @property
@@ -63,10 +64,10 @@ class OracleEstimator(KalmanEstimator):
         return (AID, (IMU, *kinds_with(*OBSERVED)))
 
     def reveal(self, recording: Recording) -> None:
-        """Take the labels, and the true datasheets where those that are given are wrong."""
+        """Take the labels, and what is true where datasheets or the start's covariance are wrong."""
         self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
-        self._actual = recording.actual
+        self._actual, self._actual_covariance = recording.actual, recording.actual_covariance
         self._revealed = True
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -75,6 +76,8 @@ class OracleEstimator(KalmanEstimator):
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
+        if self._actual_covariance is not None:
+            start = replace(start, covariance=self._actual_covariance)
         super().reset(start, instruments if self._actual is None else self._actual)
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
