@@ -41,7 +41,7 @@ def draw(steps, found, title, path):
     axes = figure.add_subplot()
     bands = np.array([interval(column) for column in found.T])
     axes.axhline(0.0, color="#33414e", linewidth=1.0)
-    axes.text(steps[-1] / 1e3, 0.5, "plain filter", ha="right", va="bottom", fontsize=9)
+    axes.text(steps[-1] / 1e3, -0.4, "plain filter", ha="right", va="top", fontsize=9)
     axes.fill_between(steps / 1e3, bands[:, 1], bands[:, 2], color="#6aa9d8", alpha=0.35, linewidth=0)
     axes.plot(steps / 1e3, bands[:, 0], color="#1f5f99")
     axes.set_xlabel("training steps, thousands")
