@@ -91,6 +91,7 @@ class Summary:
     Attributes
     ----------
     folder : Path
+        Folder of the results.
     total : int
         Results that were asked for.
     skipped : int
@@ -98,6 +99,7 @@ class Summary:
     statuses : mapping of str to int
         How many of those computed now have which status.
     seconds : float
+        Wall-clock time of the campaign [s].
     """
 
     folder: Path
@@ -157,6 +159,7 @@ def run_campaign(
     Parameters
     ----------
     scenarios, estimators, seeds
+        What is run: every estimator on every scenario with every seed.
     folder : path
         Of the results; made if it is not there.
     workers : int

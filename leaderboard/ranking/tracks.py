@@ -35,6 +35,7 @@ class Track:
     Attributes
     ----------
     name, title : str
+        Name in scenario files, and title in tables.
     score : str
         Key of `simnav.scoring.SCORES` that is ranked.
     scenarios : tuple of str
