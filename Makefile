@@ -6,13 +6,14 @@ SITE ?= site
 DOCS ?= site-docs
 BIN := $(VENV)/bin
 
-.PHONY: help leaderboard test bench docs clean
+.PHONY: help leaderboard test bench audit docs clean
 
 help:
 	@echo "make leaderboard   set up, run the quick campaign, print the ranking, write the site"
 	@echo "make test          set up and run all tests (lint, types and floors included)"
 	@echo "make bench         set up and run the benchmarks, one table"
 	@echo "make docs          set up and build the documentation as a site in $(DOCS)"
+	@echo "make audit         cheats, vandals, SIGKILLs, broken files, statistics: one table (an hour)"
 	@echo "make clean         remove the environment, results and site"
 
 $(VENV)/pyvenv.cfg:
@@ -46,6 +47,9 @@ $(VENV)/installed-docs: $(VENV)/pyvenv.cfg pyproject.toml
 
 docs: $(VENV)/installed-docs
 	$(BIN)/python -m mkdocs build --strict --site-dir $(DOCS)
+
+audit: $(VENV)/installed-test
+	$(BIN)/python -m tests.audit
 
 clean:
 	rm -rf $(VENV) $(RESULTS) $(SITE) $(DOCS) build dist *.egg-info
