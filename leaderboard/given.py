@@ -14,7 +14,7 @@ from simnav.scenario import Scenario
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["ScenarioLike", "Scenarios", "absolute", "quick_estimators", "results_of", "scenario_of", "scenarios_of"]
+__all__ = ["ScenarioLike", "Scenarios", "absolute", "results_of", "scenario_of", "scenarios_of"]
 
 ScenarioLike: TypeAlias = "str | Path | Scenario"
 Scenarios: TypeAlias = "ScenarioLike | Iterable[ScenarioLike] | None"
@@ -30,7 +30,7 @@ def scenario_of(given: ScenarioLike) -> Scenario:
         return load(given)
 
 
-def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str], None] | None = None) -> list[Scenario]:
+def scenarios_of(given: Scenarios, *, note: Callable[[str], None] | None = None) -> list[Scenario]:
     """The requested scenarios; without a request, those of the catalogue.
 
     Of the catalogue, families for training are left out, and logs whose files are not here.
@@ -39,8 +39,6 @@ def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str],
     ----------
     given : scenarios
         A text may name several, separated by commas. The name of a track stands for its scenarios.
-    quick : bool
-        Of the catalogue, leave out those that are tagged ``long``.
     note : callable, optional
         Called with a sentence on what is left out; default: a warning.
     """
@@ -57,7 +55,7 @@ def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str],
     found = []
     for item in dict.fromkeys(asked or names()) if all(isinstance(i, str) for i in asked) else asked:
         chosen = scenario_of(item)
-        if not asked and (chosen.training or (quick and "long" in chosen.tags)):
+        if not asked and chosen.training:
             continue
         if chosen.log is not None:
             from simnav.source import open_source
@@ -73,16 +71,6 @@ def scenarios_of(given: Scenarios, *, quick: bool = False, note: Callable[[str],
     if not found:
         raise RequestError("there is no scenario to run")
     return found
-
-
-def quick_estimators(note: Callable[[str], None] | None = None) -> list[str]:
-    """All registered estimators but the slow ones."""
-    from simnav.estimator import describe, names
-
-    slow = [name for name in names() if describe(name).slow]
-    if slow:
-        _note(note, f"left out of a quick campaign, for their cost: {', '.join(slow)} (-e names them)")
-    return [name for name in names() if name not in slow]
 
 
 def results_of(

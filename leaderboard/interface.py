@@ -24,7 +24,6 @@ from simnav.leaderboard.given import (
     ScenarioLike,
     Scenarios,
     absolute,
-    quick_estimators,
     results_of,
     scenario_of,
     scenarios_of,
@@ -64,7 +63,6 @@ __all__ = [
     "cite",
     "evaluate",
     "make",
-    "quick_estimators",
     "rank",
     "record",
     "reproduce",
@@ -325,7 +323,7 @@ def campaign(
     runs: int | None = None,
     seed: int = 0,
     output: str | os.PathLike[str] = "results",
-    quick: bool = False,
+    profile: str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     workers: int = 2,
     time_limit: float | None = None,
@@ -344,11 +342,12 @@ def campaign(
     scenarios, estimators : optional
         What is run; default: all.
     runs : int, optional
-        Seeds a scenario; default: 50, or 3 where it is quick.
+        Seeds a scenario; default: 50, or as the profile says.
     output : path
         Folder of the results.
-    quick : bool
-        Of what was not asked for by name, leave out what is long or slow.
+    profile : str or path, optional
+        A profile (`simnav.leaderboard.profiles`): what is run, where ``scenarios``, ``estimators`` and ``runs`` do not
+        say otherwise.
     seed, parameters, workers, time_limit, memory_limit, progress
         As for `evaluate`.
     retry : bool
@@ -370,21 +369,25 @@ def campaign(
     CampaignReport
         Of all that is in the folder.
     """
-    from simnav.leaderboard.campaign.campaign import QUICK_RUNS, RUNS
+    from simnav.leaderboard.campaign.campaign import RUNS, combined
     from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.leaderboard.profiles import load
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
 
-    seeds = range(seed, seed + (runs or (QUICK_RUNS if quick else RUNS)))
-    if quick and estimators is None:
-        estimators = quick_estimators()
-    chosen, folder = scenarios_of(scenarios, quick=quick), absolute(output)
-    everyone = requests(estimators, parameters)
-    summary = _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress, retry=retry,
-                   keep_trials=keep_trials, covariance_interval=covariance_interval, confinement=confinement,
-                   seal=None if sealed is None else read_seal(sealed))  # fmt: skip
+    parts: list[tuple[Scenarios, Estimators, int]] = [(scenarios, estimators, runs or RUNS)]
+    if profile is not None:
+        parts = [(scenarios or p.scenarios, estimators or p.estimators, runs or p.runs) for p in load(profile).parts]
+    folder, summaries, seal = absolute(output), [], None if sealed is None else read_seal(sealed)
+    tracks: dict[str, str] = {}
+    for wanted, those, count in parts:
+        chosen, everyone = scenarios_of(wanted), requests(those, parameters)
+        tracks |= {s.id: s.track for s in chosen}
+        summaries.append(_run(chosen, everyone, range(seed, seed + count), folder, workers, time_limit, memory_limit,
+                              progress, retry=retry, keep_trials=keep_trials,
+                              covariance_interval=covariance_interval, confinement=confinement, seal=seal))  # fmt: skip
     results = results_of(folder)
-    return CampaignReport(results, rank(results, tracks={s.id: s.track for s in chosen}), summary)
+    return CampaignReport(results, rank(results, tracks=tracks), combined(summaries))
 
 
 def verify(

@@ -190,6 +190,8 @@ class Recording:
         What was drawn for this run, by key path, in the units of the scenario's file.
     actual : Instruments or None
         The datasheets that would be true, where those in ``instruments`` are wrong.
+    actual_covariance : (9, 9) array or None
+        Of the errors of ``start``, where the one in it is wrong.
     """
 
     scenario: str
@@ -202,6 +204,7 @@ class Recording:
     note: str = ""
     draws: Mapping[str, Any] = field(default_factory=dict)
     actual: Instruments | None = None
+    actual_covariance: Array | None = None
 
     @property
     def duration(self) -> float:
@@ -337,6 +340,8 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         meta["draws"] = dict(recording.draws)
     if recording.actual is not None:
         meta["actual"] = _sheets(recording.actual)
+    if recording.actual_covariance is not None:
+        meta["actual_covariance"] = recording.actual_covariance.tolist()
     arrays: dict[str, Any] = {"meta": np.array(json.dumps(meta))}
 
     def add(prefix: str, holder: object, names: Sequence[str]) -> None:
@@ -395,4 +400,5 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         meta["note"],
         meta.get("draws", {}),
         _instruments(meta["actual"], meta["step"]) if "actual" in meta else None,
+        np.array(meta["actual_covariance"]) if "actual_covariance" in meta else None,
     )

@@ -87,6 +87,11 @@ class InitialError(Spec):
         """(9, 9) array over `simnav.types.COMPONENTS`: what an estimator is told."""
         return np.diag(np.square([*self.position, *self.velocity, *self.attitude]))
 
+    def actual_covariance(self) -> Array | None:
+        """(9, 9) array that the errors are really drawn from; None where it is the one that is told."""
+        f = self.factors()
+        return np.outer(f, f) * self.covariance() if self.times_told else None
+
     def factors(self) -> Array:
         """(9,) array: how many times as large as told the errors really are."""
         return np.repeat([self.times_told.get(name, 1.0) for name in ("position", "velocity", "attitude")], 3)

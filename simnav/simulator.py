@@ -203,6 +203,7 @@ def _recording(simulator: Simulator) -> Recording:
         simulator.advance(simulator.duration),
         draws=simulator.draws,
         actual=simulator.scenario.actual_sheet(),
+        actual_covariance=simulator.scenario.initial_error.actual_covariance(),
     )
 
 

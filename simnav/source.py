@@ -106,6 +106,7 @@ def record(scenario: Scenario, seed: int) -> Recording:
         source.note,
         source.scenario.draws,
         source.scenario.actual_sheet(),
+        source.scenario.initial_error.actual_covariance(),
     )
 
 

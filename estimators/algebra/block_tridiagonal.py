@@ -20,6 +20,11 @@ magnitude below P), and a state without process noise has no Q^-1 at all. So
   ``a <- a + H' S^-1 (v - H P a)``, through the motion ``a <- F' a``;
 - damping is a measurement of each component to be zero.
 
+Measurements of one instrument on one node are taken as their mean, weighed by their information: the mean of what they
+read, of their Jacobians, and its covariance. Where their Jacobians are the same and their noise is proportional,
+nothing is lost. Folded onto a node (`simnav.estimators.models.chain`), they differ by the motion of a fraction of a
+second.
+
 Sources: B. M. Bell, "The iterated Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994; for the
 backward pass G. J. Bierman, "Fixed interval smoothing with discrete measurements", Int. J. Control 18(1), 1973.
 """
@@ -125,6 +130,53 @@ def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-de
 
 
 @kernel()
+def _mean_of(i, end, instrument, components, H, r, R, weight, used, mean_H, mean_r, mean_R):  # type: ignore[no-untyped-def]
+    """The mean of measurement i and of the later ones before ``end`` that are its instrument's and count.
+
+    Each has a share of ``w / trace(R)`` in it. ``used`` becomes 0 for those that i stands for.
+
+    Returns
+    -------
+    int
+        How many they are; where there is only one, nothing is written.
+    """
+    count = 1
+    for k in range(i + 1, end):
+        if used[k] == 1 and instrument[k] == instrument[i] and components[k] == components[i]:
+            count += 1
+    if count == 1:
+        return count
+    m, n = components[i], mean_H.shape[1]
+    total = 0.0
+    mean_H[:] = 0.0
+    mean_r[:] = 0.0
+    mean_R[:] = 0.0
+    for k in range(i, end):
+        if used[k] == 0 or instrument[k] != instrument[i] or components[k] != m:
+            continue
+        trace = 0.0
+        for a in range(m):
+            trace += R[k, a, a]
+        share = weight[k] / trace
+        total += share
+        for a in range(m):
+            mean_r[a] += share * r[k, a]
+            for c in range(n):
+                mean_H[a, c] += share * H[k, a, c]
+            for b in range(m):
+                mean_R[a, b] += share / trace * R[k, a, b]
+        if k > i:
+            used[k] = 0
+    for a in range(m):
+        mean_r[a] /= total
+        for c in range(n):
+            mean_H[a, c] /= total
+        for b in range(m):
+            mean_R[a, b] /= total * total
+    return count
+
+
+@kernel()
 def _whiten(error, whitener, whitened):  # type: ignore[no-untyped-def]
     square = 0.0
     for i in range(error.size):
@@ -151,14 +203,14 @@ def _return(adjoint, U, G, y, m, z):  # type: ignore[no-untyped-def]
 
 @kernel(
     "UniTuple(f8, 2)(f8[:, ::1], f8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], "
-    "i8[::1], i8, i8[::1], f8[:, :, ::1], "
+    "i8[::1], i8, i8[::1], i8[::1], f8[:, :, ::1], "
     "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], "
-    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], f8[:, ::1])"
+    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], f8[:, ::1], f8[::1])"
 )
 def solve_chain(  # type: ignore[no-untyped-def]
     prior, prior_shift, transition, noise, error, motion_weight,
-    node, base, components, jacobian, residual, aid_noise, aid_weight, damping, first,
-    predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used, step,
+    node, base, instrument, components, jacobian, residual, aid_noise, aid_weight, damping, first,
+    predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used, step, size,
 ):  # fmt: skip
     """One step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
@@ -178,6 +230,8 @@ def solve_chain(  # type: ignore[no-untyped-def]
         In ascending order; the first node is number ``base``.
     base : int
         Number of the first node.
+    instrument : (M,) int array
+        Which one it comes from; measurements of one instrument on one node are taken as their mean.
     components : (M,) int array
         0 for a factor that says nothing.
     jacobian : (M, 3, n) array
@@ -201,15 +255,17 @@ def solve_chain(  # type: ignore[no-untyped-def]
     innovation : (M, 3) array
         Overwritten with ``L^-1 (r - H d)``.
     used : (M,) int array
-        Overwritten with 1 where a measurement counts, else 0.
+        Overwritten with 1 where a measurement counts, for itself or for a mean, else 0.
     step : (K, n) array
         Overwritten with dx.
+    size : (K,) array
+        Overwritten with the largest component of each node's step, in its filtered sigmas; NaN or infinite where the
+        step is of no use.
 
     Returns
     -------
     float, float
-        Largest component of the step, in its filtered sigmas, of all nodes and of those before ``first``; NaN or
-        infinite where the step is of no use.
+        Largest ``size`` of all nodes, and of those before ``first``.
     """
     count, n = step.shape
     total = node.size
@@ -219,6 +275,7 @@ def solve_chain(  # type: ignore[no-untyped-def]
     damp_innovations = np.empty((damps, n, 1))
     damp_used = np.zeros((damps, n), dtype=np.bool_)
     unit, zero, variance = np.zeros((1, n)), np.zeros(1), np.empty((n, 1, 1))
+    mean_jacobian, mean_residual, mean_noise = np.empty((3, n)), np.empty(3), np.empty((3, 3))
 
     i = 0
     while i < total and node[i] - base < first:
@@ -248,13 +305,25 @@ def solve_chain(  # type: ignore[no-untyped-def]
                     damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r],
                 )  # fmt: skip
                 unit[0, r] = 0.0
-        while i < total and node[i] - base == k:
-            used[i] = 0
-            if components[i] > 0 and aid_weight[i] > LEAST_WEIGHT:
-                used[i] = _absorb(
-                    P, d, jacobian[i], residual[i], aid_noise[i], aid_weight[i], components[i], L,
-                    cross[i], white[i], innovation[i],
-                )  # fmt: skip
+        end = i
+        while end < total and node[end] - base == k:
+            used[end] = 1 if components[end] > 0 and aid_weight[end] > LEAST_WEIGHT else 0
+            end += 1
+        while i < end:
+            if used[i] == 1:
+                if _mean_of(
+                    i, end, instrument, components, jacobian, residual, aid_noise, aid_weight, used,
+                    mean_jacobian, mean_residual, mean_noise,
+                ) == 1:  # fmt: skip
+                    used[i] = _absorb(
+                        P, d, jacobian[i], residual[i], aid_noise[i], aid_weight[i], components[i], L,
+                        cross[i], white[i], innovation[i],
+                    )  # fmt: skip
+                else:
+                    used[i] = _absorb(
+                        P, d, mean_jacobian, mean_residual, mean_noise, 1.0, components[i], L,
+                        cross[i], white[i], innovation[i],
+                    )  # fmt: skip
             i += 1
 
     adjoint, after, z = np.zeros(n), np.empty(n), np.empty(3)
@@ -274,13 +343,16 @@ def solve_chain(  # type: ignore[no-untyped-def]
             x = adjoint[c]
             for r in range(n):
                 step[k, r] += filtered[k, c, r] * x
+        size[k] = 0.0
         for r in range(n):
             if not filtered[k, r, r] <= 0.0:
-                size = abs(step[k, r]) / sqrt(filtered[k, r, r])
-                if size > largest or size != size:
-                    largest = size
-                if k < first and (size > older or size != size):
-                    older = size
+                x = abs(step[k, r]) / sqrt(filtered[k, r, r])
+                if x > size[k] or x != x:
+                    size[k] = x
+        if size[k] > largest or size[k] != size[k]:
+            largest = size[k]
+        if k < first and (size[k] > older or size[k] != size[k]):
+            older = size[k]
         while i >= 0 and node[i] - base == k:
             if used[i] == 1:
                 _return(adjoint, cross[i], white[i], innovation[i], components[i], z)

@@ -79,6 +79,48 @@ def through_motion(first, row, coupled, transition, jacobian):  # type: ignore[n
                 jacobian[i, r, c] = at_node[c]
 
 
+@kernel("void(i8, i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], i8[::1])")
+def add_motion_noise(first, row, components, jacobian, motion_noise, noise, whitener, bare):  # type: ignore[no-untyped-def]
+    """Add the noise of the motion up to a fold to that of the measurements there, ``R + H Q H'``, once.
+
+    Parameters
+    ----------
+    first : int
+        Aid to begin with.
+    row : (M,) int array
+        Of each aid among the folds; -1 for those that are not folded.
+    components : (M,) int array
+    jacobian : (M, 3, n) array
+        H, with respect to the state at the fold.
+    motion_noise : (K, n, n) array
+        Q of the folds, from their nodes.
+    noise, whitener : (M, 3, 3) arrays
+        Overwritten.
+    bare : (M,) int array
+        1 where it has not been added yet; overwritten with 0.
+    """
+    n = jacobian.shape[2]
+    cross = np.empty(n)
+    for i in range(first, row.size):
+        if row[i] < 0 or bare[i] == 0:
+            continue
+        bare[i] = 0
+        H, Q = jacobian[i], motion_noise[row[i]]
+        for a in range(components[i]):
+            cross[:] = 0.0
+            for j in range(n):
+                x = H[a, j]
+                if x != 0.0:
+                    for c in range(n):
+                        cross[c] += x * Q[j, c]
+            for b in range(components[i]):
+                x = 0.0
+                for c in range(n):
+                    x += cross[c] * H[b, c]
+                noise[i, a, b] += x
+        whitening(noise[i], whitener[i])
+
+
 class Columns:
     """Named columns of equal length; rows are appended at the end and dropped at the front.
 
@@ -176,12 +218,14 @@ class Chain(ABC):
         ``begin_shift``, ``end_shift`` (n,); as linearised last, ``jacobian`` (n, n) and ``residual`` (n,); ``weight``.
     aids : Columns
         ``node`` (number since the start of the run), ``fold`` (likewise, or -1), ``instrument`` (index into ``names``),
-        ``components``, ``time``, ``value`` (3,), ``noise`` and ``whitener`` (3, 3); as linearised last ``residual``
-        (3,), ``jacobian`` (3, n); ``weight``. In ascending order of their nodes.
+        ``components``, ``time``, ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 where the noise lacks
+        that of the motion yet); as linearised last ``residual`` (3,), ``jacobian`` (3, n); ``weight``. In ascending
+        order of their nodes.
     folds : Columns
         Times between nodes at which there are measurements: ``node`` (number of the node before), ``time``,
-        ``transition`` (n, n) from the node, ``shift`` (n,) by which the node has moved since, the model's arrays as
-        predicted then, and with ``now_`` before their names as the shifted node leads to; ``jacobian`` (n, n).
+        ``transition`` and ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since, the
+        model's arrays as predicted then, and with ``now_`` before their names as the shifted node leads to;
+        ``jacobian`` (n, n).
     fold_base : int
         Number of the first of them since the start of the run.
     names : tuple of str
@@ -219,9 +263,9 @@ class Chain(ABC):
         )  # fmt: skip
         self.aids = Columns(
             node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,), noise=(3, 3),
-            whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
+            bare=np.int64, whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
         )  # fmt: skip
-        self.folds = Columns(node=np.int64, time=(), transition=(n, n), shift=(n,), jacobian=(n, n))
+        self.folds = Columns(node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n))
         self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
         self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
         self.base = self.fold_base = 0
@@ -305,17 +349,14 @@ class Chain(ABC):
         return self.front.nominal_noise(measurement)
 
     def attach(self, measurement: Measurement, noise: Array) -> None:
-        """Make a measurement at the front, with the (m, m) noise, a factor on the newest node."""
-        aids, fold = self.aids, -1
-        if self.ahead > 0.0:
-            fold = self._fold()
-            linearised = self.front.measure(measurement)
-            if linearised is not None:
-                H = linearised.jacobian
-                noise = noise + H @ self._noise @ H.T
+        """Make a measurement at the front, with the (m, m) noise, a factor on the newest node.
+
+        The noise of the motion between is added where it is linearised first.
+        """
+        aids, ahead = self.aids, self.ahead > 0.0
         aids.append(
-            node=self.base + len(self.nodes) - 1, fold=fold, instrument=self._index[measurement.instrument],
-            components=len(noise), time=measurement.time, weight=1.0,
+            node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
+            instrument=self._index[measurement.instrument], components=len(noise), time=measurement.time,
         )  # fmt: skip
         _attach(
             np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
@@ -328,8 +369,8 @@ class Chain(ABC):
         newest = self.base + len(self.nodes) - 1
         if not len(folds) or folds["node"][-1] != newest or folds["time"][-1] != front.time:
             folds.append(
-                node=newest, time=front.time, transition=self._transition, jacobian=self._transition, shift=0.0,
-                **{name: getattr(front, name) for name in self._kept},
+                node=newest, time=front.time, transition=self._transition, noise=self._noise, shift=0.0,
+                jacobian=self._transition, **{name: getattr(front, name) for name in self._kept},
             )  # fmt: skip
         return self.fold_base + len(folds) - 1
 
@@ -395,6 +436,9 @@ class Chain(ABC):
         self.move_folds(int(np.searchsorted(folds["node"], aids["node"][first])))
         row = np.where(at_node, -1, aids["fold"] - self.fold_base)
         self.observe(first, row, folds, "now_", jacobian)
+        add_motion_noise(
+            first, row, aids["components"], jacobian, folds["noise"], aids["noise"], aids["whitener"], aids["bare"]
+        )
         through_motion(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
 
     @abstractmethod

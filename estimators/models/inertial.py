@@ -25,11 +25,12 @@ step: it counts for nothing.
 
 from __future__ import annotations
 
-from math import atan2, hypot
+from math import atan2, exp, hypot
 from typing import ClassVar
 
 import numpy as np
 
+from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
@@ -59,6 +60,24 @@ CURRENT, CURRENT_TIME = 0.5, 1800.0
 _NAV = 15
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
+def _carry(transition, rate, elapsed, error):  # type: ignore[no-untyped-def]
+    """Take errors, the columns of an (n, k) array, through a motion in place; arguments: `propagate_covariance`."""
+    m, columns = transition.shape[0], error.shape[1]
+    X = np.zeros((m, columns))
+    for i in range(m):
+        for k in range(m):
+            x = transition[i, k]
+            if x != 0.0:
+                for j in range(columns):
+                    X[i, j] += x * error[k, j]
+    error[:m] = X
+    for i in range(m, error.shape[0]):
+        decay = exp(-rate[i - m] * elapsed)
+        for j in range(columns):
+            error[i, j] *= decay
 
 
 class InertialModel(ErrorModel):
@@ -254,6 +273,9 @@ class InertialModel(ErrorModel):
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error, or several in columns, through the last propagation, in place."""
+        if error.ndim == 2 and error.flags.carray:
+            _carry(self.transition, self._decay, elapsed, error)
+            return
         m = len(self.transition)
         error[:m] = self.transition @ error[:m]
         if len(self._decay):

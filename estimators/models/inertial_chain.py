@@ -36,9 +36,8 @@ SERIES_ANGLE = 0.014
 
 
 @kernel()
-def _turn(r0, r1, r2, v0, v1, v2):  # type: ignore[no-untyped-def]
-    """``exp(r x) v``."""
-    a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
+def _turn(a, b, r0, r1, r2, v0, v1, v2):  # type: ignore[no-untyped-def]
+    """``exp(r x) v``, with a and b the `rotation_coefficients` of r."""
     x0, x1, x2 = cross(r0, r1, r2, v0, v1, v2)
     y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
     return v0 + a * x0 + b * y0, v1 + a * x1 + b * y1, v2 + a * x2 + b * y2
@@ -98,16 +97,17 @@ def _move(F, s, moved, J):  # type: ignore[no-untyped-def]
             size += s[j] * s[j]
     if size <= 1e-24:
         return
+    a, b = rotation_coefficients(p0 * p0 + p1 * p1 + p2 * p2)
     if n >= 15:  # the bias columns turn with the attitude
         for j in range(9, 15):
             for i in range(0, 9, 3):
-                J[i, j], J[i + 1, j], J[i + 2, j] = _turn(p0, p1, p2, F[i, j], F[i + 1, j], F[i + 2, j])
+                J[i, j], J[i + 1, j], J[i + 2, j] = _turn(a, b, p0, p1, p2, F[i, j], F[i + 1, j], F[i + 2, j])
     for i in range(0, 6, 3):
         u0 = 0.5 * (F[i + 1, 8] - F[i + 2, 7])
         u1 = 0.5 * (F[i + 2, 6] - F[i, 8])
         u2 = 0.5 * (F[i, 7] - F[i + 1, 6])
         # E (u + F_b b) - u: what the bias shift adds turns with the node, so the attitude has a share in it.
-        w0, w1, w2 = _turn(p0, p1, p2, u0, u1, u2)
+        w0, w1, w2 = _turn(a, b, p0, p1, p2, u0, u1, u2)
         w0, w1, w2 = w0 - u0, w1 - u1, w2 - u2
         x0, x1, x2 = cross(p0, p1, p2, u0, u1, u2)
         moved[i] += w0 - x0
@@ -134,7 +134,7 @@ def _move(F, s, moved, J):  # type: ignore[no-untyped-def]
             b1 += F[7, j] * s[j]
             b2 += F[8, j] * s[j]
         a0, a1, a2 = a0 - b0, a1 - b1, a2 - b2
-        h0, h1, h2 = _turn(p0, p1, p2, 0.5 * b0, 0.5 * b1, 0.5 * b2)
+        h0, h1, h2 = _turn(a, b, p0, p1, p2, 0.5 * b0, 0.5 * b1, 0.5 * b2)
         for j in range(9, 12):  # the left Jacobian of exp(b x), to first order
             x0, x1, x2 = cross(h0, h1, h2, J[6, j], J[7, j], J[8, j])
             J[6, j] += x0

@@ -16,13 +16,16 @@ __all__ = ["CauchyFgo", "DcsFgo", "GaFgo", "GaFgoPaper", "GmFgo", "GncFgo", "Hub
 __all__ += ["SwitchableFgo", "TukeyFgo"]
 
 
-class _Robust(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, every_sample=False), model=Suitable):
+class _Robust(Row, solver=piece(WindowEstimator, every_sample=False), model=Suitable):
     """The window without its weighting."""
 
 
 @register("huber-fgo")
-class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
+class HuberFgo(_Robust, weighting=piece(TunedMEstimator, defaults={"efficiency": 0.98}, weight=huber)):
     """Sliding window with Huber's weights: a residual beyond c sigma pulls no harder than one of c sigma.
+
+    With the usual 95 % of efficiency it pays twice as much on clean data, and gains nothing with gross errors in 1 or
+    5 % of the measurements.
 
     Source: P. J. Huber, *Robust Statistics*, 1981.
     """
@@ -72,7 +75,7 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
 @register("gnc-fgo")
 class GncFgo(
     _Robust,
-    solver=piece(WindowEstimator, defaults={"tolerance": 0.05, "iterations": 15}, every_sample=False),
+    solver=piece(WindowEstimator, defaults={"iterations": 15}, every_sample=False),
     weighting=GraduatedNonConvexity,
 ):
     """Sliding window with graduated non-convexity: after an outlier the robust cost begins convex and hardens.

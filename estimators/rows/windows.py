@@ -67,7 +67,9 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
 
 @register("sw-fgo-paper")
 class SwFgoPaper(
-    Row, solver=piece(WindowEstimator, defaults={"tolerance": 1e-6}, every_sample=False), model=NineStateModel
+    Row,
+    solver=piece(WindowEstimator, defaults={"tolerance": 1e-6, "spacing": 0.2}, every_sample=False),
+    model=NineStateModel,
 ):
     """Sliding-window factor graph as its paper has it: 9 states, fixed sigmas, no biases.
 

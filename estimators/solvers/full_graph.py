@@ -44,7 +44,7 @@ class FullGraph(WindowEstimator):
         *,
         tolerance: float = 1e-3,
         iterations: int = 10,
-        spacing: float = 0.2,
+        spacing: float = 0.5,
     ):
         super().__init__(
             model, adaptation, weighting, window=None, tolerance=tolerance, iterations=iterations, spacing=spacing

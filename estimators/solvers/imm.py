@@ -177,10 +177,10 @@ class ImmEstimator(KalmanEstimator):
         smoother: Smoother | None = None,
         *,
         levels: tuple[float, ...] = (),
-        highest: float = 30.0,
+        highest: float = 77.5,
         ratio: float = 1.5,
-        stay: float = 0.99,
-        stay_high: float = 0.8,
+        stay: float = 0.992,
+        stay_high: float = 0.675,
     ):
         super().__init__(model, smoother=smoother)
         if self._stepwise:

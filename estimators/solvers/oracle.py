@@ -9,27 +9,30 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimator import Needs, UnsuitableScenario
-from simnav.estimator.needs import AID, IMU
+from simnav.estimator.needs import AID
 from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_faults
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.ship import OBSERVED, ShipModel
+from simnav.estimators.models.true_motion import levelled, true_motion, with_imu
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
-from simnav.kinds import kinds_with
 from simnav.recording import Recording
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
+from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurements
 
 __all__ = ["OracleEstimator"]
 
+#: All but roll and pitch, of which it is told where there is no IMU.
+NOT_TOLD = np.array([True, True, True, True, True, True, False, False, True])
+
 
 class OracleEstimator(KalmanEstimator):
-    """The solver of the module: the inertial model where there is an IMU, the ship model where there is none.
+    """The solver of the module: the inertial model, with the true motion where there is no IMU.
 
     Of the faults it knows the flags and the statistics, not what they added (`simnav.estimators.adaptations.truth`):
     gross errors are left out, errors that last, like multipath, are states (`simnav.estimators.models.fault_states`);
-    but a disturbance of the IMU is taken off its samples. On a run without faults it is ``ekf`` or ``ship-ekf``.
+    but a disturbance of the IMU is taken off its samples. On a run without faults it is ``ekf``. Without an IMU it is
+    told how the vessel moves (`simnav.estimators.models.true_motion`).
 
     Parameters
     ----------
@@ -54,37 +57,46 @@ class OracleEstimator(KalmanEstimator):
             raise ValueError(f"{type(adaptation).__name__} does not know what the faults added; NominalNoise does")
         self.truth, self.restore = adaptation, restore
         self._imu_faults: tuple[Array, Array] | None = None
-        self._actual: Instruments | None = None
-        self._revealed = False
+        self._motion: ImuSamples | None = None
+        self._recording: Recording | None = None
 
     @property
     def needs(self) -> Needs:
-        """An instrument beside the IMU; without an IMU, one that the ship model observes."""
-        return (AID, (IMU, *kinds_with(*OBSERVED)))
+        """An instrument beside the IMU."""
+        return (AID,)
 
     def reveal(self, recording: Recording) -> None:
-        """Take the labels, and the true datasheets where those that are given are wrong."""
+        """Take the labels, and what is true where datasheets or the start's covariance are wrong."""
         self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
-        self._actual = recording.actual
-        self._revealed = True
+        self._motion = true_motion(recording) if recording.instruments.imu is None else None
+        self._recording = recording
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run; needs an IMU or what the ship model needs, and `reveal` before."""
-        if not self._revealed:
+        """Begin a run; needs an instrument beside the IMU, and `reveal` before."""
+        if self._recording is None:
             raise UnsuitableScenario("the oracle needs the truth: reveal(recording) before reset()")
         if not instruments:
             raise UnsuitableScenario("the oracle needs an instrument beside the IMU; there is none")
-        super().reset(start, instruments if self._actual is None else self._actual)
+        if self._recording.actual_covariance is not None:
+            start = replace(start, covariance=self._recording.actual_covariance)
+        if self._recording.actual is not None:
+            instruments = self._recording.actual
+        if self._motion is not None:
+            start, instruments = levelled(start, self._recording), with_imu(instruments)
+        super().reset(start, instruments)
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
-        inner: ErrorModel = InertialModel() if instruments.imu is not None else ShipModel()
+        inner: ErrorModel = InertialModel()
         states = self.truth.states()
         return FaultStateModel(inner, states) if states else inner
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step, without what a fault did to the IMU."""
         imu, aids = measurements.imu, measurements.aids
+        if self._motion is not None:
+            first, last = np.searchsorted(self._motion.time, (measurements.start + 1e-9, measurements.time + 1e-9))
+            imu = self._motion[first:last]
         if self.restore and isinstance(self.truth, NominalNoise):
             aids = [self.truth.restore(m) for m in aids]
         if imu is not None and len(imu) and self._imu_faults is not None:
@@ -92,4 +104,7 @@ class OracleEstimator(KalmanEstimator):
             k = int(np.searchsorted(times, imu.time[0] - 1e-9))
             e = error[k : k + len(imu)]
             imu = replace(imu, angular_rate=imu.angular_rate - e[:, :3], specific_force=imu.specific_force - e[:, 3:])
-        return super().update(Measurements(measurements.start, measurements.time, imu, aids))
+        estimate = super().update(Measurements(measurements.start, measurements.time, imu, aids))
+        if self._motion is not None:
+            estimate.estimated = NOT_TOLD
+        return estimate

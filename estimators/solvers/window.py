@@ -39,6 +39,7 @@ from __future__ import annotations
 import contextlib
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import hypot, isfinite
 from typing import ClassVar
 
@@ -114,9 +115,9 @@ class WindowEstimator(Solver):
         weighting: Weighting | None = None,
         *,
         window: int | None = 20,
-        tolerance: float = 1e-3,
+        tolerance: float = 0.05,
         iterations: int = 10,
-        spacing: float = 0.2,
+        spacing: float = 0.5,
         every_sample: bool = False,
     ):
         if window is not None and window < 1:
@@ -155,6 +156,7 @@ class WindowEstimator(Solver):
         self._cost_test = CostTest()
         n = self.chain.size
         self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,))
+        self.chain.nodes.add(size=())
         self.chain.aids.add(cross=(3, n), white=(3, n), innovation=(3,), used=np.int64)
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
@@ -282,62 +284,60 @@ class WindowEstimator(Solver):
             New factors that are left.
         """
         chain, nodes = self.chain, self.chain.nodes
-        moved = np.zeros(chain.size)
-        damping, settled, linear, solved = 0.0, True, False, 0
-        contraction = self._contraction = min(1.0, 2.0 * self._contraction)
-        latest = since = before = 0.0  # size of the last step; of those since the linearisation; of those up to it
-        accepted = True
-        first = self._first_new(attached)
-        self._linearise(first)
+        now = _Progress(np.zeros(chain.size), self._first_new(attached), min(1.0, 2.0 * self._contraction))
+        self._contraction = now.contraction
+        self._linearise(now.first)
         while True:
             reweighted = len(nodes)
-            if accepted and self.weighting is not None:
-                settled, reweighted = self._weigh(solved)
-            first = min(first, reweighted)
-            if first == len(nodes) and settled and linear:  # the weights are as they were
+            if now.accepted and self.weighting is not None:
+                now.settled, reweighted = self._weigh(now.solved)
+            now.first = min(now.first, reweighted)
+            if now.first == len(nodes) and now.settled and now.linear:  # the weights are as they were
                 nodes["step"][:] = 0.0
                 break
-            size, attached = self._step(damping, first, attached)
-            solved += 1
-            if before > 0.0:
-                contraction = _ratio(size, before, damping)
+            size, attached = self._step(now.damping, now.first, attached)
+            now.solved += 1
+            if now.before > 0.0:
+                now.contraction = _ratio(size, now.before, now.damping)
                 if reweighted == len(nodes):  # other weights would have their share in it
-                    self._contraction = contraction
-            since += size
-            weighed = self.weighting is None or (settled and _ratio(size, latest, damping) * size < self.tolerance)
-            linear = contraction * since < self.tolerance
-            latest, before = size, 0.0
+                    self._contraction = now.contraction
+            now.since += size
+            weighed = self.weighting is None or (
+                now.settled and _ratio(size, now.latest, now.damping) * size < self.tolerance
+            )
+            now.linear = now.contraction * now.since < self.tolerance
+            now.latest, now.before = size, 0.0
             if size > CHECKED_STEP:
-                accepted = self._checked_step()
+                now.accepted = self._checked_step()
             else:
-                accepted = True
+                now.accepted = True
                 chain.retract(nodes["step"])
-                if (weighed and linear) or solved == self.iterations:
-                    moved += nodes["step"][-1]
+                if (weighed and now.linear) or now.solved == self.iterations:
+                    now.moved += nodes["step"][-1]
                     break
-                if not weighed and damping == 0.0 and self.incremental:
-                    moved += nodes["step"][-1]
+                if not weighed and now.damping == 0.0 and self.incremental:
+                    now.moved += nodes["step"][-1]
                     self._keep()
-                    first = len(nodes)
+                    now.first = len(nodes)
                     continue
                 self._linearise()
-            first, before, since = 0, since, 0.0
-            if accepted:
-                moved += nodes["step"][-1]
-                damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
+            now.first, now.before, now.since = 0, now.since, 0.0
+            if now.accepted:
+                now.moved += nodes["step"][-1]
+                now.damping = now.damping / DAMPING_FACTOR if now.damping > FIRST_DAMPING else 0.0
             else:
-                damping = max(FIRST_DAMPING, DAMPING_FACTOR * damping)
-            if solved == self.iterations:
-                damping = max(damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
+                now.damping = max(FIRST_DAMPING, DAMPING_FACTOR * now.damping)
+            if now.solved == self.iterations:
+                now.damping = max(now.damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
                 break
-        if damping > 0.0:  # the covariances and the prior are those without it
+        if now.damping > 0.0:  # the covariances and the prior are those without it
             self._linearise()
             self._solve(0.0)
             nodes["step"][:] = 0.0
         self._keep()
         self.covariance = nodes["filtered"][-1].copy()
         self._eliminated = len(nodes)
-        return solved, self._cost(), moved, attached
+        return now.solved, self._cost(), now.moved, attached
 
     def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
         """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
@@ -423,10 +423,10 @@ class WindowEstimator(Solver):
         sizes: tuple[float, float] = solve_chain(
             chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
             motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
-            aids["node"], chain.base, aids["components"], aids["jacobian"], aids["residual"], aids["noise"],
-            aids["weight"], damping, first,
+            aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"],
+            aids["noise"], aids["weight"], damping, first,
             nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
-            aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"],
+            aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"], nodes["size"],
         )  # fmt: skip
         return sizes
 
@@ -453,6 +453,49 @@ class WindowEstimator(Solver):
             chain.set_prior(chain.turned(chain.nodes["predicted"][leaving], mean), chain.less(mean, step))
             chain.drop(leaving)
             self._eliminated -= leaving
+
+
+@dataclass(slots=True)
+class _Progress:
+    """How far the nodes have converged in an epoch.
+
+    Attributes
+    ----------
+    moved : (n,) array
+        By how much the newest node has been moved.
+    first : int
+        First node that is to be eliminated anew.
+    contraction : float
+        Size of the step that linearising anew leads to, over those before it.
+    solved : int
+        Linear systems.
+    damping : float
+        lambda of the next step.
+    latest : float
+        Size of the last step.
+    since : float
+        Size of the steps since the last linearisation.
+    before : float
+        Size of the steps up to the last linearisation, where the last step led to one; else 0.
+    settled : bool
+        Whether the weights are those that are wanted.
+    linear : bool
+        Whether linearising anew would move no node by more than the tolerance.
+    accepted : bool
+        Whether the last step was taken.
+    """
+
+    moved: Array
+    first: int
+    contraction: float
+    solved: int = 0
+    damping: float = 0.0
+    latest: float = 0.0
+    since: float = 0.0
+    before: float = 0.0
+    settled: bool = True
+    linear: bool = False
+    accepted: bool = True
 
 
 def _ratio(size: float, before: float, damping: float) -> float:

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
 __all__ = ["CampaignError", "Progress", "Summary", "run_campaign", "time_limit"]
 
-#: Seeds of a campaign and of a quick one, by default.
-RUNS, QUICK_RUNS = 50, 3
+#: Seeds of a campaign, by default.
+RUNS = 50
 #: Memory that an estimator may take, by default [bytes].
 MEMORY = 2 << 30
 
@@ -91,6 +91,7 @@ class Summary:
     Attributes
     ----------
     folder : Path
+        Folder of the results.
     total : int
         Results that were asked for.
     skipped : int
@@ -98,6 +99,7 @@ class Summary:
     statuses : mapping of str to int
         How many of those computed now have which status.
     seconds : float
+        Wall-clock time of the campaign [s].
     """
 
     folder: Path
@@ -115,6 +117,15 @@ class Summary:
     def failed(self) -> int:
         """Results computed now that are failures (an unsuitable scenario is none)."""
         return self.computed - self.statuses.get("ok", 0) - self.statuses.get("unsuitable", 0)
+
+
+def combined(summaries: Sequence[Summary]) -> Summary:
+    """The summary of several campaigns in one folder, one after the other."""
+    statuses: Counter[str] = Counter()
+    for s in summaries:
+        statuses.update(s.statuses)
+    total, skipped = sum(s.total for s in summaries), sum(s.skipped for s in summaries)
+    return Summary(summaries[0].folder, total, skipped, dict(statuses), sum(s.seconds for s in summaries))
 
 
 def time_limit(scenario: Scenario) -> float:
@@ -148,6 +159,7 @@ def run_campaign(
     Parameters
     ----------
     scenarios, estimators, seeds
+        What is run: every estimator on every scenario with every seed.
     folder : path
         Of the results; made if it is not there.
     workers : int

@@ -75,6 +75,7 @@ def recording_digest(scenario: Scenario, simulator: str) -> str:
     Parameters
     ----------
     scenario : Scenario
+        The scenario of the recording.
     simulator : str
         As from `simulator_version`; of it only the digest of the code counts, not the number of the version.
     """

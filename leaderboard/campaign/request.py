@@ -76,6 +76,7 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
     Parameters
     ----------
     given : str, Path, type, EstimatorRequest or pair
+        The estimator: a name, a file, a class, a request, or one of these with parameters.
     parameters : mapping, optional
         That are added, unless they are given already.
 

@@ -29,6 +29,7 @@ class Rescored:
     Attributes
     ----------
     folder : Path
+        Folder of the results.
     scores : tuple of str
         Names.
     rescored : int
@@ -36,6 +37,7 @@ class Rescored:
     without_trial : int
         Results that keep what they had, for there is no trial: none was kept, or the run gave nothing.
     seconds : float
+        Wall-clock time [s].
     """
 
     folder: Path
@@ -67,6 +69,7 @@ def rescore_results(
     Parameters
     ----------
     folder : path
+        Folder of the results.
     names : iterable of str
         Of scores; default: all that are known.
     scenarios : iterable of Scenario

@@ -31,6 +31,7 @@ class EstimatorRun:
     estimator : str
         Label.
     parameters : mapping
+        Parameters of the estimator that were set.
     reference : bool
         Told the truth.
     status, reason : str

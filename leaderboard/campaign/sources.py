@@ -80,6 +80,7 @@ def code_of(path: Path, package: str) -> Code:
     Parameters
     ----------
     path : Path
+        The file.
     package : str
         That its relative imports are relative to; empty for a file that belongs to none.
 

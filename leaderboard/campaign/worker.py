@@ -42,12 +42,15 @@ class Unit:
     Attributes
     ----------
     scenario : Scenario
+        The scenario.
     seed : int
+        The seed.
     entrants : tuple of (Entrant, str)
         With the keys of their results.
     recording, simulator : str
         As in `Result`.
     folder : Path
+        Folder of the results.
     timeout : float
         Of an estimator [s].
     memory : int

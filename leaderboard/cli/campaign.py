@@ -29,10 +29,14 @@ __all__ = ["command"]
 def command(
     scenario: Scenarios = None,
     estimator: Estimators = None,
-    runs: Annotated[int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50; quick: 3]")] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", "-n", min=1, help="Seeds a scenario. [50, or as the profile says]")
+    ] = None,
     seed: FirstSeed = 0,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("results"),
-    quick: Annotated[bool, typer.Option("--quick", help="Within minutes: 3 seeds, nothing long or slow.")] = False,
+    profile: Annotated[
+        str | None, typer.Option(help="What is run: smoke, quick, standard, full, or a TOML file of your own.")
+    ] = None,
     set_: Set = None,
     workers: Workers = 2,
     time_limit: TimeLimit = None,
@@ -60,12 +64,10 @@ def command(
         from simnav.leaderboard.ranking.failures import failure_table
         from simnav.leaderboard.ranking.ranking_table import ranking_tables
 
-        chosen = interface.scenarios_of(scenario, quick=quick, note=out.remark)
-        if quick and not estimator:
-            estimator = interface.quick_estimators(out.remark)
+        chosen = None if profile and not scenario else interface.scenarios_of(scenario, note=out.remark)
         with out.progress("starting") as bar:
             report = interface.campaign(
-                chosen, estimator, runs=runs, seed=seed, output=output, quick=quick, parameters=parameters(set_),
+                chosen, estimator, runs=runs, seed=seed, output=output, profile=profile, parameters=parameters(set_),
                 workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
                 covariance_interval=covariance_interval, confinement=confinement, sealed=sealed,
                 progress=campaign_progress(bar),

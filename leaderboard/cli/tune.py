@@ -69,6 +69,8 @@ def command(
         out.print(_table(found))
         chosen = ", ".join(f"{name} {found.present[name]:g} -> {value:g}" for name, value in found.chosen.items())
         out.print(f"chosen: {chosen}" if found.chosen != dict(found.present) else "the present values are the best")
+        if found.chosen != dict(found.present) and not found.holds:
+            out.print("on the unseen voyages it is no better: keep the present values, or search over more voyages")
         for what, path in (("file", written), ("figure", drawn)):
             if path is not None:
                 out.print(f"{what}: {path}")

@@ -16,6 +16,7 @@ from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Paper
 from simnav.leaderboard.papers.report import sheets, verdicts
 from simnav.leaderboard.papers.stored import load, provenance
+from simnav.leaderboard.results.provenance import Provenance
 
 __all__ = ["FOLDER", "blocks", "overview", "replaced", "update"]
 
@@ -55,12 +56,10 @@ def replaced(page: str, texts: dict[str, str]) -> str:
 def blocks(paper: Paper) -> dict[str, str]:
     """The marked blocks of a paper's page: name -> Markdown."""
     found = load(paper)
-    where = provenance(paper)
-    versions = ", ".join(f"{name} {where[name]}" for name in ("simnav", "python", "numpy", "numba", "gtsam"))
     tables = [
         "\n".join(f"- {plural[0].upper()}{plural[1:]}: {text}." for kind, plural in KINDS_OF_ROWS.items()
                   if (text := verdicts(found, kind))),
-        f"Computed on {where['date']} with {versions}, on {where['processor']}.",
+        *(f"Computed on {p.date} with {_versions(p)}, on {p.cpu}." for p in provenance(paper)),
     ]  # fmt: skip
     for sheet in sheets(found):
         number = f"{sheet.number}: " if sheet.number else ""
@@ -73,6 +72,12 @@ def blocks(paper: Paper) -> dict[str, str]:
         "tables": "\n\n".join(text for text in tables if text),
         "contents": _contents(paper),
     }
+
+
+def _versions(p: Provenance) -> str:
+    """Versions of what computed the results."""
+    commit = f" (commit {p.commit[:9]})" if p.commit else ""
+    return f"simnav {p.simnav}{commit}, Python {p.python}, NumPy {p.numpy}, Numba {p.numba} and GTSAM {p.gtsam}"
 
 
 def overview() -> str:

@@ -1,8 +1,8 @@
 """The results of the papers' comparisons that come with simnav: one small Parquet file for each paper.
 
 A file holds one row for each run of an estimator on a scenario: status, peak memory and those scores that the paper's
-rows need, in single precision. Its metadata hold the estimators that stand for the paper's methods, and where the
-results were computed.
+rows need, in single precision. Its metadata hold the estimators that stand for the paper's methods, and the
+provenance of the results.
 
 ``python -m simnav.leaderboard.papers.stored FOLDER`` writes the files from ``FOLDER/PAPER/results``, where FOLDER is
 the output of ``simnav reproduce PAPER --until-decided``, and then the tables of ``docs/papers``.
@@ -12,11 +12,7 @@ from __future__ import annotations
 
 import json
 import math
-import platform
-import subprocess
 from collections.abc import Mapping
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +20,7 @@ from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers.measures import scores_of
 from simnav.leaderboard.papers.paper import Gain, Paper
 from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method, load_results
+from simnav.leaderboard.results.provenance import Provenance, distinct
 from simnav.leaderboard.results.result import Result
 
 if TYPE_CHECKING:
@@ -58,7 +55,7 @@ def save(found: Reproduction, folder: Path = FOLDER) -> Path:
     about = {
         "paper": found.paper.key,
         "methods": {name: None if r is None else r.label for name, r in found.stands_for.items()},
-        **_here(),
+        "provenance": [p.to_dict() for p in distinct(r.provenance for r in results)],
     }
     table = pa.table(columns).replace_schema_metadata({_KEY: json.dumps(about).encode()})
     folder.mkdir(parents=True, exist_ok=True)
@@ -92,10 +89,9 @@ def load(paper: Paper, folder: Path = FOLDER) -> Reproduction:
     return fill(paper, stands_for, results, range(most))
 
 
-def provenance(paper: Paper, folder: Path = FOLDER) -> dict[str, str]:
-    """Where and with what the stored results were computed: versions, commit, processor, date."""
-    about = _read(paper.key, folder)[1]
-    return {name: str(value) for name, value in about.items() if name not in ("paper", "methods")}
+def provenance(paper: Paper, folder: Path = FOLDER) -> list[Provenance]:
+    """Where the stored results come from: versions, commit, processor and date; the latest first."""
+    return [Provenance.from_dict(values) for values in _read(paper.key, folder)[1]["provenance"]]
 
 
 def _read(key: str, folder: Path) -> tuple[Any, Mapping[str, Any]]:
@@ -118,24 +114,6 @@ def _scores(paper: Paper) -> list[str]:
     names |= {row.than_score for row in paper.rows() if isinstance(row, Gain) and row.than_score}
     names |= {s for f in paper.figures if f.draw in ("bars", "gains") for s in f.series.values()}
     return sorted({score for name in names for score in scores_of(name)})
-
-
-def _here() -> dict[str, str]:
-    """Versions, commit, processor and date."""
-    processor = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        models = [line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line]
-        processor = models[0] if models else processor
-    root = Path(__file__).resolve().parents[2]
-    done = subprocess.run(["git", "-C", str(root), "describe", "--always", "--dirty"], capture_output=True, text=True)
-    return {
-        **{name: version(name) for name in ("simnav", "numpy", "numba", "gtsam")},
-        "python": platform.python_version(),
-        "commit": done.stdout.strip() if done.returncode == 0 else "",
-        "processor": processor,
-        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
-    }
 
 
 def _main(folder: Path) -> None:

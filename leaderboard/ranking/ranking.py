@@ -122,6 +122,7 @@ class _Cell:
     Attributes
     ----------
     runs : Runs
+        All runs of the estimator on the scenario.
     units : list
         The seed or recording of each.
     logs : (n,) array

@@ -27,6 +27,7 @@ def remarks(
     unit : str
         ``seed`` or ``recording``.
     rows : sequence of Row
+        Rows of the ranking.
     references : sequence of Reference
         Of the scenarios.
     """

@@ -29,6 +29,7 @@ class _Report:
     Attributes
     ----------
     results : sequence of Result
+        The results that the report is made from.
     ranking : Ranking
         Of these results.
     """
@@ -83,6 +84,7 @@ class EvaluationReport(_Report):
     scenarios : tuple of str
         Versioned ids.
     seeds : sequence of int
+        Seeds of the runs.
     standings : tuple of Standing
         One for each estimator in question and scenario.
     folder : Path or None

@@ -32,7 +32,9 @@ class Runs:
     Attributes
     ----------
     scenario, estimator : str
+        Versioned id of the scenario, and label of the estimator.
     reference : bool
+        Whether the estimator is a reference, which is not ranked.
     results : list of Result
         In order of seed.
 

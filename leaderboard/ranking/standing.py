@@ -24,8 +24,11 @@ class StandingRow:
     Attributes
     ----------
     estimator : str
+        Label of the estimator.
     reference : bool
+        Whether it is a reference, which is not ranked.
     runs, failed : int
+        Number of runs, and how many of them failed.
     horizontal_rmse, low, high : float
         Median over the runs that ended well, with its 95 % interval [m].
     ratio, ratio_low, ratio_high : float or None
@@ -58,6 +61,7 @@ class Standing:
     Attributes
     ----------
     scenario, estimator : str
+        Versioned id of the scenario, and label of the estimator.
     place : int or None
         By the median error among those that are no references; None where the scenario does not suit it.
     of : int

@@ -132,13 +132,17 @@ def table(
     Parameters
     ----------
     title : str
+        Title above the table.
     columns : sequence of str
+        Titles of the columns.
     rows : iterable of sequences
+        Cells of each row.
     numeric : iterable of str
         Columns that are right-aligned.
     dim, strong : iterable of int
         Rows that step back (reference rows) and that stand out (the user's own).
     caption : str, optional
+        Text below the table.
     """
     from rich import box
     from rich.table import Table
@@ -176,8 +180,11 @@ class Fitted:
     Parameters
     ----------
     title : str
+        Title above the table.
     columns : sequence of str
+        Titles of the columns.
     rows : sequence of sequences
+        Cells of each row.
     value : sequence of str
         Columns from the most valuable on. The first ones are never left out, be the terminal ever so narrow; columns
         that are not named go first.

@@ -21,6 +21,7 @@ _TITLES = {
     "underwater": "Under water",
     "post-processing": "Post-processing",
     "generalisation": "Generalisation",
+    "generalisation-no-imu": "Generalisation without an IMU",
     "recorded": "Recorded voyages",
     "papers": "Scenarios of papers",
     "other": "Other scenarios",
@@ -34,6 +35,7 @@ class Track:
     Attributes
     ----------
     name, title : str
+        Name in scenario files, and title in tables.
     score : str
         Key of `simnav.scoring.SCORES` that is ranked.
     scenarios : tuple of str

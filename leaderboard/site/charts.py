@@ -49,6 +49,7 @@ class Chart:
     name : str
         Unique on its page.
     title, caption : str
+        Title and explanation of the chart.
     spec : dict
         Vega-Lite, with placeholders.
     data : mapping

@@ -31,10 +31,13 @@ class EstimatorEntry:
     Attributes
     ----------
     label, page : str
+        Label of the estimator, and file of its page.
     data : str
         Name of the file of its runs (``data/NAME.js``).
     reference : bool
+        Whether it is a reference, which is not ranked.
     facts : EstimatorFacts
+        What is shown of it beside its results.
     """
 
     label: str
@@ -51,11 +54,13 @@ class ScenarioEntry:
     Attributes
     ----------
     id, name, page : str
+        Versioned id, name, and file of its page.
     seeds : tuple of int
         All that any estimator ran.
     argument : str
         As the command takes it.
     facts : tuple of Fact
+        Facts that are shown beside the title.
     title, description, source, toml, group : str
         Empty for one that is not in the catalogue.
     """
@@ -113,6 +118,7 @@ class SiteFacts:
         Results; 0 for a page that stands alone.
     scenarios, estimators : sequence
     papers : sequence of ExtraPage
+        Pages of the comparisons of papers.
     command : str
         That makes the results again.
     benchmark : str

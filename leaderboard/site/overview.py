@@ -147,6 +147,7 @@ def overview(
     Parameters
     ----------
     ranking : Ranking
+        The ranking to be shown.
     estimators, scenarios : mapping
         By label and by versioned id.
     runs : mapping

@@ -26,6 +26,7 @@ class BreakingPoint:
     Attributes
     ----------
     estimator : str
+        Label of the estimator.
     criterion : str
         ``twice-clean``: its median error passes twice that at the clean value; ``limit``: it passes the limit.
     threshold : float
@@ -82,6 +83,7 @@ def breaking_point(
     Parameters
     ----------
     estimator : str
+        Label of the estimator.
     dial : sequence of float
         Values, ascending.
     errors : (runs, n) array

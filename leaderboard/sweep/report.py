@@ -34,11 +34,13 @@ class SweepPoint:
     Attributes
     ----------
     estimator : str
+        Label of the estimator.
     values : tuple of float
         Of the dials, in their units.
     error : Interval
         Median over the runs, of which a failed one counts as infinite.
     runs, failed : int
+        Number of runs, and how many of them failed.
     """
 
     estimator: str
@@ -60,11 +62,13 @@ class Sweep:
     values : tuple of tuple of float
         Of each dial, ascending.
     estimators : tuple of str
+        Labels of the estimators.
     score : str
         Key of `simnav.scoring.SCORES`.
     limit : float or None
         Absolute limit of the score, in its unit.
     results : sequence of Result
+        All results of the sweep.
     settings : tuple of Setting
     summary : Summary
         Of the campaign.

@@ -83,6 +83,7 @@ def chosen_dials(scenario: Scenario, asked: Mapping[str, Sequence[float]]) -> li
     Parameters
     ----------
     scenario : Scenario
+        The scenario that is swept.
     asked : mapping of str to sequence of float
         Name of a dial of the scenario, or key path in its TOML, to values. Without values: `DEFAULT_VALUES` over the
         range of the dial.

@@ -91,6 +91,11 @@ class Tuning:
     commit: str
     day: str
 
+    @property
+    def holds(self) -> bool:
+        """Whether what was chosen is better on the unseen voyages, too; what is not is not to be adopted."""
+        return self.unseen_after.objective < self.unseen_before.objective
+
     def to_dict(self) -> dict[str, Any]:
         """What the file holds, and ``simnav tune --json`` prints."""
         return {

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simnav.leaderboard.ranking.statistics import FAILURE, Interval, score, separate, share
 
-__all__ = ["SHAPES", "Board", "coverage", "coverages", "null_boards", "power", "simulated_boards"]
+__all__ = ["SHAPES", "Board", "coverage", "coverages", "null_boards", "power", "rows", "simulated_boards"]
 
 Array = NDArray[np.float64]
 
@@ -138,3 +138,23 @@ def power(*, boards: int, rows: int, seeds: int, scale: float, difference: float
         x = rng.normal(size=(seeds, 1)) + scale * rng.standard_normal((seeds, rows)) + offset
         found += bool(separate(x).better[0, rows - 1])
     return found / boards
+
+
+def rows() -> Iterator[tuple[str, str, str, bool]]:
+    """What is measured, its figure, what is promised, and whether that is kept."""
+    every = null_boards(1000)
+    yield ("boards of equal rows with any two separated", _percent(every), "at most 5 %, limit 6.5 %",
+           every.value <= 0.05 and every.high <= 0.065)  # fmt: skip
+    for shape in SHAPES:
+        found = null_boards(400, (shape,), seed=5)
+        yield f"  of these, {shape} errors", _percent(found), "limit 6.5 %", found.high <= 0.065
+    for name, found in coverages(700).items():
+        yield f"95 % intervals that hold the truth: {name}", _percent(found), "93 to 97 %", 0.93 <= found.value <= 0.97
+    for count, seeds in ((2, 10), (2, 50), (10, 30), (10, 50), (10, 200), (40, 50), (40, 200)):
+        figures = [power(boards=100, rows=count, seeds=seeds, scale=s) for s in (0.03, 0.1, 0.3)]
+        text = " / ".join(f"{100.0 * f:.0f}" for f in figures) + " %"
+        yield f"power for 5 %: {count} rows, {seeds} seeds (spread 0.03/0.1/0.3)", text, "", True
+
+
+def _percent(found: Interval) -> str:
+    return f"{100.0 * found.value:.1f} % [{100.0 * found.low:.1f}, {100.0 * found.high:.1f}]"

@@ -74,7 +74,7 @@ def command(*words: str) -> Any:
 def call_list() -> Any:
     from simnav.catalogue import headers
 
-    return {"estimators": simnav.names(), "scenarios": [h.id for h in headers()]}
+    return {"estimators": simnav.names(), "scenarios": sorted(h.id for h in headers())}
 
 
 def call_simulate() -> Any:
@@ -98,6 +98,8 @@ def call_check() -> Any:
     report = simnav.check("gnss-only:acceleration=0.5")
     return {"estimator": report.estimator, "passed": report.passed, "findings": plain(list(report.findings))}
 
+
+RATE = "instruments.gnss_position.rate_hz"
 
 CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
     "list": (["list"], call_list),
@@ -133,11 +135,15 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
     "cite": (["cite"], lambda: simnav.cite().to_dict()),
+    "sweep": (
+        ["sweep", "pond.toml", "--dial", RATE + "=1,2", "-e", "gnss-only", "-n", "1", "--workers", "1", "-o", "swept"],
+        lambda: simnav.sweep("pond.toml", {RATE: [1, 2]}, "gnss-only", runs=1, output="swept", workers=1).to_dict(),
+    ),
     "warmup": (["warmup"], lambda: {"kernels": len(__import__("simnav.compiled").compiled.kernels())}),
 }  # fmt: skip
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
-ELSEWHERE = {"reproduce", "rescore", "tune", "verify"}
+ELSEWHERE = {"reference", "reproduce", "rescore", "tune", "verify"}
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -152,7 +158,7 @@ def test_a_command_and_its_call_say_the_same(here: Path, name: str) -> None:
     if name == "list":
         said = {
             "estimators": [e["name"] for e in said["estimators"]],
-            "scenarios": [s["id"] for s in said["scenarios"]],
+            "scenarios": sorted(s["id"] for s in said["scenarios"]),
         }
     if name == "new-estimator":
         assert said.pop("name") == "theirs"
@@ -160,7 +166,7 @@ def test_a_command_and_its_call_say_the_same(here: Path, name: str) -> None:
         texts = [Path(f"{n}.py").read_text().lower().replace(n, "") for n in ("mine", "theirs")]
         assert texts[0] == texts[1]
     assert {k: said[k] for k in called} == called
-    assert set(said) - set(called) <= {"file", "csv", "scenario", "duration", "imu_samples", "failed"}
+    assert set(said) - set(called) <= {"file", "figure", "csv", "scenario", "duration", "imu_samples", "failed"}
 
 
 def test_every_command_is_compared() -> None:

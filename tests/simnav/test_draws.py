@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 
+import simnav
 from simnav.draws import Distribution, Template, has_draws, with_values
 from simnav.environment import NavigationEnv
 from simnav.recording import Recording
@@ -262,3 +263,27 @@ def test_the_head_of_a_file_with_a_drawn_duration(tmp_path):
     assert header is not None
     assert (header.duration, header.title) == (50.0, "A")
     assert {parse(text).drawn(k).duration for k in range(30)} <= set(range(40, 61))
+
+
+def test_a_start_is_worse_than_told_and_the_oracle_knows():
+    worse = TOML.replace("[vessel]", "[initial_error.times_told]\nposition = 20.0\n\n[vessel]", 1)
+    errors, told = [], 0.0
+    for seed in range(40):
+        simulator = Simulator(parse(worse).drawn(seed), seed)
+        plain = Simulator(parse(TOML).drawn(seed), seed)
+        height = simulator.initial_truth.position[0, 2]
+        errors.append(simulator.start.position[2] - height)
+        assert errors[-1] == pytest.approx(20.0 * (plain.start.position[2] - height), abs=1e-6)
+        told = float(np.sqrt(simulator.start.covariance[2, 2]))
+    assert told == 2.0
+    assert np.std(errors) == pytest.approx(40.0, rel=0.4)
+    recording = simulate(parse(worse), 0)
+    assert recording.actual_covariance is not None
+    np.testing.assert_allclose(recording.actual_covariance[:3, :3], 1600.0 * np.eye(3))
+    oracle = simnav.make("oracle")
+    oracle.reveal(recording)
+    oracle.reset(recording.start, recording.instruments)
+    first = oracle.update(next(recording.steps()))
+    assert first.covariance is not None
+    assert first.covariance[2, 2] > 10.0
+    assert simulate(parse(TOML), 0).actual_covariance is None

@@ -130,6 +130,7 @@ def share(count: int, runs: int) -> Interval:
     Parameters
     ----------
     count, runs : int
+        Number of runs with the property, and number of all runs.
 
     Examples
     --------

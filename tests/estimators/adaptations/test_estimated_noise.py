@@ -215,3 +215,19 @@ def test_out_of_scope_is_left_alone():
         adaptation = SageHusa(scope=scope)
         adaptation.reset(Instruments((sheet,)))
         assert bool(adaptation.adapt(given)[0, 0] > 1.0) is changed
+
+
+@pytest.mark.parametrize("source", ["innovation", "residual"])
+def test_the_datasheet_stands_until_the_innovations_contradict_it(source):
+    sound, noisy = innovations(4000, NOMINAL), innovations(200, 9.0 * NOMINAL)
+    believed = feed(InnovationBased(source), sound)
+    # three components, of which one may be improbable at 1 % on the side above (below, the bound is the datasheet)
+    assert np.mean([np.array_equal(noise, NOMINAL) for noise in believed[20:]]) > 0.94
+    assert all(np.trace(noise) > 2.0 * np.trace(NOMINAL) for noise in feed(InnovationBased(source), noisy)[20:])
+    printed = feed(InnovationBased(source, significance=1.0), sound)
+    assert np.mean([np.array_equal(noise, NOMINAL) for noise in printed[20:]]) < 0.2
+
+
+def test_a_significance_is_a_probability():
+    with pytest.raises(ValueError, match="significance = 0"):
+        InnovationBased(significance=0.0)

@@ -25,6 +25,7 @@ class Problem:
         self.node = np.array([0, 0, 1, 3, 4, 4, 5], dtype=np.int64)
         self.m = np.array([3, 1, 2, 3, 1, 2, 3], dtype=np.int64)
         total = len(self.node)
+        self.instrument = np.arange(total)
         self.H = rng.normal(size=(total, 3, N))
         self.r = rng.normal(size=(total, 3))
         self.R = np.array([covariance(rng, 3) for _ in range(total)])
@@ -49,8 +50,8 @@ class Problem:
             ours[:rows] = theirs[:rows]
         step = np.empty((COUNT, N))
         size = solve_chain(
-            self.prior, self.shift, self.F, self.Q, self.e, self.w, self.node + 7, 7, self.m, self.H, self.r, self.R,
-            self.v, damping, first, *nodes, *aids, step,
+            self.prior, self.shift, self.F, self.Q, self.e, self.w, self.node + 7, 7, self.instrument, self.m, self.H,
+            self.r, self.R, self.v, damping, first, *nodes, *aids, step, np.empty(COUNT),
         )  # fmt: skip
         self.left = *nodes, *aids
         return size, (*nodes, step)
@@ -111,6 +112,26 @@ def test_what_is_predicted_is_the_schur_complement_of_all_older_nodes(node: int)
     rest = b[new] - A[new, old] @ np.linalg.solve(A[old, old], b[old])
     np.testing.assert_allclose(np.linalg.inv(predicted[node]), schur, rtol=1e-7)
     np.testing.assert_allclose(predicted_shift[node], np.linalg.solve(schur, rest), rtol=1e-7)
+
+
+def test_measurements_of_one_instrument_on_one_node_are_their_mean():
+    """With one Jacobian and proportional noise nothing is lost; others on the node do not mix in."""
+    p = Problem(1)
+    order = [0, 0, 1, 0, 2, 3, 4, 5, 6]
+    for name in ("node", "m", "H", "r", "R", "v"):
+        setattr(p, name, np.ascontiguousarray(getattr(p, name)[order]))
+    p.instrument = np.array(order)
+    rng = np.random.default_rng(2)
+    p.r, p.v = rng.normal(size=p.r.shape), rng.uniform(0.2, 1.0, len(order))
+    p.R[1] *= 3.0
+    p.v[3] = 0.0  # counts for nothing
+    size, merged = p.solve()
+    assert p.left[-1].tolist() == [1, 0, 1, 0, 1, 1, 1, 1, 1]
+    p.instrument = np.arange(len(order))
+    alone, single = p.solve()
+    np.testing.assert_allclose(size, alone, rtol=1e-9)
+    for ours, theirs in zip(merged, single, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-10)
 
 
 def test_damping_is_levenberg_and_marquardts():

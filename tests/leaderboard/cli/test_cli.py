@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 
 from simnav import estimator
 from simnav.leaderboard import cli
-from simnav.leaderboard.interface import scenarios_of
 
 SCENARIO = """
 name = "pond"
@@ -363,14 +362,6 @@ def test_campaign_reports_failures_and_succeeds(here):
     found = document("campaign", "-s", "pond.toml", "-e", "gnss-only,mine.py:choice=raise", "--workers", "1", "-n", "2")
     assert found["failed"] == {"error": 2}
     assert Path(found["results"]) == here / "results"
-
-
-def test_quick_leaves_out_what_is_long():
-    every = {s.name for s in scenarios_of(None, note=str)}
-    quick = {s.name for s in scenarios_of(None, quick=True, note=str)}
-    assert quick < every
-    assert len(quick) >= 6
-    assert scenarios_of(["coastal-voyage"], quick=True)  # what is asked for is run
 
 
 # -- the console ---------------------------------------------------------------------------------------------

@@ -165,6 +165,8 @@ def test_a_shipped_file_is_of_training_families_and_the_row_has_what_was_chosen(
     best = min(e[-1] for e in document["evaluations"])
     assert document["after"]["objective"] == pytest.approx(best, abs=1e-9)
     assert document["after"]["objective"] <= document["before"]["objective"]
+    # What does not hold on unseen voyages is not adopted.
+    assert document["unseen_after"]["objective"] <= document["unseen_before"]["objective"]
 
 
 def test_some_rows_are_tuned():

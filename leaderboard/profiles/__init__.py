@@ -1,0 +1,131 @@
+"""Profiles: small files that say which rows run on which scenarios, with how many seeds.
+
+``simnav campaign --profile quick`` runs ``quick.toml`` of this folder; a path names a profile of one's own. A profile
+has a title and one or more parts::
+
+    title = "quick: about five minutes"
+
+    [[part]]
+    scenarios = ["open-sea"]          # or tracks = ["aided-ins"]
+    estimators = ["ekf", "sw-fgo"]    # left out: all that are not slow
+    runs = 10                         # seeds a scenario, from 0 on
+
+A part that names tracks may bound the length of its scenarios by ``shortest_s`` (exclusive) and ``longest_s``.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from simnav.catalogue import headers
+from simnav.estimator import describe, names
+from simnav.leaderboard.results.errors import RequestError
+from simnav.spec import closest
+
+__all__ = ["Part", "Profile", "load", "profiles"]
+
+_FOLDER = Path(__file__).parent
+_KEYS = ("scenarios", "tracks", "estimators", "runs", "shortest_s", "longest_s")
+
+
+@dataclass(frozen=True)
+class Part:
+    """Scenarios that are run with the same rows and seeds.
+
+    Attributes
+    ----------
+    scenarios, estimators : tuple of str
+        Names.
+    runs : int
+        Seeds a scenario.
+    """
+
+    scenarios: tuple[str, ...]
+    estimators: tuple[str, ...]
+    runs: int
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What a campaign runs.
+
+    Attributes
+    ----------
+    name, title : str
+    parts : tuple of Part
+        In the order in which they are run.
+    """
+
+    name: str
+    title: str
+    parts: tuple[Part, ...]
+
+    @property
+    def results(self) -> int:
+        """How many results it makes."""
+        return sum(len(p.scenarios) * len(p.estimators) * p.runs for p in self.parts)
+
+
+def profiles() -> list[str]:
+    """The names of the profiles that come with simnav."""
+    return sorted(p.stem for p in _FOLDER.glob("*.toml"))
+
+
+def load(profile: str | os.PathLike[str]) -> Profile:
+    """A profile by its name, or by the path of its file.
+
+    Raises
+    ------
+    RequestError
+        If there is none, or the file does not say what it should.
+
+    Examples
+    --------
+    >>> load("smoke").parts[0].runs
+    2
+    """
+    path = Path(profile)
+    if path.suffix != ".toml":
+        path = _FOLDER / f"{profile}.toml"
+        if not path.is_file():
+            raise RequestError(f"there is no profile {str(profile)!r}{closest(str(profile), profiles())}")
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RequestError(f"{path}: {error}") from None
+    parts = table.get("part")
+    if not isinstance(parts, list) or not parts or not all(isinstance(p, dict) for p in parts):
+        raise RequestError(f"{path}: a profile has one or more tables [[part]]")
+    found = tuple(_part(f"{path}: part {k + 1}", part) for k, part in enumerate(parts))
+    return Profile(path.stem, str(table.get("title", path.stem)), found)
+
+
+def _part(where: str, table: dict[str, Any]) -> Part:
+    for key in table:
+        if key not in _KEYS:
+            raise RequestError(f"{where}: {key!r} is no key of a part{closest(key, list(_KEYS))}")
+    runs = table.get("runs")
+    if not isinstance(runs, int) or isinstance(runs, bool) or runs < 1:
+        raise RequestError(f"{where}: runs = {runs!r} should be a number of seeds, 1 or more")
+    if ("scenarios" in table) == ("tracks" in table):
+        raise RequestError(f"{where}: it should name scenarios or tracks")
+    if "scenarios" in table:
+        scenarios = _texts(where, table, "scenarios")
+    else:
+        tracks = _texts(where, table, "tracks")
+        low, high = float(table.get("shortest_s", 0.0)), float(table.get("longest_s", math.inf))
+        scenarios = tuple(h.name for h in headers() if h.track in tracks and low < h.duration <= high)
+    everyone = tuple(n for n in names() if not describe(n).slow)
+    return Part(scenarios, _texts(where, table, "estimators") if "estimators" in table else everyone, runs)
+
+
+def _texts(where: str, table: dict[str, Any], key: str) -> tuple[str, ...]:
+    value = table[key]
+    if not isinstance(value, list) or not value or not all(isinstance(v, str) for v in value):
+        raise RequestError(f"{where}: {key} = {value!r:.80} should be a list of names")
+    return tuple(value)

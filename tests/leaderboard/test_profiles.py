@@ -1,0 +1,72 @@
+"""Profiles: what they hold, what is wrong with one, and that a campaign runs one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import simnav
+from simnav.catalogue import headers
+from simnav.estimator import describe, names
+from simnav.leaderboard.profiles import Part, load, profiles
+from simnav.leaderboard.results.errors import RequestError
+
+
+def test_the_profiles_that_come_with_simnav():
+    assert profiles() == ["full", "quick", "smoke", "standard"]
+    known, rows = {h.name: h for h in headers()}, names()
+    for name in profiles():
+        profile = load(name)
+        assert profile.title.startswith(name)
+        for part in profile.parts:
+            assert set(part.scenarios) <= known.keys()
+            assert set(part.estimators) <= set(rows)
+            assert len(set(part.estimators)) == len(part.estimators)
+    sizes = {name: load(name).results for name in profiles()}
+    assert sizes["smoke"] < sizes["quick"] < sizes["standard"] < sizes["full"]
+
+
+def test_quick_has_few_rows_and_seeds_enough_to_decide():
+    profile = load("quick")
+    assert len({e for p in profile.parts for e in p.estimators}) <= 20
+    assert all(p.runs == 10 and len(p.estimators) > 5 for p in profile.parts)
+    assert not any(describe(e).slow for p in profile.parts for e in p.estimators)
+
+
+def test_standard_covers_the_tracks_and_runs_long_scenarios_less():
+    known = {h.name: h for h in headers()}
+    short, long = load("standard").parts
+    assert {known[s].track for s in short.scenarios} >= {"aided-ins", "no-imu", "underwater", "recorded"}
+    assert max(known[s].duration for s in short.scenarios) <= 3600.0 < min(known[s].duration for s in long.scenarios)
+    assert (short.runs, long.runs) == (30, 10)
+
+
+def test_a_profile_of_ones_own(tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text('[[part]]\nscenarios = ["open-sea"]\nestimators = ["ekf"]\nruns = 3\n')
+    assert load(file).parts == (Part(("open-sea",), ("ekf",), 3),)
+    for text, says in (
+        ("", r"tables \[\[part\]\]"),
+        ('[[part]]\nscenarios = ["a"]\nruns = 0', "runs = 0 should be a number of seeds"),
+        ("[[part]]\nruns = 1", "name scenarios or tracks"),
+        ('[[part]]\nscenario = ["a"]\nruns = 1', "'scenario' is no key of a part; did you mean 'scenarios'"),
+        ('[[part]]\nscenarios = "a"\nruns = 1', "should be a list of names"),
+        ("[[part]", "mine.toml"),
+    ):
+        file.write_text(text)
+        with pytest.raises(RequestError, match=says):
+            load(file)
+    with pytest.raises(RequestError, match="no profile 'quik'; did you mean 'quick'"):
+        load("quik")
+
+
+def test_a_campaign_runs_the_parts_of_a_profile(tmp_path: Path):
+    pond = (Path(__file__).parents[1] / "cases" / "pond.toml").as_posix()
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        f'[[part]]\nscenarios = ["{pond}"]\nestimators = ["gnss-only"]\nruns = 2\n'
+        f'[[part]]\nscenarios = ["{pond}"]\nestimators = ["gnss-only"]\nruns = 3\n'
+    )
+    report = simnav.campaign(profile=file, output=tmp_path / "out", workers=1)
+    assert (len(report.results), report.summary.computed, report.summary.total) == (3, 3, 5)
