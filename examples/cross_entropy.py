@@ -21,6 +21,7 @@ from simnav.estimators.learning.features import observation_names
 from simnav.estimators.learning.policy import Policy
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
+FAMILY = "training-gnss-faults"
 SEEN = ("gnss.mean_innovation", "gnss.size_of_mean", "gnss.setting", "gnss.innovation[0]", "sigma_position")
 
 
@@ -43,13 +44,23 @@ def returns_of(envs, weights, seed, repeats):
     return total / repeats
 
 
-def train(scenario="training-gnss-faults", *, generations=25, population=64, repeats=3, voyages=64, steps=None, seed=0):
-    """The policy, and the mean return of the whole population in each generation."""
-    envs = FilterTaskVectorEnv(scenario, "Tuning", population, instruments="fixes", voyages=voyages, steps=steps)
+def policy_of(mean, layout, told):
+    """A linear policy as plain arrays."""
+    weight = np.zeros((len(mean), layout.size))
+    weight[:, columns_of(layout)] = mean[:, :-1]
+    fits = {"kinds": layout.kinds, "most": layout.most, "instruments": "fixes"}
+    return Policy([(weight, mean[:, -1])], task="Tuning", trained_on=told, **fits)
+
+
+def train(*, generations=25, population=64, repeats=3, voyages=64, length=None, seed=0, after=None):
+    """The policy, and the return of the mean policy in each generation; ``after`` is told of every fifth."""
+    envs = FilterTaskVectorEnv(FAMILY, "Tuning", population, instruments="fixes", voyages=voyages, steps=length)
+    layout, steps = envs.options.layout, length or envs.options.scenario.epochs
     shape = envs.single_action_space.shape[0], len(SEEN) + 1
     rng = np.random.default_rng(seed)
-    mean, deviation = np.zeros(shape), np.full(shape, 0.3)
-    curve = []
+    mean, deviation, curve = np.zeros(shape), np.full(shape, 0.3), []
+    told = {"scenario": FAMILY, "voyages": voyages, "first_seed": FIRST_TRAINING_SEED, "seed": seed}
+    told |= {"algorithm": "cross-entropy method, linear policy", "steps": 0}
     for generation in range(generations):
         weights = mean + deviation * rng.standard_normal((population, *shape))
         weights[0] = mean
@@ -58,19 +69,10 @@ def train(scenario="training-gnss-faults", *, generations=25, population=64, rep
         mean = best.mean(axis=0)
         deviation = best.std(axis=0) + 0.1 * 0.95**generation  # not to settle too early
         curve.append(float(returns[0]))
-    layout = envs.options.layout
-    weight = np.zeros((shape[0], layout.size))
-    weight[:, columns_of(layout)] = mean[:, :-1]
-    told = {
-        "scenario": str(scenario), "voyages": voyages, "first_seed": FIRST_TRAINING_SEED, "seed": seed,
-        "steps": generations * population * repeats * (steps or envs.options.scenario.epochs),
-        "algorithm": "cross-entropy method, linear policy",
-    }  # fmt: skip
-    policy = Policy(
-        [(weight, mean[:, -1])], task="Tuning", kinds=layout.kinds, most=layout.most, instruments="fixes",
-        trained_on=told,
-    )  # fmt: skip
-    return policy, curve
+        told["steps"] += population * repeats * steps
+        if after and (generation + 1) % 5 == 0:
+            after(told["steps"], policy_of(mean, layout, told))
+    return policy_of(mean, layout, told), curve
 
 
 if __name__ == "__main__":

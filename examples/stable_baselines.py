@@ -74,7 +74,7 @@ def policy_of(model: PPO, envs: FilterTaskVectorEnv, trained_on: dict) -> Policy
     )
 
 
-def train(*, steps=1_500_000, num_envs=64, voyages=256, seed=0, length=None, after=None):
+def train(*, steps=600_000, num_envs=64, voyages=128, seed=0, length=None, after=None):
     """PPO on the tuning task.
 
     Parameters
@@ -94,14 +94,14 @@ def train(*, steps=1_500_000, num_envs=64, voyages=256, seed=0, length=None, aft
     venv = BankOfFilters(envs)
     venv.seed(seed)
     model = PPO(
-        "MlpPolicy", venv, n_steps=64, batch_size=1024, n_epochs=4, learning_rate=1e-3, gamma=0.95, gae_lambda=0.9,
-        seed=seed, device="cpu", policy_kwargs={"net_arch": [32, 32], "log_std_init": -1.0},
+        "MlpPolicy", venv, n_steps=64, batch_size=16 * num_envs, n_epochs=4, learning_rate=1e-3, gamma=0.95,
+        gae_lambda=0.9, seed=seed, device="cpu", policy_kwargs={"net_arch": [32, 32], "log_std_init": -1.0},
     )  # fmt: skip
     told = {
         "scenario": FAMILY, "voyages": voyages, "first_seed": FIRST_TRAINING_SEED, "steps": steps, "seed": seed,
         "algorithm": "PPO of Stable-Baselines3, two layers of 32",
     }  # fmt: skip
-    done, parts = 0, 10 if after else 1
+    done, parts = 0, 5 if after else 1
     for part in range(parts):
         model.learn(steps // parts, reset_num_timesteps=part == 0)
         done += steps // parts
@@ -112,9 +112,9 @@ def train(*, steps=1_500_000, num_envs=64, voyages=256, seed=0, length=None, aft
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=1_500_000)
+    parser.add_argument("--steps", type=int, default=600_000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--voyages", type=int, default=256)
+    parser.add_argument("--voyages", type=int, default=128)
     parser.add_argument("--output", default="policy.npz")
     arguments = parser.parse_args()
     begun = time.perf_counter()

@@ -164,7 +164,7 @@ def _header(path: Path) -> Header | None:
         group=str(table.get("group", "other")),
         training=table.get("training") is True,
         path=path,
-        recorded="log" in table,
+        recorded=re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
     )
 
 

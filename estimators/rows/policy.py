@@ -12,11 +12,11 @@ __all__ = ["PolicyEkf"]
 class PolicyEkf(PolicyEstimator):
     """EKF whose GNSS noise and process noise a trained policy sets, from the innovations.
 
-    The policy that comes with it was trained by PPO on ``training-gnss-faults``, a family of voyages with an IMU and a
-    GNSS receiver, noise steps and multipath, whose seeds are never scored; on other voyages it does what it can. It
-    asks for one instrument that gives positions, a GNSS receiver with one fix a step. ``file`` names another policy
-    (docs/how-to/learn-to-navigate.md). Source: ours; PPO is of J. Schulman et al., *Proximal policy
-    optimization algorithms*, 2017.
+    The policy that comes with it was trained by the cross-entropy method on ``training-gnss-faults``, a family of
+    voyages with an IMU and a GNSS receiver, noise steps and multipath, whose runs are never scored; on other voyages it
+    does what it can. It is asked about the first receiver. ``file`` names another policy
+    (docs/how-to/learn-to-navigate.md). Source: ours; R. Y. Rubinstein, *The cross-entropy method for combinatorial and
+    continuous optimization*, Methodology and Computing in Applied Probability 1, 1999.
 
     Parameters
     ----------

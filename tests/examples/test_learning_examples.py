@@ -1,0 +1,85 @@
+"""The examples learn: a few steps of each, and what they learn beats the plain filter where it was told the truth."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simnav.environment.seeds import FIRST_TRAINING_SEED
+from simnav.estimators.learning.policy import Policy
+from simnav.estimators.learning.policy_estimator import PolicyEstimator
+from simnav.scenario import load
+from simnav.source import record
+from simnav.trial import run_trial
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture
+def example(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+
+    def get(name):
+        spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, name, module)
+        spec.loader.exec_module(module)
+        return module
+
+    return get
+
+
+def runs_as_an_estimator(policy, path):
+    policy.save(path)
+    recording = record(load("gnss-noise-step").model_copy(update={"duration": 20.0, "faults": ()}), 1)
+    trial = run_trial(PolicyEstimator(str(path)), recording)
+    assert trial.status == "ok", trial.reason
+    return Policy.load(path)
+
+
+def test_the_cross_entropy_method_learns(example, tmp_path):
+    module = example("cross_entropy")
+    policy, curve = module.train(generations=6, population=32, repeats=1, voyages=1, length=150, seed=1)
+    assert max(curve[3:]) > curve[0] + 5.0  # one and the same voyage: its return only needs to rise
+    again = runs_as_an_estimator(policy, tmp_path / "policy.npz")
+    assert again.trained_on["first_seed"] == FIRST_TRAINING_SEED
+    assert again.trained_on["steps"] == 6 * 32 * 150
+    assert len([line for line in (EXAMPLES / "cross_entropy.py").read_text().splitlines() if line.strip()]) < 100
+
+
+def test_learning_curves_over_training_seeds(example, tmp_path):
+    curve, agent = example("learning_curve"), example("cross_entropy")
+    options = {"generations": 5, "population": 8, "repeats": 1, "voyages": 1, "length": 20}
+    steps, found = curve.curves(agent, range(2), [1, 2], **options)
+    assert steps.tolist() == [5 * 8 * 20]
+    assert found.shape == (2, 1)
+    curve.draw(np.array([1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 3.0]]), "two seeds", tmp_path / "curve.png")
+    assert (tmp_path / "curve.png").stat().st_size > 1000
+
+
+def test_stable_baselines(example, tmp_path):
+    pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
+    module = example("stable_baselines")
+    seen = []
+    policy = module.train(steps=1280, num_envs=4, voyages=2, length=20, after=lambda done, p: seen.append((done, p)))
+    assert [done for done, _ in seen] == [256, 512, 768, 1024, 1280]
+    first, last = (p(np.ones(24)) for p in (seen[0][1], seen[-1][1]))
+    assert np.abs(first - last).max() > 1e-4
+    again = runs_as_an_estimator(policy, tmp_path / "policy.npz")
+    np.testing.assert_array_equal(again(np.ones(24)), last)
+
+
+def test_a_policy_in_plain_arrays_is_the_network_of_the_library(example):
+    pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
+    module = example("stable_baselines")
+    envs = module.FilterTaskVectorEnv(
+        module.FAMILY, "Tuning", 2, instruments="fixes", steps=3, voyages=1, autoreset_mode="SAME_STEP"
+    )
+    model = module.PPO("MlpPolicy", module.BankOfFilters(envs), device="cpu", n_steps=8, batch_size=16)
+    policy = module.policy_of(model, envs, {})
+    observation = np.linspace(-2.0, 2.0, 24, dtype=np.float32)
+    np.testing.assert_allclose(policy(observation), model.predict(observation, deterministic=True)[0], atol=1e-5)
