@@ -189,7 +189,8 @@ def run_campaign(
         Which of how many parts of the runs to do, from 1. All parts together are the campaign; `simnav.merge` puts
         their folders together.
     confinement : {"auto", "bubblewrap", "process", "none"}
-        How estimators are kept apart from the recording, see docs/security.md; ``auto`` is the strongest that works.
+        How estimators are kept apart from the recording, see docs/explanation/security.md; ``auto`` is the strongest
+        that works.
     seal : Seal, optional
         Derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
 
