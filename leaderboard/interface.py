@@ -355,7 +355,8 @@ def campaign(
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.
     confinement : {"auto", "bubblewrap", "process", "none"}
-        How estimators are kept apart from the recording, see docs/security.md; default: the strongest that works here.
+        How estimators are kept apart from the recording, see docs/explanation/security.md; default: the strongest
+        that works here.
     sealed : path, optional
         File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
 
