@@ -28,20 +28,16 @@ from simnav.leaderboard.given import (
     scenario_of,
     scenarios_of,
 )
+from simnav.leaderboard.inspection import bound, cite, reproduce, rescore, verify
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Progress, Summary
-    from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.single_run import RunReport
-    from simnav.leaderboard.campaign.verification import Verification
-    from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.board import Ranking
-    from simnav.leaderboard.ranking.bounds import BoundReport
     from simnav.leaderboard.ranking.costs import CostReport
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
-    from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.sweep.report import Sweep
     from simnav.leaderboard.tuning.space import Range
@@ -359,7 +355,8 @@ def campaign(
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.
     confinement : {"auto", "bubblewrap", "process", "none"}
-        How estimators are kept apart from the recording, see docs/security.md; default: the strongest that works here.
+        How estimators are kept apart from the recording, see docs/explanation/security.md; default: the strongest
+        that works here.
     sealed : path, optional
         File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
 
@@ -387,46 +384,6 @@ def campaign(
                               covariance_interval=covariance_interval, confinement=confinement, seal=seal))  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks=tracks), combined(summaries))
-
-
-def verify(
-    results: str | os.PathLike[str],
-    *,
-    key: str | os.PathLike[str] | None = None,
-    sample: int = 10,
-    scenarios: Scenarios = None,
-    estimators: Estimators = None,
-    progress: Callable[..., None] | None = None,
-) -> Verification:
-    """Check the seal of results, and repeat a sample of them: they should be the same to the bit.
-
-    Parameters
-    ----------
-    results : path
-        Folder that a campaign wrote.
-    key : path, optional
-        Published key of a sealed campaign.
-    sample : int
-        Runs that are repeated at most.
-    scenarios, estimators : optional
-        That are not in the catalogue or not registered.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
-
-    Returns
-    -------
-    Verification
-    """
-    from simnav.leaderboard.campaign.seal import read_seal
-    from simnav.leaderboard.campaign.verification import verify_results
-    from simnav.leaderboard.results.store import StoreError
-
-    given = [] if scenarios is None else scenarios_of(scenarios)
-    with mistakes(StoreError):
-        return verify_results(
-            absolute(results), None if key is None else read_seal(key), sample=sample, scenarios=given,
-            estimators=requests(estimators) if estimators else [], progress=progress,
-        )  # fmt: skip
 
 
 def sweep(
@@ -513,161 +470,6 @@ def rank(
     wanted = RANKED_SCORES | ({score} if score else set())
     given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else results
     return rank(given, score=score, tracks=tracks)
-
-
-def rescore(
-    results: str | os.PathLike[str],
-    scores: str | Iterable[str] = (),
-    *,
-    scenarios: Scenarios = None,
-    progress: Callable[..., None] | None = None,
-) -> Rescored:
-    """Compute scores again from the trials that a campaign kept; no estimator runs.
-
-    Parameters
-    ----------
-    results : path
-        Folder that a campaign wrote with ``keep_trials``. Its results get the scores.
-    scores : str or iterable of str
-        Keys of `simnav.scoring.SCORES`; default: all, those of plug-ins too.
-    scenarios : scenarios, optional
-        That are not in the catalogue.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the last.
-
-    Returns
-    -------
-    Rescored
-    """
-    from simnav.leaderboard.campaign.rescoring import rescore_results
-    from simnav.leaderboard.results.store import StoreError
-
-    names = scores.split(",") if isinstance(scores, str) else scores
-    given = [] if scenarios is None else scenarios_of(scenarios)
-    with mistakes(StoreError):
-        return rescore_results(absolute(results), [n.strip() for n in names if n.strip()], given, progress)
-
-
-def cite(results: str | os.PathLike[str] | None = None) -> Citation:
-    """How to cite this version of simnav, or results.
-
-    Parameters
-    ----------
-    results : path, optional
-        Folder that a campaign wrote; default: simnav itself.
-
-    Returns
-    -------
-    Citation
-
-    Examples
-    --------
-    >>> print(cite().bibtex.splitlines()[0])
-    @software{simnav,
-    """
-    from simnav.leaderboard.results.citation import citation
-
-    return citation(None if results is None else [r.provenance for r in results_of(results)])
-
-
-def bound(
-    scenario: ScenarioLike,
-    *,
-    runs: int = 12,
-    smoothed: bool = False,
-    progress: Callable[..., None] | None = None,
-) -> BoundReport:
-    """The posterior Cramer-Rao bound of a simulated scenario: a lower limit of the error.
-
-    Parameters
-    ----------
-    scenario : str, Path or Scenario
-        Name, file or the scenario itself.
-    runs : int
-        Seeds over which it is averaged.
-    smoothed : bool
-        The bound of smoothed output; default: of output in real time.
-    progress : callable, optional
-        Called with how many of how many kinds are done, and ``note=`` the next.
-
-    Returns
-    -------
-    BoundReport
-    """
-    from simnav.leaderboard.ranking.bounds import bounds_of
-
-    return bounds_of(scenario_of(scenario), runs, smoothed, progress)
-
-
-def reproduce(
-    paper: str,
-    *,
-    runs: int | None = None,
-    methods: Sequence[str] = (),
-    until_decided: bool = False,
-    limit: int = 200,
-    minutes: float | None = None,
-    stored: bool = False,
-    output: str | os.PathLike[str] | None = None,
-    workers: int = 2,
-    progress: Callable[[str, Progress], None] | None = None,
-) -> Reproduction:
-    """Repeat the comparison of a paper: our figures beside the paper's, with a verdict on each row.
-
-    Parameters
-    ----------
-    paper : str
-        One of `simnav.leaderboard.papers.PAPERS`, such as ``guo-2026``, or an alias.
-    runs : int, optional
-        Number of runs of each scenario; default: a few, so that it takes minutes.
-    methods : sequence of str
-        Only the rows about these methods of the paper; default: all.
-    until_decided : bool
-        Run the methods of undecided rows again and again, until each row is decided (see
-        `simnav.leaderboard.papers.sequential`).
-    limit : int
-        With ``until_decided``: largest number of runs of a scenario.
-    minutes : float, optional
-        With ``until_decided``: time after which no further run is started.
-    stored : bool
-        Use the results that come with simnav, and run nothing.
-    output : path, optional
-        Folder; default: ``reproduced/PAPER``. Its folder ``results`` keeps the results: a later call continues there.
-    workers : int
-        Number of processes.
-    progress : callable, optional
-        Called with the name of the scenario and the campaign's progress.
-
-    Returns
-    -------
-    Reproduction
-
-    Raises
-    ------
-    RequestError
-        If there is no such paper or method, or options contradict each other; one sentence.
-    """
-    from simnav.leaderboard.papers import paper as papers
-    from simnav.leaderboard.papers import sequential
-    from simnav.leaderboard.papers import stored as shipped
-    from simnav.leaderboard.papers.reproduction import reproduce
-    from simnav.leaderboard.results.store import StoreError
-
-    if stored and (until_decided or runs is not None):
-        raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")
-    if until_decided and runs is not None:
-        raise RequestError("'until_decided' chooses the number of runs itself: give 'limit' in place of 'runs'")
-    with mistakes(ValueError):
-        chosen = papers.load(paper)
-        if methods:
-            chosen = chosen.only(methods)
-        if stored:
-            return shipped.load(chosen)
-    folder = absolute(output or Path("reproduced") / chosen.key) / "results"
-    with mistakes(StoreError):
-        if until_decided:
-            return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
-        return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
 
 
 def tune(

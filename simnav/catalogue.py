@@ -138,7 +138,7 @@ def _header(path: Path) -> Header | None:
     try:
         text = path.read_text(encoding="utf-8")
         table = _head(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         _warn(f"{path}: left out, not valid TOML: {error}")
         return None
     name, version, duration = table.get("name"), table.get("version"), table.get("duration_s")
@@ -174,18 +174,17 @@ def _head(text: str) -> dict[str, Any]:
     end = next((i for i, line in enumerate(lines) if line.startswith("[")), len(lines))
     try:
         return tomllib.loads("".join(lines[:end]))
-    except tomllib.TOMLDecodeError:  # a line of a text may begin like a table
+    except (ValueError, RecursionError):  # a line of a text may begin like a table
         return tomllib.loads(text)
 
 
 def _middle(text: str, source: str) -> float | None:
     """The median duration of a scenario that draws it."""
     from simnav.draws import Template
-    from simnav.spec import SpecError
 
     try:
         duration = Template(tomllib.loads(text), source).middle().get("duration_s")
-    except (SpecError, tomllib.TOMLDecodeError):
+    except (ValueError, RecursionError):
         return None
     return float(duration) if isinstance(duration, (int, float)) else None
 

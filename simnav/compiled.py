@@ -13,11 +13,15 @@ import contextlib
 import functools
 import hashlib
 import os
+import pickle
+import shutil
+import struct
 import sys
 import tempfile
 import threading
 import time
 import types
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -32,6 +36,9 @@ Array = NDArray[np.float64]
 
 #: Cache directories that were not used for this long are deleted by `prune` [s].
 KEEP = 60 * 86400.0
+
+#: What loading a truncated or empty file of the cache raises.
+_DAMAGED = (EOFError, pickle.UnpicklingError, UnicodeDecodeError, IndexError, KeyError, struct.error)
 
 _kernels: list[Kernel] = []
 _compiling = threading.RLock()  # Numba takes the cache directory from a global setting
@@ -155,12 +162,29 @@ class Kernel:
                     try:
                         directory.mkdir(mode=0o700, exist_ok=True)
                         os.utime(directory)  # in use: see `prune`
-                        self._dispatcher = self._jit(str(directory))
+                        self._dispatcher = self._from_cache(str(directory))
                     except OSError:  # a full disk must not stop a run
                         self._dispatcher = None
                 if self._dispatcher is None:
                     self._dispatcher = self._jit(None)
             return self._dispatcher
+
+    def _from_cache(self, directory: str) -> Callable[..., Any]:
+        """Compile or load; where files of the cache are damaged, delete them, and compile."""
+        try:
+            return self._jit(directory)
+        except _DAMAGED as error:
+            root = Path(directory).parent
+            warnings.warn(
+                f"the compiled kernel {self.__name__} in {directory} is damaged ({type(error).__name__}); it is "
+                "compiled again",
+                stacklevel=2,
+            )
+            for part in self.tree():
+                part._dispatcher = None
+                shutil.rmtree(root / part.fingerprint(), ignore_errors=True)
+            Path(directory).mkdir(mode=0o700, exist_ok=True)
+            return self._jit(directory)
 
     def _jit(self, directory: str | None) -> Callable[..., Any]:
         import numba
@@ -295,8 +319,6 @@ def prune(older_than: float = KEEP) -> int:
     older_than : float
         Time since the last use from which on a kernel is deleted [s].
     """
-    import shutil
-
     root = cache_directory()
     count = 0
     for directory in [] if root is None else root.iterdir():

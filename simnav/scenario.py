@@ -41,6 +41,10 @@ _MOST_BITS = 32
 
 #: Longest run [s] and fastest instrument [Hz]: more than anyone needs, less than fills the memory by a slip.
 _LONGEST, _FASTEST = 1e7, 1e5
+#: What the lines look like that the parser of TOML cannot read.
+_LONG_NUMBER, _NESTED = r"[0-9_]{4000}", r"(?:[\[{][^\[{]{0,20}){40}"
+#: Highest speed of a vessel and of a current [m/s], and least magnitude of a number that is not 0.
+_HIGHEST_SPEED, _SMALLEST = 1e3, 1e-200
 
 #: What is added to the seed of a run of a training scenario. A campaign's seeds are below it, so that no run of the
 #: board shares a random stream with one that parameters were chosen on.
@@ -403,10 +407,32 @@ def _check_instruments(s: Scenario) -> None:
             raise ValueError(
                 f"instruments.{name}.kind = {spec.kind!r}: {name!r} is no name for it, it means something else"
             )
+        _check_no_subnormal(f"instruments.{name}", spec.model_dump())
         if spec.rate > _FASTEST:
             raise ValueError(f"instruments.{name}.rate_hz = {spec.rate:g}: should be at most {_FASTEST:g}")
         if isinstance(spec, ImuSpec) != (name == "imu"):
             raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
+
+
+def _check_no_subnormal(where: str, value: Any) -> None:
+    """Numbers next to zero that arithmetic cannot divide by."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_no_subnormal(f"{where}.{key}", inner)
+    elif isinstance(value, (list, tuple)):
+        for inner in value:
+            _check_no_subnormal(where, inner)
+    elif isinstance(value, float) and 0.0 < abs(value) < _SMALLEST:
+        raise ValueError(f"{where} = {value:g} (in SI units): should be 0, or at least {_SMALLEST:g}")
+
+
+def _check_speeds(s: Scenario) -> None:
+    """No vessel is faster than `_HIGHEST_SPEED`; beyond it the truth would not be finite."""
+    speeds = {f"manoeuvre {k} ({m.kind}).speed_m_s": getattr(m, "speed", 0.0) for k, m in enumerate(s.manoeuvres, 1)}
+    speeds |= {"start.speed_m_s": getattr(s.start, "speed", 0.0), "current.speed_m_s": getattr(s.current, "speed", 0.0)}
+    for key, speed in speeds.items():
+        if isinstance(speed, (int, float)) and abs(speed) > _HIGHEST_SPEED:
+            raise ValueError(f"{key} = {speed:g}: should be at most {_HIGHEST_SPEED:g}")
 
 
 def _check_world(s: Scenario) -> None:
@@ -417,6 +443,7 @@ def _check_world(s: Scenario) -> None:
         raise ValueError(
             f"step_s = {s.step:g} should be a multiple of the IMU's sample interval, 1 / {s.imu.rate:g} Hz"
         )
+    _check_speeds(s)
     vessel = s.vessel or Vessel()
     depth = -s.start.altitude
     if vessel.kind == "ship" and depth > 0.0:
@@ -486,9 +513,25 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> S
         table: dict[str, Any] = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SpecError(f"{source}: not valid TOML: {error}") from None
+    except ValueError:
+        raise SpecError(f"{source}: {_key_of(text, _LONG_NUMBER)}: a number has more digits than can be read") from None
+    except RecursionError:
+        raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
     if "plugins" in table:
         table["plugins"] = _load_plugins(table["plugins"], source, folder or Path.cwd())
-    return Scenario.from_toml(table, source=source)
+    try:
+        return Scenario.from_toml(table, source=source)
+    except RecursionError:
+        raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
+
+
+def _key_of(text: str, value: str) -> str:
+    """The key of the first line that holds a value of a certain form."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if re.search(value, line):
+            key = line.partition("=")[0].strip() if "=" in line else ""
+            return f"line {number}, {key[:60]}" if key else f"line {number}"
+    return "its values"
 
 
 def _load_plugins(names: Any, source: str, folder: Path) -> list[str]:

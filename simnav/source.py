@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, Protocol
 
 from simnav.recording import Block, FaultLabel, Recording
@@ -82,11 +83,17 @@ def record(scenario: Scenario, seed: int) -> Recording:
     seed : int
         Seed of the run, non-negative.
 
+    Raises
+    ------
+    SpecError
+        If the recording would not fit into the memory that is free: nothing is allocated then.
+
     Returns
     -------
     Recording
         Without the truth it would be what an estimator sees.
     """
+    check_cost(scenario)
     source = open_source(scenario, seed)
     return Recording(
         scenario.id,
@@ -101,3 +108,40 @@ def record(scenario: Scenario, seed: int) -> Recording:
         source.scenario.actual_sheet(),
         source.scenario.initial_error.actual_covariance(),
     )
+
+
+def check_cost(scenario: Scenario) -> None:
+    """Estimate the memory of a simulated recording before anything is allocated.
+
+    Raises
+    ------
+    SpecError
+        If it is more than is free; the message names the scenario, and the key that costs most.
+    """
+    from simnav.spec import SpecError
+
+    if scenario.log is not None:
+        return
+    costs = {"step_s": _EPOCH * scenario.epochs}
+    for name, spec in scenario.instruments.items():
+        costs[f"instruments.{name}.rate_hz = {spec.rate:g}"] = _SAMPLE * spec.rate * scenario.duration
+    needed, free = sum(costs.values()), _free_memory()
+    if needed > free:
+        key = max(costs, key=lambda k: costs[k])
+        raise SpecError(
+            f"{scenario.id}: a recording of duration_s = {scenario.duration:g} with {key} takes about "
+            f"{needed / 2**30:.3g} GiB of memory, and {free / 2**30:.3g} GiB are free"
+        )
+
+
+#: Memory of an epoch of the truth, and of a sample of an instrument while it is made [bytes].
+_EPOCH, _SAMPLE = 300.0, 150.0
+
+
+def _free_memory() -> float:
+    """Memory that a process can have now [bytes]; 64 GiB where it is not known."""
+    with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/meminfo") as file:
+        for line in file:
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * int(line.split()[1])
+    return float(64 << 30)

@@ -184,7 +184,8 @@ def run_campaign(
     scheduler : str, optional
         Address of the Dask scheduler; default: a cluster on this machine.
     confinement : {"auto", "bubblewrap", "process", "none"}
-        How estimators are kept apart from the recording, see docs/security.md; ``auto`` is the strongest that works.
+        How estimators are kept apart from the recording, see docs/explanation/security.md; ``auto`` is the strongest
+        that works.
     seal : Seal, optional
         Derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
 

@@ -5,18 +5,28 @@ from __future__ import annotations
 import inspect
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from simnav.estimator import Estimator, make, register
+from simnav.estimator import Estimator, find, make, register
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["EstimatorLike", "EstimatorRequest", "enlist", "kebab", "request", "requests", "split_estimators"]
+__all__ = [
+    "EstimatorLike",
+    "EstimatorRequest",
+    "comes_with_simnav",
+    "enlist",
+    "kebab",
+    "request",
+    "requests",
+    "split_estimators",
+]
 
 
 @dataclass(frozen=True)
@@ -134,8 +144,8 @@ def requests(
             mine = common if len(items) == 1 or not common else _known(item, common)
             unused -= set(mine)
             found = request(item, mine)
-            if ".py" not in found.name:
-                found.make()  # so that a mistake shows now, not in a worker
+            if ".py" not in found.name and comes_with_simnav(found.cls or find(found.name)):
+                found.make()  # so that a mistake shows now; the code of others runs in a process of its own
         made.setdefault(found.label, found)
     if unused:
         raise RequestError(f"{min(unused)}: none of the estimators has this parameter; 'simnav list estimators' shows "
@@ -173,6 +183,12 @@ def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]
 
     known = {p.name for p in describe(request(item).name).parameters}
     return {k: v for k, v in parameters.items() if k in known}
+
+
+def comes_with_simnav(cls: type) -> bool:
+    """Whether a class is one of simnav's own estimators."""
+    module = sys.modules.get(cls.__module__)
+    return cls.__module__.startswith("simnav.estimators.") and getattr(module, cls.__qualname__, None) is cls
 
 
 def enlist(cls: type[Estimator]) -> str:
@@ -213,6 +229,8 @@ def split_estimators(given: Iterable[str] | None) -> list[tuple[str, dict[str, s
     """
     found: list[tuple[str, dict[str, str]]] = []
     for text in given or ():
+        if not text.strip(" ,"):
+            raise RequestError(f"{text!r} names no estimator; leave the option out for all of them")
         open_for_more = False  # the item before has parameters, so that "key=value" is one more of them
         for part in filter(None, (p.strip() for p in text.split(","))):
             whole = re.fullmatch(r"(?P<name>.+?):(?P<key>\w+)=(?P<value>.*)", part)

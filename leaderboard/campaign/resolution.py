@@ -6,7 +6,6 @@ import contextlib
 import importlib
 import os
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, variant
 from simnav.leaderboard.campaign.isolation import isolate
-from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav
 from simnav.leaderboard.campaign.session_class import carry, is_session
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -41,7 +40,7 @@ def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bo
         with mistakes(EstimatorError):
             cls = request.cls or find(name)
         entrant = Entrant(name, parameters, request.label, False, "", point=point_of(cls.name))
-        if _is_ours(cls):
+        if comes_with_simnav(cls):
             with mistakes(EstimatorError):
                 request.make()
             return replace(entrant, reference=is_own_reference(cls.name), source=estimator_source(cls))
@@ -67,12 +66,6 @@ def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bo
             "told the truth"
         )
     return replace(entrant, source=source or found["source"])
-
-
-def _is_ours(cls: type) -> bool:
-    """Whether a class comes with simnav."""
-    module = sys.modules.get(cls.__module__)
-    return cls.__module__.startswith("simnav.estimators.") and getattr(module, cls.__qualname__, None) is cls
 
 
 def _absolute(value: Any) -> Any:

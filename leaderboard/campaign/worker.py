@@ -21,6 +21,7 @@ from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.results import store, trials
+from simnav.leaderboard.results.errors import sentence
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 
@@ -157,7 +158,7 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
         seed = unit.seed if unit.seal is None else unit.seal.seed(unit.scenario.id, unit.seed)
         recording = record(unit.scenario, seed)
     except Exception as error:
-        reason = f"no recording: {' '.join(str(error).split()) or type(error).__name__}"
+        reason = f"no recording: {sentence(error)}"
         for entrant, key in unit.entrants:
             store.write(unit.folder, unit.result(entrant, key, "no-recording", reason))
             statuses["no-recording"] += 1

@@ -6,6 +6,7 @@ standard output, everything else to standard error; exit code 2 is a user's mist
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from pathlib import Path
@@ -35,6 +36,7 @@ from simnav.leaderboard.cli import (
     warmup,
 )
 from simnav.leaderboard.cli.console import USER, Output
+from simnav.leaderboard.results.errors import shortened
 
 __all__ = ["app", "main"]
 
@@ -113,15 +115,30 @@ def _leave_out_working_directory() -> None:
         sys.path[:] = [p for p in sys.path if p and not (os.path.isabs(p) and Path(p) == here and p != str(home))]
 
 
+def _open_streams() -> None:
+    """A stream that was closed before the start (``simnav list >&-``) takes what is printed, and keeps nothing.
+
+    A terminal that knows fewer characters than are printed shows question marks for the others.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
+            setattr(sys, f"__{name}__", getattr(sys, name))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
 def main() -> None:
     """Entry point of the console script."""
+    _open_streams()
     _leave_out_working_directory()
     try:
         code = app(standalone_mode=False, prog_name="simnav")
     except Exception as error:  # of the parser: an unknown command or option, a value of the wrong type
         if not hasattr(error, "format_message"):
             raise
-        text = " ".join(error.format_message().split())
+        text = shortened(" ".join(error.format_message().split()))
         Output().note(f"simnav: {text}" if text else "simnav: see simnav --help")
         sys.exit(USER)
     except KeyboardInterrupt:

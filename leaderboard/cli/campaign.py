@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -76,5 +77,5 @@ def command(
         out.print(*ranking_tables(report.ranking), *failure_table(report.results))
         out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
                   f"{tables.duration(summary.seconds)})",
-                  f"next:    simnav leaderboard {summary.folder}")  # fmt: skip
+                  f"next:    simnav leaderboard {quote(str(summary.folder))}")  # fmt: skip
         out.code = 0 if any(r.status == "ok" for r in report.results) else FAILED

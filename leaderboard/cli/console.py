@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.leaderboard.results.errors import RequestError, sentence, shortened
 from simnav.leaderboard.results.plain import plain
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     previous = warnings.showwarning
 
     def warn(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
-        out.note(f"simnav: warning: {' '.join(str(message).split())}")
+        out.note(f"simnav: warning: {shortened(' '.join(str(message).split()))}")
 
     try:
         if not debug:

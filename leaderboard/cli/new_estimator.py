@@ -5,6 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -28,7 +29,7 @@ def command(
     with session(json, debug) as out:
         kebab, path = write_estimator(name, output)
         out.document({"name": kebab, "file": str(path)})
-        out.print(f"written: {path}", f"next:    simnav check {path.name}")
+        out.print(f"written: {path}", f"next:    simnav check {quote(path.name)}")
 
 
 def write_estimator(name: str, output: Path | None = None) -> tuple[str, Path]:

@@ -37,7 +37,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, for
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, versioned id, or path of a TOML file.")]
 Scenarios = Annotated[
-    list[str] | None, typer.Option("--scenario", "-s", help="Names or TOML files, separated by commas. [all]")
+    list[str] | None, typer.Option("--scenario", "-s", help="Names, tracks or TOML files, separated by commas. [all]")
 ]
 Estimators = Annotated[
     list[str] | None,

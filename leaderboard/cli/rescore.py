@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -34,5 +35,5 @@ def command(
         without = f", {done.without_trial} have no trial" if done.without_trial else ""
         out.print(
             f"results: {done.folder} ({done.rescored} have {len(done.scores)} scores now{without})",
-            f"next:    simnav leaderboard {done.folder}",
+            f"next:    simnav leaderboard {quote(str(done.folder))}",
         )

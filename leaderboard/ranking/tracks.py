@@ -21,6 +21,7 @@ _TITLES = {
     "underwater": "Under water",
     "post-processing": "Post-processing",
     "generalisation": "Generalisation",
+    "generalisation-no-imu": "Generalisation without an IMU",
     "recorded": "Recorded voyages",
     "papers": "Scenarios of papers",
     "other": "Other scenarios",

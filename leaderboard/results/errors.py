@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-__all__ = ["RequestError", "mistakes", "sentence"]
+__all__ = ["RequestError", "mistakes", "sentence", "shortened"]
+
+_MOST = 1000  # characters of a message
 
 
 class RequestError(ValueError):
@@ -34,4 +36,13 @@ def sentence(error: BaseException) -> str:
         text = f"{error.filename}, line {error.lineno}: {error.msg}"
     else:
         text = str(error)
-    return " ".join(text.split()) or type(error).__name__
+    return shortened(" ".join(text.split())) or type(error).__name__
+
+
+def shortened(text: str) -> str:
+    """A message that repeats a long input: its begin and its end.
+
+    >>> shortened("a" * 10_000).count("a")
+    900
+    """
+    return text if len(text) <= _MOST else f"{text[:700]} ... {text[-200:]}"

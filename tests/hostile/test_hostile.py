@@ -9,6 +9,7 @@ import pytest
 
 from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.warmup import warmup
+from tests.fuzz import fuzz_logs, fuzz_tomls
 from tests.hostile.attacks import CHEATS, cheats, vandals
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="estimators are confined on POSIX systems only")
@@ -37,3 +38,10 @@ def test_no_vandal_touches_another_row(tmp_path: Path, confinement: str) -> None
     assert harm.touched == []
     assert harm.unnamed == []
     assert harm.tried >= 13
+
+
+def test_no_broken_file_gives_a_traceback() -> None:
+    """A sample; ``python -m tests.fuzz`` does thousands."""
+    found = fuzz_tomls(60, seed=1) + fuzz_logs(60, seed=1)
+    assert set(found) <= {"read", "refused"}
+    assert found["refused"] > 10

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from simnav.catalogue import Header, headers
+from simnav.estimator import make
 from simnav.scenario import Scenario, load
 from simnav.source import record
+from simnav.types import InitialState
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
 CATALOGUE = [h for h in headers() if h.path.is_relative_to(FOLDER)]
@@ -56,7 +58,8 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
     assert scenario.recorded or re.search(r"^ours\b|\b20\d\d\b", scenario.source)
     assert scenario.source
     assert scenario.tags
-    assert scenario.track in ("aided-ins", "no-imu", "underwater", "generalisation", "training", "recorded", "papers")
+    tracks = {"aided-ins", "no-imu", "underwater", "generalisation", "generalisation-no-imu", "recorded", "papers"}
+    assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")
     assert scenario.group != "other"
 
@@ -221,3 +224,16 @@ def test_the_catalogue_is_packaged():
         project = tomllib.load(file)
     assert project["tool"]["setuptools"]["package-data"]["simnav.scenarios"] == ["*.toml", "families/*.toml"]
     assert project["project"]["entry-points"]["simnav.scenarios"] == {"simnav": "simnav.scenarios"}
+
+
+@pytest.mark.parametrize("track", ["aided-ins", "no-imu", "underwater", "generalisation", "generalisation-no-imu"])
+def test_a_track_has_an_estimator_that_suits_all_of_it(track: str):
+    """The ranking takes full coverage only."""
+    row = "ship-ekf" if "no-imu" in track else "ekf"
+    for header in SIMULATED:
+        if header.track == track:
+            scenario = load(header.id)
+            for seed in range(3):
+                run = scenario.drawn(seed)
+                start = InitialState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), run.initial_error.covariance())
+                make(row).reset(start, run.instruments_sheet())

@@ -42,6 +42,8 @@ __all__ = [
     "size_range",
 ]
 
+#: Least mean length of random intervals: shorter ones touch no measurement, and cost memory [s].
+_LEAST_MEAN = 1e-3
 #: Times are multiples of the sample interval up to rounding: half a microsecond decides [s].
 TOLERANCE = 0.5e-6
 
@@ -179,6 +181,8 @@ class FaultSpec(Spec):
             raise ValueError(f"the fault ends ({self.end} s) before it starts ({self.start} s)")
         if self.intervals and not {"start", "end", "mean_active", "mean_gap"}.isdisjoint(self.model_fields_set):
             raise ValueError("intervals_s and start_s, end_s, mean_active_s, mean_gap_s exclude each other")
+        if self.mean_active is not None and self.mean_active < _LEAST_MEAN:
+            raise ValueError(f"mean_active_s = {self.mean_active:g}: should be at least {_LEAST_MEAN:g}")
         if (self.mean_active is None) != (self.mean_gap is None):
             raise ValueError("mean_active_s and mean_gap_s belong together")
         edges = [t for interval in self.intervals for t in interval]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import random
@@ -233,6 +234,36 @@ def test_killed_at_any_moment_it_ends_with_the_same_table(tmp_path: Path) -> Non
     assert len(rows(undisturbed)) == 24
     assert rows(disturbed) == rows(undisturbed)
     assert not list((disturbed / "results").glob("*.parquet"))
+
+
+def _descendants(process: int) -> set[int]:
+    parents = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+    found, more = set[int](), {process}
+    while more:
+        more = {child for child, parent in parents.items() if parent in more}
+        found |= more
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are listed in /proc")
+def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path) -> None:
+    estimator(tmp_path)
+    estimator(tmp_path, "raises", "import time; time.sleep(1.0)")
+    process = start(tmp_path, tmp_path / "out", 12)
+    wait_until(lambda: results_in(tmp_path / "out") >= 1, process)
+    time.sleep(0.5)
+    left = _descendants(process.pid)
+    assert len(left) >= 4  # two workers, their servers, the estimators
+    process.kill()
+    process.wait()
+    deadline = time.monotonic() + 10.0
+    while left and time.monotonic() < deadline:
+        time.sleep(0.2)
+        left = {child for child in left if Path(f"/proc/{child}").exists()}
+    assert not left
 
 
 def test_an_interrupt_of_the_user_ends_it_at_once_and_keeps_all(tmp_path: Path) -> None:
