@@ -13,9 +13,8 @@ from simnav.leaderboard.cli.options import Debug, Estimators, Json, ScenarioName
 from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from simnav.leaderboard.campaign.single_run import RunReport
+    from simnav.leaderboard.ranking.tables import Fitted
 
 __all__ = ["command"]
 
@@ -82,7 +81,7 @@ def command(
             out.code = USER
 
 
-def _table(report: RunReport) -> Table:
+def _table(report: RunReport) -> Fitted:
     """Scores of the estimators, the best horizontal RMSE first."""
     from simnav.leaderboard.ranking import tables
 
@@ -104,10 +103,20 @@ def _table(report: RunReport) -> Table:
     recording = report.recording
     note = f"; {recording.note}" if recording.note else ""
     reference = [i for i, e in enumerate(ordered) if e.reference]
-    return tables.table(
+    return tables.Fitted(
         f"{recording.scenario}, seed {recording.seed}, {tables.duration(recording.duration)}{note}",
         columns,
         cells,
+        [
+            "estimator",
+            "horizontal RMSE [m]",
+            "status",
+            "R95 [m]",
+            "NEES/dof",
+            "max [m]",
+            "heading RMSE [deg]",
+            "per epoch",
+        ],
         numeric=columns[2:],
         dim=reference,
         caption="* reference: it is told the truth" if reference else None,

@@ -11,6 +11,7 @@ import pytest
 
 from simnav.estimator import Estimator, find, make, names
 from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.composition import Row
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.base import Factors, Weighting
@@ -20,7 +21,8 @@ from simnav.source import record
 from simnav.trial import Trial, run_trial
 from simnav.types import Estimate, Measurements
 
-ROWS = [n for n in names() if issubclass(find(n).recipe["solver"].make, WindowEstimator)]
+RECIPES = {n: find(n).recipe for n in names() if issubclass(find(n), Row)}
+ROWS = [n for n, recipe in RECIPES.items() if issubclass(recipe["solver"].make, WindowEstimator)]
 #: Few nodes, so that these tests take seconds.
 FAST = [n for n in ROWS if n not in ("fgo-unsimplified",) and "ship" not in n and "anfis" not in n]
 

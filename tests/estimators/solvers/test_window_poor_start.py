@@ -14,6 +14,7 @@ import pytest
 
 import simnav
 from simnav.estimator import find, make, names
+from simnav.estimators.composition import Row
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.window import WindowEstimator
@@ -29,6 +30,8 @@ def inertial_windows(slow: bool) -> list[str]:
     """All windows over the inertial model of 15 states that are registered."""
     found = []
     for name in names():
+        if not issubclass(find(name), Row):
+            continue
         recipe = find(name).recipe
         window = issubclass(recipe["solver"].make, WindowEstimator) and find(name).slow is slow
         if window and recipe["model"].make in (InertialModel, Suitable):

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from simnav.leaderboard import cli
 from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.scoring import SCORES, protection_levels, score, stanford
 from simnav.scoring.integrity import ALERT_LIMITS, KINDS_OF_EPOCHS, RISK, Stanford
@@ -107,3 +109,27 @@ def test_a_diagram_of_several_runs_counts_all_epochs_and_is_drawn(recording, mak
     with pytest.raises(ValueError, match="at least one"):
         stanford_diagrams({})
     assert stanford([], 25.0).shares["normal"] != stanford([], 25.0).shares["normal"]  # NaN
+
+
+def test_the_command_draws_diagrams_of_those_that_have_a_level(tmp_path):
+    path = tmp_path / "integrity.png"
+    words = [
+        "run",
+        "ship-straight",
+        "-e",
+        "ship-ekf,gnss-only",
+        "--stanford",
+        str(path),
+        "--alert-limit",
+        "10",
+        "--json",
+    ]
+    done = CliRunner().invoke(cli.app, words)
+    assert done.exit_code == 0, done.output
+    document = json.loads(done.stdout)
+    assert path.stat().st_size > 1000
+    assert document["stanford_plot"] == str(path)
+    assert set(document["stanford"]) == {"ship-ekf", "gnss-only"}
+    for diagram in document["stanford"].values():
+        assert diagram["limit"] == 10.0
+        assert sum(diagram["shares"].values()) == pytest.approx(1.0)
