@@ -221,7 +221,11 @@ def run_campaign(
         raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
     if not covariance_interval >= 0.0:
         raise RequestError(f"covariance_interval = {covariance_interval:g} s should not be negative")
-    for seed in (min(seeds), max(seeds)) if seeds else ():
+    if isinstance(seeds, range):  # its ends say it, without a look at each seed
+        ends = (seeds[0], seeds[-1]) if seeds else ()
+    else:
+        ends = (min(seeds), max(seeds)) if seeds else ()
+    for seed in ends:
         if not 0 <= seed < 2**63:
             raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
     _unique("scenario", [s.id for s in scenarios])

@@ -1,8 +1,9 @@
 """The tables of ``docs/papers``, written from the stored results.
 
-``python -m simnav.leaderboard.papers.documentation`` writes them. Each page has a marked block for each of these:
-``citation``, ``tables`` and ``contents``; the overview has ``overview``. The text between the marks is replaced, and
-everything else is written by hand.
+``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav
+reproduce PAPER --until-decided``, it stores the results of that folder first. Each page has a marked block for each of
+these: ``citation``, ``tables`` and ``contents``; the overview has ``overview``. The text between the marks is replaced,
+and everything else is written by hand.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from simnav.leaderboard.papers import paper as papers
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Paper
 from simnav.leaderboard.papers.report import sheets, verdicts
-from simnav.leaderboard.papers.stored import load, provenance
+from simnav.leaderboard.papers.reproduction import fill, find_method, load_results
+from simnav.leaderboard.papers.sequential import LIMIT
+from simnav.leaderboard.papers.stored import load, provenance, save
 from simnav.leaderboard.results.provenance import Provenance
 
 __all__ = ["FOLDER", "blocks", "overview", "replaced", "update"]
@@ -108,5 +111,23 @@ def _line(cells: Iterable[str]) -> str:
     return f"| {' | '.join(texts)} |"
 
 
+def _store(folder: Path) -> None:
+    """Store the results of all papers that a folder has."""
+    for key in PAPERS:
+        if not (folder / key / "results").is_dir():
+            continue
+        paper = papers.load(key)
+        stands_for = {m.name: find_method(m) for m in paper.methods}
+        results = load_results(paper, stands_for, folder / key / "results", range(LIMIT))
+        path = save(fill(paper, stands_for, results, range(max(r.seed for r in results) + 1)))
+        print(f"{path}: {len(results)} runs, {path.stat().st_size / 1000:.0f} kB")
+
+
 if __name__ == "__main__":
+    import sys
+
+    if len(sys.argv) > 2:
+        sys.exit("usage: python -m simnav.leaderboard.papers.documentation [FOLDER]")
+    for given in sys.argv[1:]:
+        _store(Path(given))
     update()

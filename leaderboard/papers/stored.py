@@ -4,8 +4,8 @@ A file holds one row for each run of an estimator on a scenario: status, peak me
 rows need, in single precision. Its metadata hold the estimators that stand for the paper's methods, and the
 provenance of the results.
 
-``python -m simnav.leaderboard.papers.stored FOLDER`` writes the files from ``FOLDER/PAPER/results``, where FOLDER is
-the output of ``simnav reproduce PAPER --until-decided``, and then the tables of ``docs/papers``.
+``python -m simnav.leaderboard.papers.documentation FOLDER`` writes the files from ``FOLDER/PAPER/results``, where
+FOLDER is the output of ``simnav reproduce PAPER --until-decided``, and then the tables of ``docs/papers``.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers.measures import scores_of
 from simnav.leaderboard.papers.paper import Gain, Paper
-from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method, load_results
+from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method
 from simnav.leaderboard.results.provenance import Provenance, distinct
 from simnav.leaderboard.results.result import Result
 
@@ -114,28 +113,3 @@ def _scores(paper: Paper) -> list[str]:
     names |= {row.than_score for row in paper.rows() if isinstance(row, Gain) and row.than_score}
     names |= {s for f in paper.figures if f.draw in ("bars", "gains") for s in f.series.values()}
     return sorted({score for name in names for score in scores_of(name)})
-
-
-def _main(folder: Path) -> None:
-    """Write the stored results of all papers that a folder has, and the tables of the documentation."""
-    from simnav.leaderboard.papers import documentation
-    from simnav.leaderboard.papers.paper import load as load_paper
-    from simnav.leaderboard.papers.sequential import LIMIT
-
-    for key in PAPERS:
-        if not (folder / key / "results").is_dir():
-            continue
-        paper = load_paper(key)
-        stands_for = {m.name: find_method(m) for m in paper.methods}
-        results = load_results(paper, stands_for, folder / key / "results", range(LIMIT))
-        path = save(fill(paper, stands_for, results, range(max(r.seed for r in results) + 1)))
-        print(f"{path}: {len(results)} runs, {path.stat().st_size / 1000:.0f} kB")
-    documentation.update()
-
-
-if __name__ == "__main__":
-    import sys
-
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m simnav.leaderboard.papers.stored FOLDER (the output of 'simnav reproduce')")
-    _main(Path(sys.argv[1]))

@@ -2,7 +2,7 @@
 
 ``Estimator.needs`` lists what must be there. Each entry is one name, or a tuple of names of which one is enough::
 
-    needs = ("imu", ("gnss_position", "terrain"))      # an IMU, and GNSS or terrain fixes
+    needs = ("imu", ("gnss_position", "terrain_fix"))      # an IMU, and GNSS or terrain fixes
 
 A name is a kind of `simnav.types.KINDS`, ``"imu"``, or ``"aid"`` for any instrument beside the IMU.
 """
@@ -78,7 +78,7 @@ def lacking(needs: object, instruments: Instruments) -> str:
     Examples
     --------
     >>> from simnav.types import Instruments
-    >>> lacking(("imu", ("gnss_position", "terrain")), Instruments())
+    >>> lacking(("imu", ("gnss_position", "terrain_fix")), Instruments())
     'it needs an IMU; there is none'
     """
     kinds = {sheet.kind for sheet in instruments.values()}

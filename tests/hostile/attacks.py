@@ -23,7 +23,7 @@ SCENARIO = HERE / "cheats" / "scenario.toml"
 
 #: The files of the cheats: each gained a position error below a micrometre, or scores of its own making, while
 #: estimators ran in forks of the worker.
-CHEATS = sorted(path.stem for path in (HERE / "cheats").glob("*.py") if path.stem != "last_fix")
+CHEATS = sorted(path.stem for path in (HERE / "cheats").glob("*.py") if path.stem != "cheating_last_fix")
 
 _VANDAL = '''
 import os, signal, subprocess, sys, time
@@ -130,7 +130,7 @@ def cheats(folder: Path, confinement: str = "auto", seeds: int = 2) -> list[str]
     gained = []
     scenario = load(SCENARIO)
     files = {name: EstimatorRequest(str(HERE / "cheats" / f"{name}.py"), label=name) for name in CHEATS}
-    honest = EstimatorRequest(f"{HERE / 'cheats' / 'last_fix.py'}:LastFix", label="honest")
+    honest = EstimatorRequest(f"{HERE / 'cheats' / 'cheating_last_fix.py'}:LastFix", label="honest")
     run_campaign([scenario], [honest], range(seeds), folder / "honest", workers=1, confinement=confinement)
     wanted = [plain(result) for result in store.load(folder / "honest")]
     assert [status for status, *_ in wanted] == ["ok"] * seeds

@@ -61,8 +61,10 @@ def test_seeds_fix_a_run_and_differ(name):
     assert_same_block(first.data, again.data)
     np.testing.assert_array_equal(first.start.position, again.start.position)
     assert not np.array_equal(first.start.position, other.start.position)
-    for name, stream in first.data.aids.items():
-        assert not np.array_equal(stream.value, other.data.aids[name].value)
+    assert first.data.aids
+    for name, stream in first.data.aids.items():  # a family draws which instruments there are
+        if len(stream.value) and name in other.data.aids:
+            assert not np.array_equal(stream.value, other.data.aids[name].value)
 
 
 DIGEST = """

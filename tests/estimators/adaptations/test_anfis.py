@@ -207,11 +207,13 @@ def test_the_target_is_the_variance_that_the_fixes_had():
 
 def test_seeds_of_training_and_validation_are_never_scored():
     """Campaigns, papers and bounds count from zero, by hundreds at most."""
-    from simnav.leaderboard.campaign.campaign import QUICK_RUNS, RUNS
+    from simnav.leaderboard import profiles
+    from simnav.leaderboard.campaign.campaign import RUNS
     from simnav.leaderboard.papers import PAPERS
     from simnav.leaderboard.papers.paper import load as load_paper
 
-    scored = max(RUNS, QUICK_RUNS, *(load_paper(key).full for key in PAPERS))
+    runs = [part.runs for name in profiles.profiles() for part in profiles.load(name).parts]
+    scored = max(RUNS, *runs, *(load_paper(key).full for key in PAPERS))
     for features in FEATURES:
         record_ = Parameters.load(shipped(features)).record
         (first, last), (check, end) = record_["training_seeds"], record_["validation_seeds"]

@@ -3,7 +3,7 @@
 import sys
 import threading
 
-from last_fix import LastFix, truth_in
+from cheating_last_fix import LastFix, truth_in
 
 
 class CurrentFrames(LastFix):

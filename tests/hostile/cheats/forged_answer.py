@@ -1,6 +1,6 @@
 """Names itself with a text that runs code where it is unpickled: there the scores are made."""
 
-from last_fix import LastFix
+from cheating_last_fix import LastFix
 
 CODE = """
 import simnav.scoring

@@ -2,7 +2,7 @@
 
 import sys
 
-from last_fix import LastFix, truth_in
+from cheating_last_fix import LastFix, truth_in
 
 
 class Frames(LastFix):

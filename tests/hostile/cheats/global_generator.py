@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from last_fix import LastFix, truth_in
+from cheating_last_fix import LastFix, truth_in
 
 from simnav.scenario import load
 from simnav.source import record

@@ -1,6 +1,6 @@
 """Declares itself a reference, as an instance, and is told all."""
 
-from last_fix import LastFix, truth_in
+from cheating_last_fix import LastFix, truth_in
 
 
 class SelfDeclared(LastFix):
