@@ -16,7 +16,7 @@ __all__ = ["CauchyFgo", "DcsFgo", "GaFgo", "GaFgoPaper", "GmFgo", "GncFgo", "Hub
 __all__ += ["SwitchableFgo", "TukeyFgo"]
 
 
-class _Robust(Row, solver=piece(WindowEstimator, every_sample=False), model=Suitable):
+class _Robust(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, every_sample=False), model=Suitable):
     """The window without its weighting."""
 
 
@@ -75,7 +75,7 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
 @register("gnc-fgo")
 class GncFgo(
     _Robust,
-    solver=piece(WindowEstimator, defaults={"iterations": 15}, every_sample=False),
+    solver=piece(WindowEstimator, defaults={"tolerance": 0.05, "iterations": 15}, every_sample=False),
     weighting=GraduatedNonConvexity,
 ):
     """Sliding window with graduated non-convexity: after an outlier the robust cost begins convex and hardens.

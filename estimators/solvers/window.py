@@ -115,7 +115,7 @@ class WindowEstimator(Solver):
         weighting: Weighting | None = None,
         *,
         window: int | None = 20,
-        tolerance: float = 0.05,
+        tolerance: float = 1e-3,
         iterations: int = 10,
         spacing: float = 0.5,
         every_sample: bool = False,
