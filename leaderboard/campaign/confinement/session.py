@@ -304,7 +304,7 @@ class RemoteSession:
         simnav.trial.FailureError
             If that fails.
         """
-        told = _told(self._ask(Down.MAKE, (entrant, sys.path, words)))
+        told = _told(self._ask(Down.MAKE, (entrant, _search_path(), words)))
         name, needs = told.get("name"), told.get("needs")
         self.needs = tuple(tuple(n) if isinstance(n, list) else n for n in needs) if isinstance(needs, list) else needs
         self.name = name[:200] if isinstance(name, str) else ""
@@ -317,7 +317,7 @@ class RemoteSession:
         simnav.trial.FailureError
             If it cannot be found.
         """
-        return _told(self._ask(Down.DESCRIBE, (entrant, sys.path, [0])))
+        return _told(self._ask(Down.DESCRIBE, (entrant, _search_path(), [0])))
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
         """Hand over start and datasheets."""
@@ -430,6 +430,11 @@ class RemoteSession:
 
     def _late(self) -> StoppedError:
         return StoppedError("timeout", f"stopped after {self.limits.timeout:g} s")
+
+
+def _search_path() -> list[str]:
+    """Where this process finds modules, for one in another folder: an empty entry is the folder that we are in."""
+    return [os.path.abspath(entry) for entry in sys.path]
 
 
 def _told(reply: bytes) -> dict[str, Any]:

@@ -178,3 +178,15 @@ def test_what_cannot_be_sent_is_told(session: Any) -> None:
     made = session(BASE.replace("FACTOR = 2", "import threading\nFACTOR = threading.Lock()"))
     with pytest.raises(RequestError, match=r"Mine cannot be sent to a worker .* put it into a file"):
         carry(made.Mine)
+
+
+def test_a_class_of_a_module_beside_the_script_takes_part(tmp_path: Path):
+    """Its folder is on the path as an empty entry, and the estimator runs in another folder."""
+    text = NOTEBOOK.replace("@GAIN@", "1.0")
+    parts = [part.strip() for part in text.split('"""')[1::2]]
+    (tmp_path / "beside.py").write_text(f"{parts[0]}\n{parts[1]}\n")
+    (tmp_path / "pond.toml").write_text(POND)
+    script = "import simnav\nfrom beside import LastFix\n" + parts[2].replace("workers=2", "workers=1")
+    done = subprocess.run([sys.executable, "-"], input=script, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "('last-fix', 'ok')" in done.stdout
