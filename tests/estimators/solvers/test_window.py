@@ -79,7 +79,7 @@ def test_what_left_the_window_is_not_forgotten(clean: Recording):
 def test_converging_further_changes_little(clean: Recording):
     loose = position(run(make("sw-fgo"), clean), clean)
     tight = position(run(make("sw-fgo", tolerance=1e-7, iterations=20), clean), clean)
-    assert np.max(np.abs(loose - tight)) < 1e-3  # of a sigma of 0.2 m
+    assert np.max(np.abs(loose - tight)) < 1e-4
 
 
 def test_its_memory_does_not_grow_with_the_run(clean: Recording):
