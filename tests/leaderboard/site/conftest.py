@@ -11,7 +11,7 @@ import pytest
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.site import scenario_page, site
+from simnav.leaderboard.site import background, site
 from simnav.scenario import load
 from simnav.scoring import SCORES
 
@@ -49,6 +49,8 @@ def made_up(scenario: str, seed: int, estimator: str, status: str = "ok") -> Res
         track |= {"estimate_north": time + error, "estimate_east": 0.5 * time}
         series = {"time": time, "horizontal": error, "heading": error, "three_sigma": 3.0 * np.ones(60)}
         series |= {"quantiles": np.quantile(error, np.linspace(0.0, 1.0, 101)), **track}
+        if estimator == "sw-fgo":
+            series |= {"diagnostics_time": time[::3], "weight.gnss": rng.uniform(size=20)}
         series = {k: v.astype(np.float32) for k, v in series.items()}
     reason = "" if status == "ok" else f"<b>{status}</b> of {estimator}"
     parameters = {"gate": 3.5} if estimator == "ekf" else {}
@@ -67,6 +69,7 @@ def made_up(scenario: str, seed: int, estimator: str, status: str = "ok") -> Res
         2**20,
         scenario_digest="5ce",
         provenance=MADE,
+        draws={} if scenario in MADE_UP else {"faults.0.size_m": 3.5, "faults.0.instruments": "dvl"},
     )
 
 
@@ -98,7 +101,7 @@ def folder(results: list[Result], tmp_path_factory: pytest.TempPathFactory) -> P
     """The site."""
     output = tmp_path_factory.mktemp("board") / "site"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenario_page, "BOUND_RUNS", 1)
+        patch.setattr(background, "BOUND_RUNS", 1)
         index = site.build(results, rank(results), output)
     assert index == output / "index.html"
     return output
