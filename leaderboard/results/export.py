@@ -204,8 +204,8 @@ def table(results: Sequence[Result]) -> pa.Table:
             values = [known[id(v)] for v in values]
         columns[name] = pa.array(values, kinds.get(name, text))
     for name in SCORES:
-        values = np.array([r.scores.get(name, math.nan) for r in results], dtype=np.float64)
-        columns[name] = pa.array(values, real, mask=np.isnan(values))
+        scores = np.array([r.scores.get(name, math.nan) for r in results], dtype=np.float64)
+        columns[name] = pa.array(scores, real, mask=np.isnan(scores))
     for column, name in _ORIGIN.items():
         columns[column] = pa.array([getattr(r, name) for r in results], kinds.get(column, text))
     index: dict[str, int] = {}

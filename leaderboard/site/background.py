@@ -106,9 +106,9 @@ def background(identity: str, seeds: Iterable[int]) -> Background:
         return Background()
     units = {}
     for name, stream in first.data.aids.items():
-        found = {c.error_unit for c in KINDS[stream.kind].components}
-        if len(found) == 1:
-            unit = found.pop()
+        shared = {c.error_unit for c in KINDS[stream.kind].components}
+        if len(shared) == 1:
+            unit = shared.pop()
             units[name] = list(_UNITS.get(unit, (unit, 1.0)))
     return Background(
         happening=events(scenario, first),

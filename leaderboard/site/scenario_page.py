@@ -414,6 +414,6 @@ def _inside(single: Mapping[str, dict[str, Any]], around: Background, seed: str)
 
 def track_from(single: Iterable[dict[str, Any]]) -> dict[str, Any]:
     """Truth and frame of a track from the series of a run, where there is no recording."""
-    truth = next((one["truth"] for one in single if "truth" in one), ([], [], []))
+    truth: Sequence[Any] = next((one["truth"] for one in single if "truth" in one), ([], [], []))
     nothing: dict[str, list[Any]] = {"east": [], "north": [], "time": [], "name": [], "part": []}
     return {"faulty": nothing, "fixes": {k: nothing[k] for k in ("east", "north", "name")}, **truth_of(*truth)}

@@ -171,6 +171,15 @@ def test_a_scenario_of_the_catalogue_says_what_happens_with_which_instruments(fo
     assert (folder / "data" / f"{catalogued}-run-0.js").is_file()
 
 
+def test_a_scenario_shows_its_sweeps_with_breaking_points(folder, catalogued):
+    page, data = Page(folder / f"{catalogued}.html"), data_of(folder / f"{catalogued}.html")
+    assert "How large a fault may be: Jump [m]" in page.text
+    assert "beyond 4.0" in page.text  # the one that does not break
+    (chart,) = data["sweeps"][0]["charts"]
+    assert chart["data"]["curves"]["rows"]["ekf"]["value"] == [0.0, 2.0, 4.0]
+    assert chart["data"]["marks"]["rows"] == {"ekf": {"at": [3.0], "threshold": [2.0]}}
+
+
 def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):
     page, data = Page(folder / f"{SCENARIOS[1]}.html"), data_of(folder / f"{SCENARIOS[1]}.html")
     assert "timeout" in page.text
