@@ -1,4 +1,4 @@
-"""The tutorials as notebooks, from the same pages: mkdocs writes one beside each tutorial (``hooks`` in ``mkdocs.yml``).
+"""The tutorials as notebooks: mkdocs writes one beside each tutorial, from the same page (``hooks`` in ``mkdocs.yml``).
 
 Python blocks and command lines become cells that can be run. A block that the text says to save becomes a cell that
 writes the file. All else is text.

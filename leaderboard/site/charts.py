@@ -24,6 +24,7 @@ __all__ = [
     "over_time",
     "ratios_by_group",
     "short",
+    "shorts",
     "spread",
     "stanford",
     "timeline",
@@ -81,9 +82,27 @@ def short(value: Any, digits: int = 4) -> float | None:
     return float(f"{x:.{digits}g}") if math.isfinite(x) else None
 
 
+def shorts(values: Any, digits: int = 4) -> list[float | None]:
+    """`short` of an array.
+
+    >>> shorts([0.123456, float("nan"), 12345.6, 0.0])
+    [0.1235, None, 12350.0, 0.0]
+    """
+    x = np.asarray(values, dtype=np.float64)
+    known = np.isfinite(x)
+    size = np.where(known & (x != 0.0), np.abs(x), 1.0)
+    places = np.clip(digits - 1 - np.floor(np.log10(size)), -22.0, 22.0)
+    up, down = 10.0 ** np.maximum(places, 0.0), 10.0 ** np.maximum(-places, 0.0)  # one of them is 1: both are exact
+    found = (np.rint(np.where(known, x, 0.0) * up / down) / up * down).tolist()
+    if not known.all():
+        for k in np.flatnonzero(~known).tolist():
+            found[k] = None
+    return found  # type: ignore[no-any-return]
+
+
 def columns(**values: Iterable[Any]) -> dict[str, list[Any]]:
     """Columns of a data set: arrays become short lists."""
-    return {name: [short(x) for x in v] if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
+    return {name: shorts(v) if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
 
 
 def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
@@ -480,7 +499,7 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
     spec = {
         "data": {"name": "curves"},
         "facet": {"field": "row", "type": "nominal", "title": None, "sort": None},
-        "columns": 3,
+        "columns": 6,
         "spec": {"layer": inner},
     }
     words = (

@@ -7,15 +7,15 @@ memory.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.results.stored_series import StoredSeries
-from simnav.leaderboard.site.charts import short
+from simnav.leaderboard.results.stored_series import read_ahead
+from simnav.leaderboard.site.charts import shorts
 from simnav.scoring.integrity import RISK
 from simnav.scoring.plot_series import DIAGNOSTICS
 
@@ -82,9 +82,7 @@ class Gathered:
     single: dict[Result, dict[str, Any]]
 
 
-def gather(
-    over_all: Iterable[Result], single: Collection[Result], progress: Callable[[int, int], None] | None = None
-) -> Gathered:
+def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
     """Read series, each part of a file once.
 
     Parameters
@@ -93,28 +91,22 @@ def gather(
         Those whose `Curves` are wanted.
     single : collection of Result
         Those that are shown one by one.
-    progress : callable, optional
-        Called with (done, total).
     """
     wanted, alone = set(over_all), set(single)
     times: dict[bytes, Thin] = {}  # nearly all runs of a scenario share theirs
     found = Gathered({}, {})
-    every = sorted(wanted | alone, key=_place)
-    for k, result in enumerate(every):
-        if progress is not None and k % 1000 == 0:
-            progress(k, len(every))
-        if not _has(result, "time"):
-            continue
-        if result in wanted:
-            found.curves[result] = _curves(result, times)
-        if result in alone:
-            found.single[result] = one_run(result)
+    every: dict[int, list[Result]] = {}
+    for result in wanted | alone:
+        every.setdefault(id(result.series), []).append(result)
+    for series in read_ahead([results[0].series for results in every.values()]):
+        for result in every[id(series)]:
+            if not _has(result, "time"):
+                continue
+            if result in wanted:
+                found.curves[result] = _curves(result, times)
+            if result in alone:
+                found.single[result] = one_run(result)
     return found
-
-
-def _place(result: Result) -> tuple[str, int, int]:
-    s = result.series
-    return (s.path, s.group, s.row) if isinstance(s, StoredSeries) else ("", 0, 0)
 
 
 def _has(result: Result, name: str) -> bool:
@@ -184,7 +176,7 @@ def band(curves: Sequence[Curves], name: str, factor: float, time: Array) -> dic
     gaps = np.flatnonzero(np.isnan(middle) & np.isfinite(rows).any(axis=0))  # some runs have a value, others none
     if len(gaps):
         low[gaps], middle[gaps], high[gaps] = factor * np.nanpercentile(rows[:, gaps], (5.0, 50.0, 95.0), axis=0)
-    return {"low": _list(low), "middle": _list(middle), "high": _list(high)}
+    return {"low": shorts(low), "middle": shorts(middle), "high": shorts(high)}
 
 
 def _at(time: Array, t: Thin, v: Thin) -> Array:
@@ -199,7 +191,7 @@ def quantiles(curves: Sequence[Curves]) -> dict[str, list[float | None]] | None:
     values = np.concatenate(rows).astype(np.float64)
     values = values[np.isfinite(values)]
     share = np.linspace(0.0, 100.0, 101)
-    return {"error": _list(np.percentile(values, share)), "share": share.tolist()}
+    return {"error": shorts(np.percentile(values, share)), "share": share.tolist()}
 
 
 def integrity(curves: Sequence[Curves], limit: float) -> dict[str, list[Any]] | None:
@@ -222,9 +214,8 @@ def integrity(curves: Sequence[Curves], limit: float) -> dict[str, list[Any]] | 
     edges = np.linspace(0.0, 2.0 * limit, 33)
     counts = found.histogram(edges)
     i, j = np.nonzero(counts)
-    width = edges[1]
-    return {"x": _list(edges[i]), "x2": _list(edges[i] + width), "y": _list(edges[j]), "y2": _list(edges[j] + width),
-            "epochs": counts[i, j].tolist()}  # fmt: skip
+    sides = {"x": edges[i], "x2": edges[i + 1], "y": edges[j], "y2": edges[j + 1]}
+    return {**{name: shorts(values) for name, values in sides.items()}, "epochs": counts[i, j].tolist()}
 
 
 def one_run(result: Result) -> dict[str, Any]:
@@ -234,12 +225,12 @@ def one_run(result: Result) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, _, _, factor in QUANTITIES:
         if name in s and np.isfinite(s[name]).any():
-            found[name] = {"time": _list(s["time"][keep]), "middle": _list(factor * np.abs(s[name][keep]))}
+            found[name] = {"time": shorts(s["time"][keep]), "middle": shorts(factor * np.abs(s[name][keep]))}
             if name == "horizontal" and np.isfinite(s.get("three_sigma", np.zeros(0))).any():
-                found[name]["bound"] = _list(s["three_sigma"][keep])
+                found[name]["bound"] = shorts(s["three_sigma"][keep])
     if "estimate_north" in s:
         track = {"time": s["time"], "east": s["estimate_east"], "north": s["estimate_north"]}
-        found["track"] = {name: _list(v[keep]) for name, v in track.items()}
+        found["track"] = {name: shorts(v[keep]) for name, v in track.items()}
     if "truth_north" in s:
         known = np.flatnonzero(np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"]))
         known = known[_thinned(len(known), _TRACK_POINTS)] if len(known) else known
@@ -247,9 +238,5 @@ def one_run(result: Result) -> dict[str, Any]:
     for name, values in s.items():
         if name.partition(".")[0] in DIAGNOSTICS and np.isfinite(values).any():
             known = np.isfinite(values)
-            found[name] = {"time": _list(s["diagnostics_time"][known]), "middle": _list(values[known])}
+            found[name] = {"time": shorts(s["diagnostics_time"][known]), "middle": shorts(values[known])}
     return found
-
-
-def _list(values: Any) -> list[float | None]:
-    return [short(x) for x in values]

@@ -47,7 +47,8 @@ def filled(chart: Chart, rows: Sequence[str], width: int = 620) -> Spec:
             and datasets.get(x.get("data", {}).get("name"), True)
         ]
     spec = {"$schema": "https://vega.github.io/schema/vega-lite/v6.json", **fill(given)}
-    if "facet" in spec:  # panels side by side
+    if "facet" in spec:  # panels side by side, three a line
+        spec["columns"] = 3
         spec["spec"] |= dict.fromkeys(("width", "height"), width // spec["columns"] - 40)
     else:
         spec.setdefault("width", width)

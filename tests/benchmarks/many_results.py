@@ -134,29 +134,31 @@ def main() -> None:
             own, others = (resource.getrusage(w).ru_maxrss for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
             return max(own, others) / 1024.0
 
-        started = time.perf_counter()
+        started, cpu = time.perf_counter(), time.process_time()
         stored = len(store.keys(folder))
         scanned = time.perf_counter()
         ranking = interface.rank(folder)
         ranked = time.perf_counter()
+        cpu = time.process_time() - cpu
         rows = sum(len(t.rows) for t in ranking.tracks)
         print(f"{stored} results: scan of a resumed campaign {scanned - started:.1f} s, read and ranked "
-              f"{ranked - scanned:.1f} s ({rows} rows), peak memory {megabytes():.0f} MiB", flush=True)  # fmt: skip
+              f"{ranked - scanned:.1f} s ({rows} rows; CPU {cpu:.1f} s), "
+              f"peak memory {megabytes():.0f} MiB", flush=True)  # fmt: skip
         if given.site is None:
             return
         from simnav.leaderboard.site.site import build
 
-        started = time.perf_counter()
+        started, cpu = time.perf_counter(), time.process_time()
         found = interface.results_of(folder, series=True)
         read = time.perf_counter()
         ranking = interface.rank(found)
         ranked = time.perf_counter()
         build(found, ranking, given.site, workers=given.workers)
-        built = time.perf_counter()
+        built, cpu = time.perf_counter(), time.process_time() - cpu
         size = sum(f.stat().st_size for f in given.site.rglob("*") if f.is_file()) / 2**20
         largest = max(given.site.glob("*.html"), key=lambda f: f.stat().st_size)
         print(f"site: read {read - started:.1f} s, ranked {ranked - read:.1f} s, written {built - ranked:.1f} s, "
-              f"all {built - started:.1f} s, peak memory {megabytes():.0f} MiB; {math.ceil(size)} MiB, largest page "
+              f"all {built - started:.1f} s (CPU {cpu:.1f} s), peak memory {megabytes():.0f} MiB; {math.ceil(size)} MiB, largest page "
               f"{largest.name} {largest.stat().st_size / 1000:.0f} kB")  # fmt: skip
 
 

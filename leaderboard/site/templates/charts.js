@@ -95,7 +95,7 @@
     constructor(host, given) {
       Object.assign(this, { host, given });
       this.place = make("div", { class: "vega", role: "group", "aria-label": given.title });
-      host.append(make("figure", { class: "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
+      host.append(make("figure", { class: given.spec.facet ? "chart wide" : "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
       this.drawn = false;
       new IntersectionObserver((entries, observer) => {
         if (!entries.some((e) => e.isIntersecting)) return;
@@ -118,7 +118,8 @@
       const width = Math.max(180, this.place.clientWidth - 75);
       spec.$schema = "https://vega.github.io/schema/vega-lite/v6.json";
       if (spec.facet) { // panels side by side, as many as fit
-        spec.columns = Math.max(1, Math.min(spec.columns, Math.floor((width + 75) / 230), rows.length || 1));
+        const fit = Math.max(1, Math.min(spec.columns, Math.floor((width + 75) / 230))), count = Math.max(1, rows.length);
+        spec.columns = Math.ceil(count / Math.ceil(count / fit));
         const side = Math.min(300, Math.floor((width + 30) / spec.columns) - 30);
         Object.assign(spec.spec, { width: side, height: side });
       } else spec.width ??= width;
