@@ -158,8 +158,8 @@ def main() -> None:
         size = sum(f.stat().st_size for f in given.site.rglob("*") if f.is_file()) / 2**20
         largest = max(given.site.glob("*.html"), key=lambda f: f.stat().st_size)
         print(f"site: read {read - started:.1f} s, ranked {ranked - read:.1f} s, written {built - ranked:.1f} s, "
-              f"all {built - started:.1f} s (CPU {cpu:.1f} s), peak memory {megabytes():.0f} MiB; {math.ceil(size)} MiB, largest page "
-              f"{largest.name} {largest.stat().st_size / 1000:.0f} kB")  # fmt: skip
+              f"all {built - started:.1f} s (CPU {cpu:.1f} s), peak memory {megabytes():.0f} MiB; "
+              f"{math.ceil(size)} MiB, largest page {largest.name} {largest.stat().st_size / 1000:.0f} kB")  # fmt: skip
 
 
 if __name__ == "__main__":
