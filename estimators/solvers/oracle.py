@@ -11,6 +11,7 @@ import numpy as np
 from simnav.estimator import Needs, UnsuitableScenario
 from simnav.estimator.needs import AID
 from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_faults
+from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
@@ -18,7 +19,16 @@ from simnav.estimators.models.true_motion import levelled, true_motion, with_imu
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.recording import Recording
-from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurements
+from simnav.types import (
+    Array,
+    Estimate,
+    ImuSamples,
+    InitialState,
+    Instruments,
+    Measurements,
+    NavigationStates,
+    TapStates,
+)
 
 __all__ = ["OracleEstimator"]
 
@@ -87,7 +97,15 @@ class OracleEstimator(KalmanEstimator):
         super().reset(start, instruments)
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
-        inner: ErrorModel = InertialModel()
+        recording = self._recording
+        assert recording is not None
+        first, then = recording.initial_truth, recording.data.truth
+        names = ("time", "position", "velocity", "attitude")
+        truth = NavigationStates(*(np.concatenate([getattr(first, n), getattr(then, n)]) for n in names))
+        water = None
+        if isinstance(then, TapStates):
+            water = np.concatenate([then.water_velocity[:1], then.water_velocity])
+        inner: ErrorModel = AboutTruthModel(truth, water)
         states = self.truth.states()
         return FaultStateModel(inner, states) if states else inner
 
