@@ -27,14 +27,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from math import atan2, hypot, remainder, tau
 from typing import NamedTuple
 
 import numpy as np
 
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.models.inertial import CURRENT, CURRENT_TIME, InertialModel
-from simnav.geometry.earth import principal_radii, relative_position
-from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm
+from simnav.estimators.models.propagation import correct_inertial
+from simnav.geometry.earth import principal_radii
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.kinds import BODY_VELOCITY, DEPTH, WATER_SPEED
 from simnav.types import (
     Array,
@@ -55,6 +57,8 @@ _NAV, _INERTIAL = 9, 15
 _SHORTEST = 1.0
 #: Times closer than this are one and the same [s].
 _SAME = 1e-6
+#: Three less the trace of a rotation matrix that is a vector product to third order: an angle of 3 mrad.
+_SMALL = 1e-5
 
 
 class _ImuError(NamedTuple):
@@ -88,6 +92,13 @@ class AboutTruthModel(ErrorModel):
     def __init__(self, truth: NavigationStates, water: Array | None = None):
         self.truth, self.water = truth, water
         self._known = np.all(np.isfinite(np.hstack([truth.position, truth.velocity, truth.attitude])), axis=1)
+        self._dcm = dcm_from_rpy(truth.attitude)
+        meridian, prime = principal_radii(truth.position[:, 0])
+        height = truth.position[:, 2]
+        #: Metres a radian to the north and to the east, and a metre of height down.
+        self._metres = np.stack(
+            [meridian + height, (prime + height) * np.cos(truth.position[:, 0]), -np.ones(len(truth))], axis=1
+        )
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU."""
@@ -109,6 +120,8 @@ class AboutTruthModel(ErrorModel):
         covariance[range(_INERTIAL, n), range(_INERTIAL, n)] = variance
         self._rate, self._density = rate, density
         self._unused = np.zeros_like(own)
+        self._axes = np.array([_NAV + e.axis for e in self._imu_errors], dtype=np.intp)
+        self._times = np.array([e.times for e in self._imu_errors], dtype=np.intp)
         self.transition = np.eye(n)
         self.y = np.zeros(n)
         self._integral: tuple[Array, Array] | None = None
@@ -176,25 +189,28 @@ class AboutTruthModel(ErrorModel):
         nominal, y = self.nominal, self.y
         if abs(self.truth.time[k] - self.time) > _SAME:
             return
-        if self._known[k]:
-            position, velocity = self.truth.position[k], self.truth.velocity[k]
-            dcm = dcm_from_rpy(self.truth.attitude[k])
-            y[:3] += relative_position(nominal.position, position)
-            y[3:6] += nominal.velocity - velocity
-            y[6:9] += rotation_vector_from_dcm(nominal.dcm @ dcm.T)
-        else:
+        if not self._known[k]:
             position, velocity, dcm = self._navigation()
             y[:_NAV] = 0.0
+        else:
+            position, velocity, dcm = self.truth.position[k], self.truth.velocity[k], self._dcm[k]
+            off = nominal.position - position
+            off[1] = remainder(off[1], tau)
+            y[:3] += off * self._metres[k]
+            y[3:6] += nominal.velocity - velocity
+            turn = nominal.dcm @ dcm.T
+            if turn[0, 0] + turn[1, 1] + turn[2, 2] < 3.0 - _SMALL:
+                y[6:9] += rotation_vector_from_dcm(turn)
+            else:
+                y[6:9] += 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
         nominal.position[:], nominal.velocity[:], nominal.dcm[:] = position, velocity, dcm
 
     def _navigation(self) -> tuple[Array, Array, Array]:
         """Position, velocity and attitude matrix of the estimate."""
-        nominal, y = self.nominal, self.y
-        meridian, prime = principal_radii(nominal.position[0])
-        height = nominal.position[2]
-        metres = np.array([meridian + height, (prime + height) * np.cos(nominal.position[0]), -1.0])
-        dcm = dcm_from_rotation_vector(y[6:9]) @ nominal.dcm
-        return nominal.position + y[:3] / metres, nominal.velocity + y[3:6], dcm
+        nominal = self.nominal
+        position, velocity, dcm = nominal.position.copy(), nominal.velocity.copy(), nominal.dcm.copy()
+        correct_inertial(position, velocity, dcm, np.empty(6), np.empty(0), np.ascontiguousarray(self.y[:_INERTIAL]))
+        return position, velocity, dcm
 
     def observes(self, instrument: Datasheet) -> bool:
         """As the inertial model."""
@@ -215,7 +231,11 @@ class AboutTruthModel(ErrorModel):
         if self._integral is None:
             return np.zeros(6)
         time, total = self._integral
-        return np.array([np.diff(np.interp((first, last), time, t))[0] for t in total.T]) / (last - first)
+        k = np.clip(np.searchsorted(time, (first, last)), 1, len(time) - 1)
+        share = np.clip((np.array([first, last]) - time[k - 1]) / (time[k] - time[k - 1]), 0.0, 1.0)
+        begin, end = total[k - 1] + share[:, None] * (total[k] - total[k - 1])
+        mean: Array = (end - begin) / (last - first)
+        return mean
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance."""
@@ -231,9 +251,8 @@ class AboutTruthModel(ErrorModel):
         phi[index, index] = decay
         if self._imu_errors:
             measured = self._measured(self.time, until)
-            for k, error in enumerate(self._imu_errors):
-                factor = 1.0 if error.times < 0 else measured[error.times]
-                phi[:_NAV, m + k] = factor * phi[:_NAV, _NAV + error.axis]
+            factor = np.append(measured, 1.0)[self._times]  # -1, for a bias, is the last
+            phi[:_NAV, m : m + len(factor)] = factor * phi[:_NAV, self._axes]
         noise = self._density * elapsed
         moving = self._rate > 0.0
         noise[moving] = self._density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * self._rate[moving])
@@ -296,5 +315,7 @@ class AboutTruthModel(ErrorModel):
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""
-        position, velocity, dcm = self._navigation()
-        return Estimate(self.time, position, velocity, rpy_from_dcm(dcm), covariance[:_NAV, :_NAV].copy())
+        position, velocity, c = self._navigation()
+        c20, c21, c22 = float(c[2, 0]), float(c[2, 1]), float(c[2, 2])
+        attitude = np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(c[1, 0]), float(c[0, 0]))])
+        return Estimate(self.time, position, velocity, attitude, covariance[:_NAV, :_NAV].copy())

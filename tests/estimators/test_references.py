@@ -53,7 +53,7 @@ def test_the_clairvoyant_works_on_the_run_without_faults():
     wrong, right = simulate(shortened("open-sea", 80.0, *faults), 5), simulate(shortened("open-sea", 80.0), 5)
     assert np.abs(wrong.data.aids["gnss"].value - right.data.aids["gnss"].value).max() > 1e-6
     # Displacements one after the other, or their sum: tens of metres over the radius of the Earth, squared.
-    ours, theirs = run("oracle-clairvoyant", wrong), run("ekf", right)
+    ours, theirs = run("oracle-clairvoyant", wrong), run("oracle", right)
     np.testing.assert_allclose(errors(ours, wrong)[:, :6], errors(theirs, right)[:, :6], rtol=0, atol=5e-4)
     np.testing.assert_allclose(ours.covariance, theirs.covariance, rtol=1e-6, atol=1e-12)
 
