@@ -80,7 +80,9 @@ def oracle_run(scenario: Scenario, seed: int) -> OracleRun:
     if trial.status != "ok" or trial.covariance is None:
         raise SpecError(f"{scenario.id}, seed {seed}: the oracle ended with {trial.status}: {trial.reason}")
     real_time = _summary(errors(trial, recording), trial.covariance)
-    smoothed = _summary(smoothed_errors(trial, recording), smoother.smoothed_covariance)
+    after = smoothed_errors(trial, recording)
+    assert after is not None, "it has a smoother"
+    smoothed = _summary(after, smoother.smoothed_covariance)
     return OracleRun(seed, *real_time, *smoothed)
 
 

@@ -180,8 +180,9 @@ class AboutTruthModel(ErrorModel):
         if amplitude:
             deviation = self._several([amplitude, amplitude])
         self._aids[sheet.name] = _AidErrors(bias, scale, misalignment, deviation)
-        still = {} if fast else {"bias_instability": np.zeros_like(sheet.bias)}
-        return replace(sheet, bias=np.zeros_like(sheet.bias), scale=0.0, misalignment=np.zeros(3), **still)
+        none = np.zeros_like(sheet.bias)
+        white = sheet.bias_instability if fast else none
+        return replace(sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3))
 
     def _anchor(self) -> None:
         """Where a step begins: go on from the truth; where it is not known, from the estimate."""

@@ -1,4 +1,4 @@
-"""The EKF that is told the truth: the noise of each measurement and the faults."""
+"""The Kalman filter that is told the truth: where to linearise, the noise of each measurement, and the faults."""
 
 from __future__ import annotations
 
@@ -37,12 +37,13 @@ NOT_TOLD = np.array([True, True, True, True, True, True, False, False, True])
 
 
 class OracleEstimator(KalmanEstimator):
-    """The solver of the module: the inertial model, with the true motion where there is no IMU.
+    """The solver of the module: the inertial model about the truth, with the true motion where there is no IMU.
 
     Of the faults it knows the flags and the statistics, not what they added (`simnav.estimators.adaptations.truth`):
     gross errors are left out, errors that last, like multipath, are states (`simnav.estimators.models.fault_states`);
-    but a disturbance of the IMU is taken off its samples. On a run without faults it is ``ekf``. Without an IMU it is
-    told how the vessel moves (`simnav.estimators.models.true_motion`).
+    but a disturbance of the IMU is taken off its samples. It is linearised about the truth
+    (`simnav.estimators.models.about_truth`), and told the velocity of the water. Without an IMU it is told how the
+    vessel moves (`simnav.estimators.models.true_motion`).
 
     Parameters
     ----------
