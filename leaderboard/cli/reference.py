@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,10 @@ from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.cli.options import Debug, Json, Scenarios, Workers, absolute
 
 __all__ = ["command"]
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{value:.3f} +- {error:.3f}" if math.isfinite(value) else ""
 
 
 def command(
@@ -50,8 +55,8 @@ def command(
                 r.runs,
                 tables.number(r.value, 4),
                 tables.number(r.spread),
-                f"{r.to_bound:.3f} +- {r.to_bound_error:.3f}",
-                f"{r.nees:.3f} +- {r.nees_error:.3f}",
+                _with_error(r.to_bound, r.to_bound_error),
+                _with_error(r.nees, r.nees_error),
             ]
             for scenario_id, scores in sorted(found.items())
             for score, r in scores.items()

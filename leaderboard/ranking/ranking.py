@@ -154,7 +154,7 @@ class _Scenario:
         entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
         if track.name == "post-processing":  # whoever never smooths is not in it
             entries = {n: r for n, r in entries.items() if any(_finite(x, track.score) for x in r.tried)}
-        self.reference = reference_of(name, track.score, entries)
+        self.reference = reference_of(name, track.score, entries, self.recorded)
         ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
         seeds = sorted({x.seed for r in ranked for x in r.tried})
         self.cells = {n: self._cell(r, seeds) for n, r in entries.items()}

@@ -24,11 +24,13 @@ from simnav.leaderboard.results.errors import RequestError
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.runs import Runs
 
-__all__ = ["FILE", "FORMAT", "ORACLES", "entry", "figure", "reference_of", "stored"]
+__all__ = ["FILE", "FORMAT", "ORACLES", "PLAIN", "entry", "figure", "reference_of", "stored"]
 
 FILE = Path(__file__).with_name("reference.json")
 FORMAT = 2
 
+#: The plain filters whose error is the figure of a recorded scenario: the first that suits it.
+PLAIN = ("ekf", "ship-ekf")
 #: Digits that a stored figure has.
 _DIGITS = 5
 #: What a stored figure says of its oracle, beside the figure itself.
@@ -82,7 +84,7 @@ def entry(figure: Reference) -> dict[str, Any]:
     return {**found, **{name: float(f"{x:.4g}") for name, x in checks.items() if math.isfinite(x)}}
 
 
-def reference_of(scenario: str, score: str, cells: Mapping[str, Runs]) -> Reference:
+def reference_of(scenario: str, score: str, cells: Mapping[str, Runs], recorded: bool = False) -> Reference:
     """The figure of a scenario.
 
     A stored figure is refused where the results are of another content of the scenario than it was measured on.
@@ -95,6 +97,8 @@ def reference_of(scenario: str, score: str, cells: Mapping[str, Runs]) -> Refere
         Key of `simnav.scoring.SCORES`.
     cells : mapping of str to Runs
         The runs by estimator; an oracle among them stands in where nothing is stored.
+    recorded : bool
+        Whether the runs are of recorded logs: an oracle is none there, and a plain filter stands in.
     """
     found = stored().get(scenario, {}).get(score)
     contents = {r.scenario_digest for runs in cells.values() for r in runs.results if r.scenario_digest}
@@ -102,7 +106,10 @@ def reference_of(scenario: str, score: str, cells: Mapping[str, Runs]) -> Refere
         return found
     name = ORACLES.get(score, "oracle")
     names = [n for n in sorted(cells) if cells[n].reference and "oracle" in n]
-    for candidate in [n for n in names if n == name] or names:
+    names = [n for n in names if n == name] or names
+    if recorded:
+        names = [n for n in PLAIN if n in cells]
+    for candidate in names:
         errors = [r.scores.get(score, math.nan) for r in cells[candidate].good]
         made = figure(errors, candidate)
         if made is not None:

@@ -24,10 +24,7 @@ from simnav.leaderboard.results import store
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["PLAIN", "measure", "save"]
-
-#: The plain filters whose error is the figure of a recorded scenario: the first that suits it.
-PLAIN = ("ekf", "ship-ekf")
+__all__ = ["measure", "save"]
 
 #: Seeds of a scenario that are run before the next scenario has its turn.
 _TURN = 10
@@ -80,7 +77,7 @@ def measure(
             figures[oracle.scenario.id] = _figures(oracle)
             if found is not None:
                 found(figures)
-    return {**figures, **_recorded([s for s in scenarios if s.log is not None], folder, workers)}
+    return {**figures, **_recorded([s for s in scenarios if s.log is not None], runs, folder, workers)}
 
 
 def _figures(oracle: OracleRuns) -> dict[str, Reference]:
@@ -103,17 +100,17 @@ def _figures(oracle: OracleRuns) -> dict[str, Reference]:
     return made
 
 
-def _recorded(scenarios: Sequence[Scenario], folder: str | os.PathLike[str], workers: int) -> dict[str, Any]:
+def _recorded(scenarios: Sequence[Scenario], runs: int, folder: str | os.PathLike[str], workers: int) -> dict[str, Any]:
     """Figures of recorded scenarios: the error of a plain filter, each recording once."""
     if not scenarios:
         return {}
-    run_campaign(scenarios, requests(list(PLAIN)), range(1), folder, workers=workers)
+    run_campaign(scenarios, requests(list(reference.PLAIN)), range(runs), folder, workers=workers)
     results = store.load(folder, series=False, scores=tuple(reference.ORACLES))
     found: dict[str, dict[str, Reference]] = {}
     for s in scenarios:
         mine = [r for r in results if r.scenario == s.id and r.status == "ok"]
         for score in reference.ORACLES:
-            for name in PLAIN:
+            for name in reference.PLAIN:
                 errors = {r.note: r.scores.get(score, math.nan) for r in mine if r.estimator == name}
                 made = reference.figure(errors.values(), name, stored=True)
                 if made is not None:
