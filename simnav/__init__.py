@@ -107,9 +107,11 @@ __all__ = [
     "run",
     "run_trial",
     "score",
+    "submit",
     "sweep",
     "tune",
     "verify",
+    "verify_bundle",
 ]
 
 # Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
@@ -158,6 +160,7 @@ _HOMES = {
         "tune",
         "verify",
     ),
+    "leaderboard.publishing": ("submit", "verify_bundle"),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}
 

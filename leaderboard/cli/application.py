@@ -30,6 +30,7 @@ from simnav.leaderboard.cli import (
     rescore,
     run,
     simulate,
+    submit,
     sweep,
     train,
     tune,
@@ -99,6 +100,7 @@ for _module in (
     verify,
     cite,
     merge,
+    submit,
     tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
