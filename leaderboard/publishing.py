@@ -17,9 +17,12 @@ from simnav.leaderboard.interface import CampaignProgress, campaign
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
+    from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.standard.currency import Outdated
+    from simnav.leaderboard.standard.publication import Published
     from simnav.leaderboard.submission.verifying import SubmissionReport
 
-__all__ = ["Submission", "submit", "verify_bundle"]
+__all__ = ["Submission", "check_standard", "publish_standard", "run_standard", "submit", "verify_bundle"]
 
 
 @dataclass(frozen=True)
@@ -202,3 +205,133 @@ def verify_bundle(
         absolute(bundle), None if key is None else read_seal(key), sample=sample, present=present,
         tolerance=TOLERANCE if tolerance is None else tolerance, progress=progress,
     )  # fmt: skip
+
+
+def run_standard(
+    *,
+    minutes: float | None = 110.0,
+    profile: str | os.PathLike[str] = "standard",
+    results: str | os.PathLike[str] = "results/standard",
+    shipped: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    progress: CampaignProgress = None,
+) -> CampaignReport:
+    """Run what is missing of the standard result, for some time. The same call continues.
+
+    A new folder starts with the results that come with simnav. So only what has changed since is run.
+
+    Parameters
+    ----------
+    minutes : float or None
+        Time after which no further run is started; None for no end.
+    profile : str or path
+        What is run.
+    results : path
+        Folder to work in.
+    shipped : path, optional
+        The results to start with; default: those that come with simnav.
+    workers : int
+        Processes.
+    progress : callable, optional
+        As for `simnav.leaderboard.interface.campaign`.
+
+    Returns
+    -------
+    CampaignReport
+        Its summary says how many runs are left.
+    """
+    from simnav.leaderboard import standard
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.standard.publication import begin
+
+    folder = absolute(results)
+    with mistakes(StoreError):
+        begin(folder, standard.RESULTS if shipped is None else absolute(shipped))
+    return campaign(output=folder, profile=profile, workers=workers, minutes=minutes, progress=progress)
+
+
+def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
+    """Whether the standard result is what the code of today gives; nothing is run.
+
+    Parameters
+    ----------
+    results : path, optional
+        Folder of results; default: those that come with simnav.
+
+    Returns
+    -------
+    simnav.leaderboard.standard.currency.Outdated
+
+    Raises
+    ------
+    RequestError
+        If there are no results.
+    """
+    from simnav.leaderboard import standard
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.standard.currency import outdated
+
+    folder = standard.RESULTS if results is None else absolute(results)
+    if not standard.shipped(folder):
+        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    with mistakes(StoreError):
+        return outdated(folder)
+
+
+def publish_standard(
+    *,
+    results: str | os.PathLike[str] = "results/standard",
+    profile: str | os.PathLike[str] = "standard",
+    shipped: str | os.PathLike[str] | None = None,
+    history: str | os.PathLike[str] | None = None,
+    readme: str | os.PathLike[str] | None = None,
+    site: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    progress: Callable[..., None] | None = None,
+) -> Published:
+    """Make what comes with simnav from the results of `run_standard`: packed results, history, README, and a site.
+
+    Parameters
+    ----------
+    results : path
+        Folder of the results. If it is not there, the results that come with simnav are taken.
+    profile : str or path
+        That the results should hold as a whole.
+    shipped, history : path, optional
+        Folder of the packed results, and file of the editions; default: those that come with simnav.
+    readme : path, optional
+        Whose tables are written; default: none.
+    site : path, optional
+        Folder of a site that is drawn; default: none.
+    workers : int
+        Processes that draw.
+    progress : callable, optional
+        Called with how many of how many pages are done.
+
+    Raises
+    ------
+    RequestError
+        If runs are missing or out of date; then nothing is written.
+    """
+    from simnav.leaderboard import standard
+    from simnav.leaderboard.interface import results_of
+    from simnav.leaderboard.papers.page import find
+    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.site.site import build
+    from simnav.leaderboard.standard.editions import pages_of
+    from simnav.leaderboard.standard.history import read
+    from simnav.leaderboard.standard.publication import publish
+
+    folder = standard.RESULTS if shipped is None else absolute(shipped)
+    file = standard.HISTORY if history is None else absolute(history)
+    working = absolute(results)
+    if not working.exists():
+        working = folder
+    with mistakes(StoreError):
+        made = publish(working, load(profile), folder, file, None if readme is None else absolute(readme))
+    if site is not None:
+        found = results_of(working, series=True)
+        build(found, made.ranking, absolute(site), progress=progress, workers=workers, papers=find(Path("reproduced")),
+              editions=pages_of(read(file)))  # fmt: skip
+    return made

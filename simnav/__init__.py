@@ -88,6 +88,7 @@ __all__ = [
     "bound",
     "campaign",
     "check",
+    "check_standard",
     "cite",
     "evaluate",
     "load",
@@ -96,6 +97,7 @@ __all__ = [
     "merge",
     "names",
     "open_source",
+    "publish_standard",
     "rank",
     "record",
     "register",
@@ -105,6 +107,7 @@ __all__ = [
     "reproduce",
     "rescore",
     "run",
+    "run_standard",
     "run_trial",
     "score",
     "submit",
@@ -160,7 +163,7 @@ _HOMES = {
         "tune",
         "verify",
     ),
-    "leaderboard.publishing": ("submit", "verify_bundle"),
+    "leaderboard.publishing": ("check_standard", "publish_standard", "run_standard", "submit", "verify_bundle"),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}
 

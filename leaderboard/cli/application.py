@@ -30,6 +30,7 @@ from simnav.leaderboard.cli import (
     rescore,
     run,
     simulate,
+    standard,
     submit,
     sweep,
     train,
@@ -104,6 +105,7 @@ for _module in (
     tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
+standard.register(app)
 train.register(app)
 
 
