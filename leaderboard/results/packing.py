@@ -94,7 +94,7 @@ def _file_name(label: str) -> str:
     """A file name for a label: plain characters only, and none twice.
 
     >>> _file_name("ekf"), _file_name("ekf(gate=3)")
-    ('ekf', 'ekf-gate-3-a3fa69')
+    ('ekf', 'ekf-gate-3-499a09')
     """
     plain: Any = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")[:60]
     if plain == label:

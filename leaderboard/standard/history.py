@@ -112,7 +112,7 @@ def read(path: Path) -> list[Line]:
                 if len(row) != len(_NAMES):
                     raise ValueError(f"{len(row)} values where {len(_NAMES)} are wanted")
                 found.append(
-                    Line(int(row[0]), *row[1:8], *(float(v) if v else math.nan for v in row[8:11]), *map(int, row[11:]))  # type: ignore[call-arg, arg-type]
+                    Line(int(row[0]), *row[1:8], *(float(v) if v else math.nan for v in row[8:11]), *map(int, row[11:]))  # type: ignore[arg-type]
                 )
             except ValueError as error:
                 raise RequestError(f"{path}, line {number}: {error}") from None
