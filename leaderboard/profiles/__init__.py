@@ -11,8 +11,8 @@ has a title and one or more parts::
     runs = 10                         # seeds a scenario, from 0 on
 
 A part that names tracks may bound the length of its scenarios by ``shortest_s`` (exclusive) and ``longest_s``. Rows
-that several parts share are named once: ``[groups]`` with ``chosen = ["ekf", "sw-fgo"]``, and ``estimators = "chosen"``.
-What an earlier part has run is not run again.
+that several parts share are named once: ``[groups]`` with ``chosen = ["ekf", "sw-fgo"]``, and
+``estimators = "chosen"``. What an earlier part has run is not run again.
 """
 
 from __future__ import annotations
