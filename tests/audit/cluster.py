@@ -1,7 +1,7 @@
 """What a Dask cluster costs: the throughput of one and of two workers, and the work of the scheduler for each run.
 
-Scheduler and workers are processes of their own on this machine. The second worker needs a core of its own, so the ratio
-means nothing on a machine with other work.
+Scheduler and workers are processes of their own on this machine. The second worker needs a core of its own, so the
+ratio means nothing on a machine with other work.
 """
 
 from __future__ import annotations
