@@ -1,8 +1,8 @@
 """The tables of TOML keys in the documentation, made from the code: ``python docs/keys.py`` writes them.
 
-A table follows a mark: ``<!-- keys: CLASS [CLASS] -->`` (one row for each key), ``<!-- keys: profile -->``, or
-``<!-- kinds: UNION; common: KEYS -->`` (one row for each kind). Keys, kinds, defaults and what is required come from the
-code. The last column may be edited in the page, where it can be more detailed; for a new key it is the field's
+A table follows a mark: ``<!-- keys: CLASS [CLASS] -->`` or ``<!-- keys: profile -->`` (one row for each key), or
+``<!-- kinds: UNION; common: KEYS -->`` (one row for each kind). Keys, kinds, defaults, and what is required, come from
+the code. The last column may be edited in the page, where it can be more detailed; for a new key it is the field's
 description, or what the docstring of its class says.
 """
 

@@ -7,22 +7,24 @@ ratio means nothing on a machine with other work.
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
-from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.scenario import load
 
 __all__ = ["rows"]
 
 SCENARIO = "gnss-outage"
-ROWS = ("ekf", "gated-ekf", "huber-kf", "iae", "sw-fgo", "gnc-fgo")
-RUNS = 14
+ROWS = ("ekf", "gated-ekf", "iae", "sw-fgo")
+RUNS = 8
 _TICKS = 100.0  # of /proc/PID/stat in a second
 
 
@@ -56,45 +58,69 @@ class _Cluster:
 
 def rows() -> Iterator[tuple[str, str, str, bool]]:
     """What, figure, promised, kept."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no worker is left behind
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         cluster = _Cluster(folder)
         try:
             cluster.add()
-            _run(cluster, folder / "warm", range(100, 102))  # kernels are loaded, and simnav is imported
-            one, _, _ = _run(cluster, folder / "one", range(RUNS))
+            _run(cluster, folder / "warm", range(100, 101))  # kernels are loaded, and simnav is imported
+            one = _run(cluster, folder / "one", range(RUNS))
             cluster.add()
-            _run(cluster, folder / "warm", range(102, 110))
-            two, scheduler, campaign = _run(cluster, folder / "two", range(RUNS))
+            _run(cluster, folder / "warm", range(101, 105))
+            two = _run(cluster, folder / "two", range(RUNS))
         finally:
             cluster.close()
         size = sum(p.stat().st_size for p in (folder / "one").rglob("*.parquet")) / RUNS
-    yield f"runs a second of one worker, {len(ROWS)} rows", f"{RUNS / one:.3g}", "", True
-    yield "throughput of two workers over that of one", f"{one / two:.2f}", "at least 1.8", one / two >= 1.8
-    yield "CPU of the scheduler for a run [ms]", f"{1e3 * scheduler / RUNS:.1f}", "", True
-    yield "CPU of the campaign's process for a run [ms]", f"{1e3 * campaign / RUNS:.1f}", "", True
+    faster = one.wall / two.wall
+    scheduler, campaign = (1e3 * (getattr(one, n) + getattr(two, n)) / (2 * RUNS) for n in ("scheduler", "campaign"))
+    worker = 1e3 * one.workers / RUNS
+    yield f"runs a second of one worker, {len(ROWS)} rows", f"{RUNS / one.wall:.3g}", "", True
+    yield "throughput of two workers over that of one", f"{faster:.2f}", "at least 1.8", faster >= 1.8
+    yield "CPU of a worker for a run [ms]", f"{worker:.0f}, with two {1e3 * two.workers / RUNS:.0f}", "", True
+    yield "CPU of the scheduler for a run [ms]", f"{scheduler:.1f}", "", True
+    yield "CPU of the campaign's process for a run [ms]", f"{campaign:.1f}", "", True
     yield "results of a run on disk [kB]", f"{size / 1e3:.0f}", "", True
-    most = RUNS / max(scheduler, campaign) / (RUNS / one)
-    yield "workers that one scheduler feeds", f"{most:.0f}", "at least 100", most >= 100.0
+    most = worker / max(scheduler, campaign)
+    yield "workers that are fed, for rows as quick as these", f"{most:.0f}", "", True
 
 
-def _run(cluster: _Cluster, folder: Path, seeds: range) -> tuple[float, float, float]:
-    """Wall time of a campaign, and CPU time of the scheduler and of this process in it [s]."""
+@dataclass(frozen=True)
+class _Cost:
+    """What a campaign took: wall time, and CPU time of the workers, the scheduler and the campaign's process [s]."""
+
+    wall: float
+    workers: float
+    scheduler: float
+    campaign: float
+
+
+def _run(cluster: _Cluster, folder: Path, seeds: range) -> _Cost:
     requests = [EstimatorRequest(name) for name in ROWS]
-    before, mine, started = _cpu(cluster.scheduler.pid), time.process_time(), time.monotonic()
-    first: list[float] = []
+    begin: list[tuple[float, float, float, float]] = []
 
-    def seen(progress: object) -> None:
-        if getattr(progress, "stage", "") == "run" and not first:
-            first.append(time.monotonic())
-            nonlocal mine
-            mine = time.process_time()
+    def now() -> tuple[float, float, float, float]:
+        workers = sum(_cpu(pid) for worker in cluster.workers for pid in _family(worker.pid))
+        return time.monotonic(), workers, _cpu(cluster.scheduler.pid), time.process_time()
+
+    def seen(progress: Progress) -> None:
+        if progress.stage == "run" and not begin:  # the estimators are resolved, the kernels compiled
+            begin.append(now())
 
     run_campaign([load(SCENARIO)], requests, seeds, folder, backend="dask", scheduler=cluster.address, progress=seen)
-    end = time.monotonic()
-    return end - (first or [started])[0], _cpu(cluster.scheduler.pid) - before, time.process_time() - mine
+    return _Cost(*(b - a for a, b in zip(begin[0], now(), strict=True)))
+
+
+def _family(pid: int) -> list[int]:
+    """A process and its descendants."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    threads = {int(t.name) for t in Path(f"/proc/{pid}/task").iterdir()} - {pid}
+    for thread in threads:
+        children += Path(f"/proc/{pid}/task/{thread}/children").read_text().split()
+    return [pid, *(p for child in children for p in _family(int(child)))]
 
 
 def _cpu(pid: int) -> float:
+    """Of a process, and of its children that have ended."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / _TICKS
+    return sum(map(int, fields[11:15])) / _TICKS
