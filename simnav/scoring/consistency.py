@@ -217,7 +217,9 @@ for _of in ("_clean", "_faulty"):
     _register_coverage(95, _of)
 
 
-@register_score("inconsistent", title="Share of the epochs at which it reports that it is inconsistent", unit="-")
+@register_score(
+    "inconsistent", title="Share of the epochs at which it reports that it is inconsistent", unit="-", better="lower"
+)
 def _inconsistent(given: ScoringInput) -> float:
     """NaN for an estimator that does not test itself."""
     reported = given.trial.diagnostics.get("inconsistent", np.empty(0))
