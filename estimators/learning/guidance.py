@@ -39,8 +39,8 @@ from typing import Any, ClassVar, NamedTuple
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
+from simnav.environment.charted import ChartedEnv
 from simnav.environment.rendering import Chart
 from simnav.estimator import Estimator, make
 from simnav.estimators.learning.environment import run_seed
@@ -113,7 +113,7 @@ class Route:
         return float(self.course[min(at + seconds, len(self.course) - 1)])
 
 
-class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
+class GuidanceEnv(ChartedEnv[Numbers, Numbers]):
     """Steer by the estimate (see the module).
 
     Parameters
@@ -144,7 +144,6 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         If an argument is not valid, or the scenario is a recorded log, which cannot be steered.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
     task: ClassVar[str] = "Guidance"
 
     def __init__(
@@ -159,6 +158,7 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         reveal_truth: bool = False,
         render_mode: str | None = None,
     ):
+        super().__init__(render_mode)
         scenario = load(scenario) if isinstance(scenario, (str, Path)) else scenario
         if scenario.recorded or scenario.start is None:
             raise ValueError(f"scenario {scenario.id} is a recorded log: its vessel cannot be steered")
@@ -169,10 +169,8 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         for name, value in (("steps", steps), ("voyages", voyages)):
             if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
                 raise ValueError(f"{name} is a positive integer or None, not {value!r}")
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode is 'human', 'rgb_array' or None, not {render_mode!r}")
         self.scenario, self.route, self.half_width, self.steps = scenario, route, half_width, steps
-        self.voyages, self.reveal_truth, self.render_mode = voyages, reveal_truth, render_mode
+        self.voyages, self.reveal_truth = voyages, reveal_truth
         if isinstance(navigator, str):
             navigator = make(navigator)
         self.navigator: Estimator = KalmanEstimator(Suitable()) if navigator is None else navigator
@@ -181,7 +179,6 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         self._fixes: set[str] = set()
         self.observation_space = spaces.Box(-LIMIT, LIMIT, (SIZE,), dtype=np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), dtype=np.float32)
-        self._chart: Chart | None = None
         self._source: Simulator | None = None
 
     def reset(
@@ -207,10 +204,7 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         self._at = self._true_at = self._k = 0
         self._turn, self._last_fix, self._along = 0.0, 0.0, 0.0
         self._squares, self._fuel, self._clearance = 0.0, 0.0, np.inf
-        if self.render_mode is not None:
-            if self._chart is None:
-                self._chart = Chart(self.scenario.id, self.scenario.duration, human=self.render_mode == "human")
-            self._chart.clear()
+        self._begin_chart(self.scenario.id, self.scenario.duration)
         info: dict[str, Any] = {"seed": run, "start": start, "instruments": source.instruments}
         return self._observe(), info
 
@@ -256,20 +250,8 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
             self._source = None
         return self._observe(), value, aground, last and not aground, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The chart so far: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window is up to date."""
-        if self._chart is None:
-            if self.render_mode is None:
-                gymnasium.logger.warn("render() shows nothing: make the environment with render_mode='rgb_array'")
-                return None
-            raise gymnasium.error.ResetNeeded("there is nothing to render yet: call reset() first")
-        return self._chart.frame() if self.render_mode == "rgb_array" else None
-
-    def close(self) -> None:
-        """Close the window and forget the voyage."""
-        if self._chart is not None:
-            self._chart.close()
-        self._chart = self._source = None
+    def _forget(self) -> None:
+        self._source = None
 
     # ---------------------------------------------------------------------------------------------- the voyage
 
@@ -337,8 +319,7 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         if e.position is not None:
             covariance = None if e.covariance is None else e.covariance[:2, :2]
             chart.add(time, self._truth[0], e.position, covariance=covariance)
-        if self.render_mode == "human":
-            chart.show()
+        self._show()
 
 
 class LineOfSight:

@@ -28,6 +28,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from simnav.environment.charted import ChartedEnv
 from simnav.geometry.earth import principal_radii
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
@@ -66,7 +67,7 @@ class _Stretch:
     cuts: dict[str, NDArray[np.intp]]  # instrument -> (S + 1,) bounds of each step's measurements in its stream
 
 
-class NavigationEnv(gymnasium.Env[Observation, Array]):
+class NavigationEnv(ChartedEnv[Observation, Array]):
     """Navigate one scenario.
 
     Observation (`gymnasium.spaces.Dict`, float64; all entries are zero where ``valid`` is 0, never NaN; K is the most
@@ -119,8 +120,6 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         If an argument is not valid.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
-
     def __init__(
         self,
         scenario: Scenario | str | Path,
@@ -134,8 +133,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             from simnav.scenario import load
 
             scenario = load(scenario)
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode is 'human', 'rgb_array' or None, not {render_mode!r}")
+        super().__init__(render_mode)
         if closed_loop and scenario.recorded:
             raise ValueError(
                 f"scenario {scenario.id} is a recorded log: its vessel cannot steer by the estimate; "
@@ -144,7 +142,6 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self.scenario = scenario
         self.reveal_truth = reveal_truth
         self.closed_loop = closed_loop
-        self.render_mode = render_mode
         self._weights = _weights(reward)
         # The spaces are fixed: they hold what any run of the scenario can bring.
         possible = scenario.extremes()
@@ -160,7 +157,6 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self._row = 0
         self._size = _FIRST_STRETCH
         self._steps = 0  # steps that the source has been advanced by
-        self._chart: Chart | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -194,14 +190,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             self._source.steer_by(*_horizontal(start.position.tolist(), row), heading)
         if not self._load():
             raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
-        if self.render_mode is not None:
-            if self._chart is None:
-                from simnav.environment.rendering import Chart
-
-                self._chart = Chart(self.scenario.id, self._source.duration, human=self.render_mode == "human")
-            self._chart.clear()
-            if self.render_mode == "human":
-                self._chart.show()
+        self._begin_chart(self.scenario.id, self._source.duration)
         info = {"seed": seed, "start": start, "instruments": self._source.instruments, "note": note}
         return self._observation(), self._reveal(info)
 
@@ -239,20 +228,8 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self._stretch = None
         return observation, reward, False, True, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The chart so far: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window is up to date."""
-        if self._chart is None:
-            if self.render_mode is None:
-                gymnasium.logger.warn("render() shows nothing: make the environment with render_mode='rgb_array'")
-                return None
-            raise gymnasium.error.ResetNeeded("there is nothing to render yet: call reset() first")
-        return self._chart.frame() if self.render_mode == "rgb_array" else None
-
-    def close(self) -> None:
-        """Close the window and forget the run."""
-        if self._chart is not None:
-            self._chart.close()
-        self._chart = self._source = self._stretch = None
+    def _forget(self) -> None:
+        self._source = self._stretch = None
 
     # ------------------------------------------------------------------------------------------- the run
 
@@ -323,8 +300,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
                 cut = slice(*stretch.cuts[name][i : i + 2])
                 chart.add_fixes(stream.value[cut, :2], stream.faults[cut] != 0)
         chart.add(float(stretch.intervals[i, 1]), stretch.truth[i, 0], np.array(estimate[:3]))
-        if self.render_mode == "human":
-            chart.show()
+        self._show()
 
 
 def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
