@@ -31,7 +31,8 @@ from simnav.types import Array, Estimate, InitialState, Instruments
 
 __all__ = ["Navigators", "navigate"]
 
-_ARRAYS = (
+_INSTRUMENTS = ("codes", "arms", "noises", "limits", "used")
+_STATE = (
     "position", "velocity", "dcm", "memory", "bias", "turn", "clock", "sensors", "calibration", "decay", "density",
     "covariance",
 )  # fmt: skip
@@ -101,11 +102,12 @@ class Navigators:
         for b in np.flatnonzero(banked).tolist():
             self._until[b] = runs.interval_of(b)[1]
         a = self._arrays
-        navigate(
+        arguments: Any = (
             banked, self._until, runs.count, runs.who, runs.when, runs.value, runs.samples, runs.imu_time,
-            runs.imu_interval, runs.rate, runs.force, self._size, a["codes"], a["arms"], a["noises"], a["limits"],
-            a["used"], self._now, *(a[name] for name in _ARRAYS), self.estimate, self.spread,
+            runs.imu_interval, runs.rate, runs.force, self._size, *(a[name] for name in _INSTRUMENTS), self._now,
+            *(a[name] for name in _STATE), self.estimate, self.spread,
         )  # fmt: skip
+        navigate(*arguments)
 
     def _put(self, name: str, b: int, array: NDArray[Any]) -> None:
         """Store an array of voyage b; where there is no room for it, all get more."""

@@ -194,7 +194,7 @@ class World:
         n = round(self.rate)
         room = np.empty((1, n, 3))
         none, states, samples = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS)), np.array([n])
-        arguments = (*self._one(), np.empty((1, 0)), none, none, states, samples, room, room.copy())
+        arguments: Any = (*self._one(), np.empty((1, 0)), none, none, states, samples, room, room.copy())
         track, position = np.empty((seconds, 4)), np.empty((seconds, 3))
         for i in range(seconds):
             motion.advance(*arguments)
@@ -242,10 +242,9 @@ class World:
         times = np.concatenate([np.empty(0), *taps.values()])
         order = np.argsort(times, kind="stable")
         sorted_states = np.empty((1, len(times), motion.TAP_COLUMNS))
-        motion.advance(
-            *self._one(), times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states,
-            np.array([n]), rate, force,
-        )  # fmt: skip
+        within = times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
+        arguments: Any = (*self._one(), *within, np.array([n]), rate, force)
+        motion.advance(*arguments)
         states = np.empty_like(sorted_states[0])
         states[order] = sorted_states[0]
         out, i = {}, 0
