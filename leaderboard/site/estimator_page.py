@@ -97,7 +97,7 @@ def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs
         found[table.scenario] = {
             "seed": [r.seed for r in results],
             "note": [r.note for r in results] if any(r.note for r in results) else None,
-            "status": [r.status for r in results] if any(r.status != "ok" for r in results) else None,
+            "status": [r.ending for r in results] if any(r.ending != "ok" for r in results) else None,
             "reason": [r.reason for r in results] if any(r.reason for r in results) else None,
             "seconds": [short(r.seconds, 3) for r in results],
             "scores": _scores(results),
