@@ -17,7 +17,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.figures.plots import save
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import Runs, group
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
@@ -254,6 +256,9 @@ class _Site:
             self._page(pages, "estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
                        data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
         tracks = overview(self.ranking, self.estimators, self.scenarios, self.runs)
+        if figures:
+            for track in self.ranking.tracks:
+                save(ranking_figure(track), self.folder / "figures" / f"board-{track.track}", formats=("svg", "png"))
         self._page(
             pages, "index.html", "index.html", {"kind": "index", "tracks": tracks}, tracks=tracks, facts=self._counts()
         )
