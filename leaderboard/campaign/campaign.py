@@ -34,6 +34,7 @@ from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.resolution import resolve, variant_of
 from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.campaign.sources import digest
+from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -244,6 +245,8 @@ def run_campaign(
     endings = store.keys(path)
     simulator = simulator_version()
     entrants = [resolve(request, chosen, path, workers == 1 and backend == "loky") for request in estimators]
+    if seal is None:  # the seeds of a sealed campaign are drawn from 2**63
+        require_unseen(entrants, scenarios, seeds)
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     if seal is not None:
         recordings = {name: digest(known, "sealed", seal.hash) for name, known in recordings.items()}

@@ -33,6 +33,8 @@ class Entrant:
         The class itself, where no other process can import it.
     point : str
         Entry point of another package that registers it; empty where there is none.
+    learned_from : tuple of pairs of int
+        As of `simnav.estimator.Estimator`.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Entrant:
     source: str
     code: bytes = b""
     point: str = ""
+    learned_from: tuple[tuple[int, int], ...] = ()
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

@@ -160,6 +160,22 @@ def test_disabled_voyages_stand_still_until_they_are_begun_anew(scenario):
     assert rewards[1] == 0.0
 
 
+def test_the_gain_is_the_reward_of_the_error_less_that_of_the_plain_filter(scenario):
+    def agent(_):
+        return np.array([0.5, -0.4, 0.3], np.float32)
+
+    def plain_filter(_):
+        return np.zeros(3, np.float32)
+
+    env = FilterTaskEnv(scenario, reward="gain")
+    gain, nothing = episode(env, 3, agent)[0], episode(env, 3, plain_filter)[0]
+    env = FilterTaskEnv(scenario, reward="error")
+    error, plain_error = episode(env, 3, agent)[0], episode(env, 3, plain_filter)[0]
+    np.testing.assert_allclose(gain, error - plain_error, atol=1e-9)
+    assert np.abs(gain).max() > 0.1
+    assert np.abs(nothing).max() < 1e-6
+
+
 def test_the_labels_give_the_reward_of_detection(scenario):
     env = FilterTaskEnv(scenario, "Detection")
     assert isinstance(env.action_space, gymnasium.spaces.MultiBinary)
@@ -214,7 +230,7 @@ def test_training_voyages_have_seeds_of_their_own(scenario):
     ("call", "message"),
     [
         (lambda s: FilterTaskEnv(s, "Turning"), "task is one of Tuning, Detection, Correction, not 'Turning'"),
-        (lambda s: FilterTaskEnv(s, reward="labels"), "reward of Tuning is one of error, likelihood, not 'labels'"),
+        (lambda s: FilterTaskEnv(s, reward="labels"), "reward of Tuning is one of error, gain, likelihood, not"),
         (lambda s: FilterTaskEnv(s, steps=0), "steps is a positive integer or None, not 0"),
         (lambda s: FilterTaskEnv(s, instruments="some"), "instruments is 'all' or 'fixes', not 'some'"),
         (lambda s: FilterTaskEnv(s, render_mode="ascii"), "render_mode is 'human', 'rgb_array' or None"),
