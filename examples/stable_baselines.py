@@ -7,8 +7,9 @@ Install the extra ``rl`` (``pip install simnav[rl]``) and run it; it takes less 
 The policy learns from training voyages with noise steps and multipath. It is scored on other voyages of the same
 family, beside the plain filter, and written to a file of plain arrays that ``simnav`` runs without this library.
 
-What matters for learning (docs/how-to/learn-to-navigate.md): the reward is relative to the plain filter on the same
-voyage; the agent begins as the plain filter, and tries small changes only; each update sees whole voyages.
+Four things decide whether it learns (docs/how-to/learn-to-navigate.md): the reward is relative to the plain filter;
+several filters sail the same voyage, and what counts is who does better than the others; the advantage is not
+bootstrapped, for a critic does not see the error; exploration is small.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from importlib.metadata import version
 import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from simnav.estimators.learning.evaluation import interval, plain, scoring_envs, worth
@@ -27,21 +29,27 @@ from simnav.estimators.learning.policy import Policy, record_of_training
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
 FAMILY = "training-gnss-faults"
+STEPS = 100 * 64 * 240  # a hundred updates
 LIBRARIES = ("simnav", "stable-baselines3", "torch", "numpy")
 
 
 class BankOfFilters(VecEnv):
-    """The vector form as Stable-Baselines3 wants it: a voyage that is over begins anew within the step."""
+    """The vector form as Stable-Baselines3 wants it: a voyage that is over begins anew within the step.
 
-    def __init__(self, envs: FilterTaskVectorEnv):
+    Groups of ``same`` filters sail the same voyages. The reward is less the mean of the group, which does not depend on
+    what a filter does itself, but for its own share.
+    """
+
+    def __init__(self, envs: FilterTaskVectorEnv, same: int):
         assert envs.autoreset_mode.name == "SAME_STEP"
-        self.envs = envs
+        assert envs.num_envs % same == 0
+        self.envs, self.same = envs, same
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self):
-        seed = self._seeds[0]
+        groups = np.random.default_rng(self._seeds[0]).integers(2**31, size=self.num_envs // self.same)
         self._reset_seeds()
-        return self.envs.reset(seed=seed)[0]
+        return self.envs.reset(seed=np.repeat(groups, self.same).tolist())[0]
 
     def step_async(self, actions):
         self._actions = actions
@@ -51,6 +59,8 @@ class BankOfFilters(VecEnv):
         infos = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(over):  # nothing is lost after the end of a voyage: its value is 0
             infos[i] = {"terminal_observation": info["final_obs"][i]}
+        reward = reward.reshape(-1, self.same)
+        reward = (reward - reward.mean(axis=1, keepdims=True)).ravel()
         return observation, reward.astype(np.float32), over, infos
 
     def close(self):
@@ -69,20 +79,39 @@ class BankOfFilters(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
 
-def made(*, num_envs=64, voyages=256, seed=0, length=None):
+class Now(BaseCallback):
+    """Calls a function with the steps done, ``parts`` times, after an update of the policy."""
+
+    def __init__(self, steps, parts, function):
+        super().__init__()
+        self.marks, self.function = [steps * (i + 1) / parts for i in range(parts)], function
+
+    def _on_step(self):
+        return True
+
+    def _on_rollout_start(self):
+        while self.marks and self.num_timesteps >= self.marks[0]:
+            self.marks.pop(0)
+            self.function(self.num_timesteps)
+
+    def _on_training_end(self):
+        self._on_rollout_start()
+
+
+def made(*, num_envs=64, same=8, voyages=64, seed=0, length=None):
     """The environments, and PPO as it begins: its mean action is close to zero, so that it is the plain filter."""
     envs = FilterTaskVectorEnv(
         FAMILY, "Tuning", num_envs, reward="gain", instruments="fixes", voyages=voyages, steps=length,
         autoreset_mode="SAME_STEP",
     )  # fmt: skip
-    steps, gamma = length or envs.options.scenario.epochs, 0.95
+    steps, gamma = length or envs.options.scenario.epochs, 0.98  # each update sees whole voyages
     # The large epsilon: what hardly varies in training must not become large on other voyages.
-    venv = VecNormalize(BankOfFilters(envs), gamma=gamma, clip_obs=np.inf, epsilon=0.01)
+    venv = VecNormalize(BankOfFilters(envs, same), gamma=gamma, clip_obs=np.inf, epsilon=0.01)
     venv.seed(seed)
     model = PPO(
-        "MlpPolicy", venv, n_steps=steps, batch_size=num_envs * steps // 8, n_epochs=5, gamma=gamma, gae_lambda=0.9,
-        learning_rate=1e-3, seed=seed, device="cpu",
-        policy_kwargs={"net_arch": {"pi": [32, 32], "vf": [64, 64]}, "log_std_init": -1.5},
+        "MlpPolicy", venv, n_steps=steps, batch_size=num_envs * steps // 8, n_epochs=8, gamma=gamma, gae_lambda=1.0,
+        learning_rate=lambda left: 4e-3 * left, clip_range=0.4, seed=seed, device="cpu",
+        policy_kwargs={"net_arch": {"pi": [], "vf": [32, 32]}, "log_std_init": -1.5},
     )  # fmt: skip
     return envs, model
 
@@ -98,40 +127,40 @@ def policy_of(model: PPO, envs: FilterTaskVectorEnv, trained_on: dict) -> Policy
     )  # fmt: skip
 
 
-def train(*, steps=4_000_000, num_envs=64, voyages=256, seed=0, length=None, after=None, parts=5):
+def train(*, steps=STEPS, num_envs=64, same=8, voyages=64, seed=0, length=None, after=None, parts=5):
     """PPO on the tuning task.
 
     Parameters
     ----------
     steps : int
         Of all environments together; whole voyages are done.
-    num_envs, voyages, seed : int
-        Filters side by side, training voyages, and the seed of everything that is drawn.
+    num_envs, same, voyages, seed : int
+        Filters side by side, how many of them sail the same voyage, training voyages, and the seed of everything that
+        is drawn.
     length : int, optional
         Of an episode.
     after : callable, optional
         Called so many times (``parts``), with the steps done and the policy.
     """
     torch.set_num_threads(1)
-    envs, model = made(num_envs=num_envs, voyages=voyages, seed=seed, length=length)
+    envs, model = made(num_envs=num_envs, same=same, voyages=voyages, seed=seed, length=length)
     told = record_of_training(
-        envs.options.scenario, voyages, seed=seed, algorithm="PPO of Stable-Baselines3, two layers of 32",
+        envs.options.scenario, voyages, seed=seed, algorithm="PPO of Stable-Baselines3, linear policy",
         versions={name: version(name) for name in LIBRARIES},
     )  # fmt: skip
-    parts = parts if after else 1
-    for part in range(parts):
-        model.learn(steps // parts, reset_num_timesteps=part == 0)
-        told["steps"] = model.num_timesteps
-        if after:
-            after(model.num_timesteps, policy_of(model, envs, dict(told)))
-    return policy_of(model, envs, told)
+
+    def policy():
+        return policy_of(model, envs, {**told, "steps": model.num_timesteps})
+
+    model.learn(steps, callback=Now(steps, parts, lambda done: after(done, policy())) if after else None)
+    return policy()
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=4_000_000)
+    parser.add_argument("--steps", type=int, default=STEPS)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--voyages", type=int, default=256)
+    parser.add_argument("--voyages", type=int, default=64)
     parser.add_argument("--output", default="policy.npz")
     arguments = parser.parse_args()
     begun = time.perf_counter()

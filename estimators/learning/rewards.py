@@ -3,17 +3,20 @@
 ============= =================================================================================================
 error         ``-ln((e^2 + s^2) / (o^2 + s^2)) / 2``: e and o the horizontal errors of the filter and of the
               oracle, s the oracle's horizontal sigma
-gain          ``-ln((e^2 + s^2) / (p^2 + s^2)) / 2``: p the horizontal error of the plain filter
+gain          ``-ln((e^2 + r^2) / (p^2 + r^2)) / 2``: p the horizontal error of the plain filter, and r^2 the mean
+              of ``p^2 + s^2`` from the start of the voyage on
 likelihood    logarithm of the density that the filter gave to the true horizontal position [1/m^2], but for
               the constant
 labels        +1 for each fault that is found, -1 for each that is not, -1 for each false alarm
 improvement   how much the error becomes less [m]; 1 m/s counts as 10 m and 1 rad as 50 m
 ============= =================================================================================================
 
-"gain" differs from "error" by what the plain filter would have got in the same step, which no action changes. So both
-have the same best policy. The return of "gain" varies much less from voyage to voyage, and that of the plain filter
-is 0. (A baseline that depends on the voyage only: Mao, Venkatakrishnan, Schwarzkopf and Alizadeh, "Variance Reduction
-for Reinforcement Learning in Input-Driven Environments", 2019.)
+"error" counts the logarithm of every error alike: to halve 20 cm is worth what it is to halve 20 m. An agent can earn
+much of it where nothing is wrong, and become worse by the RMS error of the voyage, which is scored. "gain" counts an
+error by its size beside what is usual in the voyage. It is relative to the plain filter in the same step, whose return
+is 0, so that it varies less from voyage to voyage; no action changes what is subtracted. (On baselines that depend on
+what drives an environment: Mao, Venkatakrishnan, Schwarzkopf and Alizadeh, "Variance Reduction for Reinforcement
+Learning in Input-Driven Environments", 2019.)
 """
 
 from __future__ import annotations
@@ -47,8 +50,8 @@ def reward(  # type: ignore[no-untyped-def]
         Of `REWARDS`.
     error : (b, 9) array
         Of the plain filter at the end of the step: estimate minus truth.
-    oracle : (b, 2) array
-        The oracle's horizontal error and its horizontal sigma [m].
+    oracle : (b, 3) array
+        As of `simnav.estimators.learning.voyage.Voyage`.
     action : (b, 7) array
         Corrections: north, east, down [m], the same of the velocity [m/s], heading [rad].
     first, last, instrument, size, place, active, scale, covariance, delta
@@ -65,10 +68,13 @@ def reward(  # type: ignore[no-untyped-def]
             continue
         north, east = error[b, 0] + delta[b, 0], error[b, 1] + delta[b, 1]
         value = 0.0
-        if code == 0 or code == 4:
+        if code == 0:
             square = oracle[b, 1] * oracle[b, 1]
-            beside = oracle[b, 0] * oracle[b, 0] if code == 0 else error[b, 0] * error[b, 0] + error[b, 1] * error[b, 1]
-            value = -0.5 * log((north * north + east * east + square) / (beside + square))
+            value = -0.5 * log((north * north + east * east + square) / (oracle[b, 0] * oracle[b, 0] + square))
+        elif code == 4:
+            square = oracle[b, 2] * oracle[b, 2]
+            alone = error[b, 0] * error[b, 0] + error[b, 1] * error[b, 1]
+            value = -0.5 * log((north * north + east * east + square) / (alone + square))
         elif code == 1:
             p, q, r = covariance[b, 0, 0], covariance[b, 0, 1], covariance[b, 1, 1]
             determinant = p * r - q * q

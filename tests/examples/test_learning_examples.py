@@ -54,10 +54,14 @@ def test_the_cross_entropy_method_learns(example, tmp_path):
 def test_learning_curves_over_training_seeds(example, tmp_path):
     curve, agent = example("learning_curve"), example("cross_entropy")
     options = {"generations": 5, "population": 8, "repeats": 1, "voyages": 1, "length": 20}
-    steps, found = curve.curves(agent, range(2), [1, 2], **options)
+    steps, found = curve.curves(agent, range(2), [1, 2], tmp_path / "kept", **options)
     assert steps.tolist() == [5 * 8 * 20]
     assert found.shape == (2, 1)
-    curve.draw(np.array([1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 3.0]]), "two seeds", tmp_path / "curve.png")
+    agent.train = None  # what is there is not trained again
+    np.testing.assert_array_equal(curve.curves(agent, range(2), [1, 2], tmp_path / "kept")[1], found)
+    assert Policy.load(tmp_path / "kept" / "cross_entropy-1.npz").trained_on["seed"] == 1
+    two = np.array([1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 3.0]])
+    curve.draw({"one": two, "other": two}, "two seeds", tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 1000
 
 
@@ -65,7 +69,7 @@ def test_stable_baselines(example, tmp_path):
     pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
     module = example("stable_baselines")
     seen = []
-    options = {"num_envs": 4, "voyages": 2, "length": 20, "parts": 3}
+    options = {"num_envs": 4, "same": 2, "voyages": 2, "length": 20, "parts": 3}
     policy = module.train(steps=480, after=lambda done, p: seen.append((done, p)), **options)
     assert [done for done, _ in seen] == [160, 320, 480]
     assert [p.trained_on["steps"] for _, p in seen] == [160, 320, 480]
@@ -80,7 +84,7 @@ def test_a_policy_in_plain_arrays_is_the_network_of_the_library(example):
     """With its normalisation of observations, after some of them; it begins as the plain filter."""
     pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
     module = example("stable_baselines")
-    envs, model = module.made(num_envs=2, voyages=1, length=20)
+    envs, model = module.made(num_envs=2, same=2, voyages=1, length=20)
     observation = np.random.default_rng(1).normal(size=(50, 24)).astype(np.float32)
     told = module.record_of_training(module.FAMILY, 1)
     assert np.abs(module.policy_of(model, envs, told)(observation)).max() < 0.1

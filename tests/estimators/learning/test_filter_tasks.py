@@ -160,20 +160,26 @@ def test_disabled_voyages_stand_still_until_they_are_begun_anew(scenario):
     assert rewards[1] == 0.0
 
 
-def test_the_gain_is_the_reward_of_the_error_less_that_of_the_plain_filter(scenario):
-    def agent(_):
-        return np.array([0.5, -0.4, 0.3], np.float32)
-
+def test_the_gain_is_relative_to_the_plain_filter_and_to_what_errors_are_usual(scenario):
     def plain_filter(_):
         return np.zeros(3, np.float32)
 
-    env = FilterTaskEnv(scenario, reward="gain")
-    gain, nothing = episode(env, 3, agent)[0], episode(env, 3, plain_filter)[0]
-    env = FilterTaskEnv(scenario, reward="error")
-    error, plain_error = episode(env, 3, agent)[0], episode(env, 3, plain_filter)[0]
-    np.testing.assert_allclose(gain, error - plain_error, atol=1e-9)
-    assert np.abs(gain).max() > 0.1
+    def agent(_):
+        return np.array([0.5, -0.4, 0.3], np.float32)
+
+    env = FilterTaskEnv(scenario, reward="gain", reveal_truth=True)
+    nothing, before = episode(env, 3, plain_filter)
+    gain, infos = episode(env, 3, agent)
     assert np.abs(nothing).max() < 1e-6
+    assert np.abs(gain).max() > 0.02
+    alone, error = (np.array([info["error"] for info in found]) ** 2 for found in (before, infos))
+    ratio = np.exp(-2.0 * gain)  # (e^2 + r^2) / (p^2 + r^2)
+    moved = np.abs(ratio - 1.0) > 1e-3
+    usual = ((error - ratio * alone) / (ratio - 1.0))[moved]
+    least = np.cumsum(alone)[moved] / (1.0 + np.flatnonzero(moved))  # without the oracle's variance
+    assert (usual > least).all()
+    assert (usual < least + 100.0).all()
+    assert (np.sign(gain) == np.sign(alone - error))[moved].all()
 
 
 def test_the_labels_give_the_reward_of_detection(scenario):
