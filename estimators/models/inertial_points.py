@@ -24,7 +24,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import HEADING, observe_inertial
+from simnav.estimators.models.measurements import HEADING, NAVIGATION_STATES, SPEED_LOG, observe_inertial
 from simnav.estimators.models.points import PointModel
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import cross, rotation_coefficients
@@ -38,7 +38,7 @@ PIECE = 0.5
 
 
 @kernel()
-def _turn(dcm, r0, r1, r2, turned):  # type: ignore[no-untyped-def]
+def _turn(dcm: Array, r0: float, r1: float, r2: float, turned: Array) -> None:
     """``turned = exp(r x) dcm``."""
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
     for j in range(3):
@@ -49,9 +49,10 @@ def _turn(dcm, r0, r1, r2, turned):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8[:, ::1])")
-def propagate_points(  # type: ignore[no-untyped-def]
-    position, velocity, dcm, next_velocity, next_dcm, interval, gyro_decay, accelerometer_decay, errors
-):
+def propagate_points(
+    position: Array, velocity: Array, dcm: Array, next_velocity: Array, next_dcm: Array, interval: float,
+    gyro_decay: float, accelerometer_decay: float, errors: Array,
+) -> None:  # fmt: skip
     """Take points through one piece of a state's motion, in place.
 
     Parameters
@@ -131,9 +132,10 @@ def propagate_points(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def observe_points(  # type: ignore[no-untyped-def]
-    code, arm, bias_at, scale_at, position, velocity, dcm, rate, bias, calibration, errors, differences
-):
+def observe_points(
+    code: int, arm: Array, bias_at: int, scale_at: int, position: Array, velocity: Array, dcm: Array, rate: Array,
+    bias: Array, calibration: Array, errors: Array, differences: Array,
+) -> None:  # fmt: skip
     """What an instrument should read at points, minus what it should read at the state.
 
     In position and calibration the readings are linear (see the module), and so computed; the rest is the instrument's
@@ -153,11 +155,17 @@ def observe_points(  # type: ignore[no-untyped-def]
     at_state, reading = np.zeros(3), np.zeros(3)
     value = position  # any will do; for a fix, one nearby is the more accurate
     v, b, m = velocity.copy(), bias[:3].copy(), dcm.copy()
+    through = velocity.copy()  # the water, for a log
+    if code == SPEED_LOG and bias_at >= 0:
+        for j in range(2):
+            through[j] -= calibration[bias_at + 1 + j - NAVIGATION_STATES]
     # First the state, for the Jacobian; then the state as if calibrated, and the points likewise.
     for k in range(-2, errors.shape[0]):
+        if k == -1:
+            v[:] = through
         if k >= 0:
             for j in range(3):
-                v[j], b[j] = velocity[j] + errors[k, 3 + j], bias[j] + errors[k, 9 + j]
+                v[j], b[j] = through[j] + errors[k, 3 + j], bias[j] + errors[k, 9 + j]
             _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
         full = k == -2
         known = observe_inertial(

@@ -33,6 +33,8 @@ class Entrant:
         The class itself, where no other process can import it.
     point : str
         Entry point of another package that registers it; empty where there is none.
+    search : tuple of str
+        Folders in which the estimator's process looks for packages first.
     learned_from : tuple of pairs of int
         As of `simnav.estimator.Estimator`.
     """
@@ -44,6 +46,7 @@ class Entrant:
     source: str
     code: bytes = b""
     point: str = ""
+    search: tuple[str, ...] = ()
     learned_from: tuple[tuple[int, int], ...] = ()
 
     def find(self) -> type[Estimator]:

@@ -82,6 +82,9 @@ def command(
     sealed: Annotated[
         Path | None, typer.Option("--sealed", metavar="KEYFILE", help="Derive the seeds from the secret in this file.")
     ] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -99,11 +102,13 @@ def command(
                 workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
                 covariance_interval=covariance_interval, confinement=confinement, sealed=sealed,
                 backend=(Backend.DASK if scheduler else backend).value, scheduler=scheduler, shard=_shard(shard),
-                progress=campaign_progress(bar),
+                minutes=minutes, progress=campaign_progress(bar),
             )  # fmt: skip
         summary = report.summary
         out.document(report.to_dict())
         out.print(*ranking_tables(report.ranking), *failure_table(report.results))
+        if summary.left:
+            out.print(f"{summary.left} of {summary.total} runs are left; the same command continues")
         out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
                   f"{tables.duration(summary.seconds)})",
                   f"next:    simnav leaderboard {quote(str(summary.folder))}")  # fmt: skip

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.leaderboard.results.provenance import Provenance
+from simnav.scoring.consistency import ending
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -120,6 +121,11 @@ class Result:
         return self.key.rpartition("-")[0]
 
     @property
+    def ending(self) -> str:
+        """The status, or ``inconsistent`` (`simnav.scoring.consistency.ending`)."""
+        return ending(self.status, self.scores)
+
+    @property
     def tried(self) -> bool:
         """Whether the run says something about the estimator."""
         return self.status not in NO_TRIAL
@@ -201,11 +207,12 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
             yield table.replace_schema_metadata(schema().metadata)
 
 
-def write_tables(file: BinaryIO, tables: Iterator[pa.Table]) -> None:
-    """Write a file of results, with check sums."""
+def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | None = None) -> None:
+    """Write a file of results, with check sums; ``level`` is that of the compression."""
     import pyarrow.parquet as pq
 
-    with pq.ParquetWriter(file, schema(), compression="zstd", write_page_checksum=True) as writer:
+    options = {"compression": "zstd", "compression_level": level, "write_page_checksum": True}
+    with pq.ParquetWriter(file, schema(), **options) as writer:
         for table in tables:
             writer.write_table(table)
 
