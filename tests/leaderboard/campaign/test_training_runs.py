@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import pickle
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,7 @@ import pytest
 from simnav.environment.seeds import FIRST_TRAINING_SEED, training_seed
 from simnav.estimator import make
 from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.confinement.estimator_process import _Session
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.training_runs import ranges_of, require_unseen, told_of
@@ -63,15 +67,24 @@ def test_the_policy_that_comes_along_is_not_scored_on_its_training_voyages(tmp_p
         run_campaign([family], [policy], [3, FIRST_TRAINING_SEED], tmp_path / "out", workers=1)
 
 
+@pytest.mark.usefixtures("clean_registry")
 @pytest.mark.parametrize(
     ("ranges", "message"),
     [("[(3, 5)]", "'learned' has learned from .* seed 3 of"), ("7", "learned_from should hold at most 1000 pairs")],
 )
-def test_an_estimator_of_others_tells_it_too(tmp_path: Path, ranges: str, message: str) -> None:
+def test_an_estimator_of_others_tells_it_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ranges: str, message: str
+) -> None:
     (tmp_path / "learned.py").write_text(LEARNED.format(ranges=ranges))
     mine = EstimatorRequest(str(tmp_path / "learned.py"))
     with pytest.raises(RequestError, match=message):
-        run_campaign([load("gnss-noise-step")], [mine], range(4), tmp_path / "out", workers=1, confinement="process")
+        run_campaign([load("gnss-noise-step")], [mine], range(4), tmp_path / "out", workers=1, confinement="none")
+    session = _Session()
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    name = f"{tmp_path / 'learned.py'}"
+    reply = session.describe(pickle.dumps((Entrant(name, {}, "learned", False, ""), sys.path, [0])))
+    told = json.loads(reply[reply.index(b"{") :])
+    assert told["learned_from"] == ([[3, 5]] if ranges.startswith("[") else "TypeError: 'int' object is not iterable")
 
 
 @pytest.mark.parametrize("told", [None, "text", [[1]], [[1, 2.5]], [[True, 2]], [[1, 2]] * 1001])
