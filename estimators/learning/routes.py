@@ -47,7 +47,7 @@ class Routes:
         self.of[b] = 0 if shared else b
         if shared and len(self.length):
             return
-        track = _planned(drawn, template.content_hash()) if shared else _plan(drawn)
+        track = _planned(drawn)
         keep = np.concatenate([[True], np.hypot(*np.diff(track.points[:, :2], axis=0).T) > 0.05])
         position, points = track.position[keep], track.points[keep]
         steps = relative_position(position[1:], position[:-1])[:, :2]
@@ -67,22 +67,19 @@ class Routes:
         self.along[r, :k] = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
 
-def _plan(scenario: Scenario) -> PlannedTrack:
-    assert scenario.start is not None
-    track = World.plan(scenario.start, scenario.vessel or Vessel(), scenario.manoeuvres, scenario.current)
-    track.reach(scenario.duration)
-    return track
-
-
 _tracks: dict[str, PlannedTrack] = {}
 
 
-def _planned(scenario: Scenario, key: str) -> PlannedTrack:
-    """The track of a scenario in which nothing is drawn: planned once, since that of half a day takes a second."""
+def _planned(scenario: Scenario) -> PlannedTrack:
+    """The track that the manoeuvres plan; the last ones are kept, since that of half a day takes half a second."""
+    assert scenario.start is not None
+    told = scenario.start, scenario.vessel or Vessel(), scenario.manoeuvres, scenario.current
+    key = repr((told, scenario.duration))
     if key not in _tracks:
         if len(_tracks) > 4:
             _tracks.pop(next(iter(_tracks)))
-        _tracks[key] = _plan(scenario)
+        _tracks[key] = track = World.plan(*told)
+        track.reach(scenario.duration)
     return _tracks[key]
 
 
