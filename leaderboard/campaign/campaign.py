@@ -48,8 +48,8 @@ RUNS = 50
 #: Memory that an estimator may take, by default [bytes].
 MEMORY = 2 << 30
 
-_IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
 _RESTARTS = 3  # of the workers, where one died
+_GATHERED = 5000  # results that are gathered into one file meanwhile, so that a killed campaign is soon read again
 
 
 class CampaignError(RuntimeError):
@@ -243,7 +243,8 @@ def run_campaign(
     path = store.create(Path(folder).resolve())
     endings = store.keys(path)
     simulator = simulator_version()
-    entrants = [resolve(request, chosen, path, workers == 1 and backend == "loky") for request in estimators]
+    hidden = [path] if seal is None or seal.file is None else [path, seal.file]
+    entrants = [resolve(request, chosen, hidden, workers == 1 and backend == "loky") for request in estimators]
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     if seal is not None:
         recordings = {name: digest(known, "sealed", seal.hash) for name, known in recordings.items()}
@@ -300,11 +301,15 @@ def run_campaign(
                 trials.discard(path, key)
         _compile(report)
         run_started = time.monotonic()
-        weight, left = 0.0, plan.weight
+        weight, left, loose = 0.0, plan.weight, 0
         report(Progress("run", skipped, total))
         with contextlib.closing(_outcomes(plan.units(unit), path, workers, backend, scheduler)) as outcomes:
             for done_unit, outcome in outcomes:
                 statuses.update(outcome)
+                loose += outcome.total()
+                if loose >= _GATHERED:
+                    store.compact(path)
+                    loose = 0
                 weight, left = weight + done_unit.weight, left - done_unit.weight
                 elapsed = time.monotonic() - run_started
                 failed = Summary(path, total, skipped, statuses, 0.0).failed

@@ -26,9 +26,12 @@ class Seal:
     ----------
     key : bytes
         32 bytes, from the content of the file.
+    file : Path, optional
+        That estimators must not read.
     """
 
     key: bytes
+    file: Path | None = None
 
     def __repr__(self) -> str:
         return f"Seal({self.hash})"  # a key in a traceback would be a key that is published
@@ -71,4 +74,4 @@ def read_seal(path: str | os.PathLike[str]) -> Seal:
         raise RequestError(
             f"the key file {file} holds {len(content)} bytes; a key has {_LEAST} to {_MOST}, drawn at random"
         )
-    return Seal(hashlib.blake2b(content, digest_size=32, person=b"simnav key").digest())
+    return Seal(hashlib.blake2b(content, digest_size=32, person=b"simnav key").digest(), file.resolve())

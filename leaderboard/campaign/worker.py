@@ -88,6 +88,12 @@ class Unit:
     seal: Seal | None = None
 
     @property
+    def hidden(self) -> tuple[Path, ...]:
+        """What estimators must not read: other results, the trials that are kept, and a secret key."""
+        key = None if self.seal is None else self.seal.file
+        return (self.folder,) if key is None else (self.folder, key)
+
+    @property
     def weight(self) -> float:
         """About how much work it is."""
         return self.scenario.duration * len(self.entrants)
@@ -119,7 +125,7 @@ def _prepare_worker(unit: Unit) -> None:
     """Once a worker: Ctrl-C is the parent's business, and it ends when the parent is gone."""
     global _prepared
     if unit.confinement != "none":
-        prepare(unit.confinement, unit.folder)  # loads its kernels while the first recording is made
+        prepare(unit.confinement, unit.hidden)  # loads its kernels while the first recording is made
     if _prepared:
         return
     _prepared = True
@@ -180,7 +186,8 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
         made = _in_a_fork(unit, entrant, recording)
     else:
         limits = Limits(unit.timeout, unit.memory)
-        made = attempt(prepare(unit.confinement, unit.folder), entrant, recording, limits)
+        server = prepare(unit.confinement, unit.hidden, sealed=unit.seal is not None)
+        made = attempt(server, entrant, recording, limits)
     trial = made.trial
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),

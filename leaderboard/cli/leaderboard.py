@@ -29,6 +29,7 @@ def command(
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.papers.page import find
+        from simnav.leaderboard.ranking.confinement import confined, confinement_line
         from simnav.leaderboard.ranking.failures import failure_table, failures
         from simnav.leaderboard.ranking.ranking_table import ranking_tables
         from simnav.leaderboard.site.site import build
@@ -40,5 +41,9 @@ def command(
                 found, ranking, output, progress=progress, workers=workers, papers=find(papers), runs_shown=runs_shown,
                 figures=figures,
             )  # fmt: skip
-        out.document({"site": str(index), "runs": len(found), "failed": failures(found), "ranking": ranking.to_dict()})
-        out.print(*ranking_tables(ranking), *failure_table(found), f"site: {index}")
+        out.document({
+            "site": str(index), "runs": len(found), "failed": failures(found), "confinement": confined(found),
+            "ranking": ranking.to_dict(),
+        })  # fmt: skip
+        out.print(*ranking_tables(ranking), *failure_table(found), *filter(None, [confinement_line(found)]))
+        out.print(f"site: {index}")

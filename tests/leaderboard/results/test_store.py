@@ -199,6 +199,8 @@ def test_damaged_files_are_set_aside(folder: Path, damage: str, compacted: bool)
 
         pq.write_table(pa.table({"key": ["a"]}), victim)
     with pytest.warns(StoreWarning, match=victim.name):
+        if compacted and damage == "flipped":  # a scan of keys reads no other column of a part
+            assert len(store.load(folder)) == 2
         there = store.keys(folder)
     assert len(there) == 2
     aside = victim.with_name(victim.name + ".broken")
