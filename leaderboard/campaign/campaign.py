@@ -29,11 +29,11 @@ from simnav.leaderboard.campaign.fingerprint import (
 )
 from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
 from simnav.leaderboard.campaign.plan import Plan, in_part
+from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.resolution import resolve, variant_of
 from simnav.leaderboard.campaign.seal import Seal
-from simnav.leaderboard.campaign.sources import digest
 from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -41,7 +41,7 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["CampaignError", "Progress", "Summary", "run_campaign", "time_limit"]
+__all__ = ["CampaignError", "Progress", "Summary", "run_campaign"]
 
 #: Seeds of a campaign, by default.
 RUNS = 50
@@ -127,11 +127,6 @@ def combined(summaries: Sequence[Summary]) -> Summary:
         statuses.update(s.statuses)
     total, skipped = sum(s.total for s in summaries), sum(s.skipped for s in summaries)
     return Summary(summaries[0].folder, total, skipped, dict(statuses), sum(s.seconds for s in summaries))
-
-
-def time_limit(scenario: Scenario) -> float:
-    """Default time that an estimator may take for a run [s]: a fifth of real time, at least a minute."""
-    return max(60.0, 0.2 * scenario.duration)
 
 
 def run_campaign(
@@ -247,7 +242,7 @@ def run_campaign(
     entrants = [resolve(request, chosen, hidden, workers == 1 and backend == "loky") for request in estimators]
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     if seal is not None:
-        recordings = {name: digest(known, "sealed", seal.hash) for name, known in recordings.items()}
+        recordings = {name: seal.recording(known) for name, known in recordings.items()}
     variants = {
         s.id: {e.label: variant_of(e, recordings[s.id]) for e in entrants} for s in scenarios
     }  # scenario -> label -> variant
@@ -271,7 +266,7 @@ def run_campaign(
         if scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
     }
     if stale:  # a score was edited: the trials that were kept have all that it needs
-        rescore_results(path, scenarios=scenarios, keys=stale)
+        rescore_results(path, scenarios=scenarios, keys=stale, seal=seal)
         endings = store.keys(path)
 
     def limit(scenario: Scenario) -> float:

@@ -11,6 +11,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from simnav.leaderboard.campaign.sources import digest
 from simnav.leaderboard.results.errors import RequestError
 
 __all__ = ["Seal", "read_seal"]
@@ -40,6 +41,10 @@ class Seal:
     def hash(self) -> str:
         """What results carry: a hash of the key from which it cannot be found."""
         return hashlib.blake2b(self.key, digest_size=16, person=b"simnav seal").hexdigest()
+
+    def recording(self, known: str) -> str:
+        """The digest of sealed recordings of a scenario, from that of its public ones."""
+        return digest(known, "sealed", self.hash)
 
     def seed(self, scenario: str, number: int) -> int:
         """The seed of a run.

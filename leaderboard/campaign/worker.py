@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import random
 import signal
@@ -19,9 +20,9 @@ from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import OwnScores
+from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
 from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.results import store, trials
-from simnav.leaderboard.results.errors import sentence
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 
@@ -129,19 +130,26 @@ def _prepare_worker(unit: Unit) -> None:
     if _prepared:
         return
     _prepared = True
+    _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
     if os.getpid() != unit.parent:
         with contextlib.suppress(ValueError):  # not in the main thread of a Dask worker
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         if os.getppid() == unit.parent:
             threading.Thread(target=_end_with, args=(unit.parent,), daemon=True).start()
-    from simnav.estimator.registry import discover_own
-    from simnav.warmup import warmup
 
+
+def _load(estimators: bool) -> None:
+    """Load the kernels of what is made in forks of this process: of recordings, and of references if there are any."""
+    from simnav.compiled import kernels
+    from simnav.estimator.registry import discover_own
+
+    importlib.import_module("simnav.simulator")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if unit.confinement == "none":  # estimators are forked from here
-            warmup(load=True)
         discover_own()
+        for kernel in kernels():
+            if estimators or not kernel.__module__.startswith("simnav.estimators."):
+                kernel.compile()
 
 
 def _end_with(parent: int) -> None:
@@ -154,17 +162,15 @@ def _end_with(parent: int) -> None:
 
 def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     """Record a run and try everyone on it; return how many ended how."""
-    from simnav.source import record
-
     _prepare_worker(unit)
     unit.scores.register()
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
     try:
         seed = unit.seed if unit.seal is None else unit.seal.seed(unit.scenario.id, unit.seed)
-        recording = record(unit.scenario, seed)
-    except Exception as error:
-        reason = f"no recording: {sentence(error)}"
+        recording = record_within(unit.scenario, seed, max(unit.timeout, time_limit(unit.scenario)))
+    except NoRecordingError as error:
+        reason = f"no recording: {error}"
         for entrant, key in unit.entrants:
             store.write(unit.folder, unit.result(entrant, key, "no-recording", reason))
             statuses["no-recording"] += 1

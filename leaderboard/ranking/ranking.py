@@ -39,8 +39,8 @@ from simnav.leaderboard.ranking.board import (
     TrackRanking,
     TrackRow,
 )
-from simnav.leaderboard.ranking.plausibility import too_good
 from simnav.leaderboard.ranking.identity import real_time_twin
+from simnav.leaderboard.ranking.plausibility import too_good
 from simnav.leaderboard.ranking.reference import reference_of
 from simnav.leaderboard.ranking.remarks import reference_remarks, remarks
 from simnav.leaderboard.ranking.runs import Runs, group

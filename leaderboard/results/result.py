@@ -17,7 +17,19 @@ from simnav.leaderboard.results.provenance import Provenance
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["BATCH", "FORMAT", "NO_TRIAL", "READABLE", "Result", "batches", "listed", "rows", "schema", "to_table", "write_tables"]
+__all__ = [
+    "BATCH",
+    "FORMAT",
+    "NO_TRIAL",
+    "READABLE",
+    "Result",
+    "batches",
+    "listed",
+    "rows",
+    "schema",
+    "to_table",
+    "write_tables",
+]
 
 #: Version of the format of results, and those that can be read.
 FORMAT = 4

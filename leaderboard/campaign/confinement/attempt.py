@@ -94,9 +94,7 @@ def chosen_confinement(asked: str = "auto") -> str:
         "process" if asked == "auto" else asked)  # fmt: skip
 
 
-def prepare(
-    confinement: str, hidden: Sequence[Path], *, loaded: bool = True, sealed: bool = False
-) -> EstimatorServer:
+def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, sealed: bool = False) -> EstimatorServer:
     """The server of this process: the one that is there, or a new one that begins to load its kernels.
 
     Parameters

@@ -198,10 +198,10 @@ def test_damaged_files_are_set_aside(folder: Path, damage: str, compacted: bool)
         import pyarrow.parquet as pq
 
         pq.write_table(pa.table({"key": ["a"]}), victim)
+    noticed = store.load if compacted and damage == "flipped" else store.keys  # which reads the keys of parts only
     with pytest.warns(StoreWarning, match=victim.name):
-        if compacted and damage == "flipped":  # a scan of keys reads no other column of a part
-            assert len(store.load(folder)) == 2
-        there = store.keys(folder)
+        noticed(folder)
+    there = store.keys(folder)
     assert len(there) == 2
     aside = victim.with_name(victim.name + ".broken")
     assert aside.exists()
