@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+from simnav.leaderboard.campaign.confinement.session import ServerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import (
     recording_digest,
@@ -239,7 +240,10 @@ def run_campaign(
     endings = store.keys(path)
     simulator = simulator_version()
     hidden = [path] if seal is None or seal.file is None else [path, seal.file]
-    entrants = [resolve(request, chosen, hidden, workers == 1 and backend == "loky") for request in estimators]
+    try:
+        entrants = [resolve(request, chosen, hidden, workers == 1 and backend == "loky") for request in estimators]
+    except ServerError as error:
+        raise CampaignError(str(error)) from None
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     if seal is not None:
         recordings = {name: seal.recording(known) for name, known in recordings.items()}
@@ -376,6 +380,8 @@ def _outcomes(
             for index, outcome in _parallel(dispatched(), workers, backend, scheduler):
                 yield left.pop(index), outcome
             return
+        except ServerError as error:
+            raise CampaignError(f"{error}; what is done is on disk") from None
         except BrokenProcessPool:
             endings = store.keys(folder)  # some of it was finished, and could not be told any more
             for index, unit in list(left.items()):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
-import random
 import signal
 import threading
 import time
@@ -15,10 +14,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, close_server, prepare, seed_words
+from simnav.leaderboard.campaign.attempts import try_estimator
+from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
 from simnav.leaderboard.campaign.seal import Seal
@@ -29,7 +28,6 @@ from simnav.leaderboard.results.result import Result
 if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
-    from simnav.trial import Trial
 
 __all__ = ["Unit", "run_unit"]
 
@@ -188,12 +186,10 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
 
     from simnav.scoring import score, series
 
-    if unit.confinement == "none" or entrant.reference:
-        made = _in_a_fork(unit, entrant, recording)
-    else:
-        limits = Limits(unit.timeout, unit.memory)
-        server = prepare(unit.confinement, unit.hidden, sealed=unit.seal is not None)
-        made = attempt(server, entrant, recording, limits)
+    limits = Limits(unit.timeout, unit.memory)
+    made = try_estimator(
+        entrant, recording, limits, unit.confinement, unit.hidden, sealed=unit.seal is not None
+    )  # fmt: skip
     trial = made.trial
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),
@@ -217,23 +213,3 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
         scoring=unit.scoring if scores else blank.scoring,
         series={name: np.asarray(values, dtype=np.float32) for name, values in curves.items()},
     )
-
-
-def _in_a_fork(unit: Unit, entrant: Entrant, recording: Recording) -> Attempt:
-    """Run an estimator in a process that has the recording: simnav's own references, or any where asked for."""
-    outcome = isolate(_attempt, entrant, recording, timeout=unit.timeout, memory=unit.memory)
-    trial: Trial | None = outcome.value if outcome.status == "ok" else None
-    status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
-    return Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
-
-
-def _attempt(entrant: Entrant, recording: Recording) -> Trial:
-    """In the isolated process: make the estimator and run it."""
-    import numpy as np
-
-    from simnav.trial import run_trial
-
-    words = seed_words(recording, entrant)
-    random.seed(sum(word << 32 * k for k, word in enumerate(words)))
-    np.random.seed(words)  # noqa: NPY002
-    return run_trial(entrant.make(), recording)

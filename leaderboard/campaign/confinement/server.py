@@ -25,6 +25,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from simnav.leaderboard.campaign.confinement import seccomp
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES, live
 from simnav.leaderboard.campaign.confinement.landlock import Unreadable, restrict
 from simnav.leaderboard.campaign.confinement.limits import (
@@ -183,6 +184,7 @@ def _become_estimator(
         os.chdir(asked["folder"])
     if asked["landlock"]:
         restrict(writable)
+    seccomp.deny()
     limit(asked["timeout"], asked["memory"])
     live(down, up)
     os._exit(0)

@@ -40,7 +40,7 @@ _ENVIRONMENT = (
     "CUDA_VISIBLE_DEVICES",
 )  # fmt: skip
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "NUMBA_NUM_THREADS")
-_START = 180.0  # for a server to be ready, compiling included [s]
+_START = 600.0  # for a server to be ready, compiling included [s]
 _END = 20.0  # for a server to look after what is left of an estimator process [s]
 _PIECE = 1 << 16
 _TICK = 1000.0  # the longest wait between two looks at the clock [ms]
