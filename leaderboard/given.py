@@ -30,7 +30,9 @@ def scenario_of(given: ScenarioLike) -> Scenario:
         return load(given)
 
 
-def scenarios_of(given: Scenarios, *, note: Callable[[str], None] | None = None) -> list[Scenario]:
+def scenarios_of(
+    given: Scenarios, *, note: Callable[[str], None] | None = None, optional: bool = False
+) -> list[Scenario]:
     """The requested scenarios; without a request, those of the catalogue.
 
     Of the catalogue, families for training are left out, and logs whose files are not here.
@@ -41,6 +43,8 @@ def scenarios_of(given: Scenarios, *, note: Callable[[str], None] | None = None)
         A text may name several, separated by commas. The name of a track stands for its scenarios.
     note : callable, optional
         Called with a sentence on what is left out; default: a warning.
+    optional : bool
+        Leave out logs whose files are not here also where they were asked for.
     """
     from simnav.scenario import headers, names
 
@@ -63,7 +67,7 @@ def scenarios_of(given: Scenarios, *, note: Callable[[str], None] | None = None)
             try:
                 open_source(chosen, 0)
             except (ValueError, OSError) as error:
-                if asked:
+                if asked and not optional:
                     raise RequestError(sentence(error)) from error
                 _note(note, f"{chosen.name} is left out: {sentence(error)}")
                 continue

@@ -6,6 +6,7 @@ These are calls of `simnav.leaderboard.interface`, which has them under its own 
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -74,7 +75,7 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     Parameters
     ----------
     folders : iterable of path
-        They stay as they are.
+        They stay as they are. A bundle of `simnav.submit` stands for its results; verify it first.
     output : path
         New, or a folder of results, which are kept.
 
@@ -91,9 +92,15 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     """
     from simnav.leaderboard.results.gathering import gather
     from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.submission.bundle import open_bundle
 
-    with mistakes(StoreError):
-        target = gather(absolute(output), [absolute(folder) for folder in folders])
+    with tempfile.TemporaryDirectory(prefix="simnav-merge-") as scratch, mistakes(StoreError):
+        paths = [absolute(folder) for folder in folders]
+        places = [
+            open_bundle(path, Path(scratch) / str(k)).results if path.is_file() else path
+            for k, path in enumerate(paths)
+        ]
+        target = gather(absolute(output), places)
     return results_of(target)
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -334,6 +335,7 @@ def campaign(
     confinement: str = "auto",
     sealed: str | os.PathLike[str] | None = None,
     oracle: bool = True,
+    minutes: float | None = None,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run estimators on scenarios and seeds. Started again, the campaign continues.
@@ -369,6 +371,8 @@ def campaign(
         File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
     oracle : bool
         Run the oracles on simulated scenarios, too: what is best there, not ranked.
+    minutes : float, optional
+        Time after which no further run is started. The same call continues.
 
     Returns
     -------
@@ -387,14 +391,16 @@ def campaign(
         parts = [(scenarios or p.scenarios, estimators or p.estimators, runs or p.runs) for p in load(profile).parts]
     folder, summaries, seal = absolute(output), [], None if sealed is None else read_seal(sealed)
     tracks: dict[str, str] = {}
+    began = time.monotonic()
     for wanted, those, count in parts:
-        chosen, everyone = scenarios_of(wanted), requests(those, parameters)
+        chosen, everyone = scenarios_of(wanted, optional=profile is not None), requests(those, parameters)
         tracks |= {s.id: s.track for s in chosen}
         for some, beside in beside_oracles(chosen, everyone) if oracle else [(chosen, everyone)]:
             summaries.append(_run(some, beside, range(seed, seed + count), folder, workers, time_limit, memory_limit,
                                   progress, retry=retry, keep_trials=keep_trials,
                                   covariance_interval=covariance_interval, confinement=confinement, seal=seal,
-                                  backend=backend, scheduler=scheduler, shard=shard))  # fmt: skip
+                                  backend=backend, scheduler=scheduler, shard=shard,
+                                  minutes=_left(minutes, began)))  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks=tracks), combined(summaries))
 
@@ -558,6 +564,11 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
         return
     with tempfile.TemporaryDirectory(prefix="simnav-evaluate-") as name:
         yield Path(name) / "results"
+
+
+def _left(minutes: float | None, began: float) -> float | None:
+    """What is left of some minutes."""
+    return None if minutes is None else max(0.0, minutes - (time.monotonic() - began) / 60.0)
 
 
 def _run(

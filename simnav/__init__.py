@@ -88,6 +88,7 @@ __all__ = [
     "bound",
     "campaign",
     "check",
+    "check_standard",
     "cite",
     "evaluate",
     "load",
@@ -96,6 +97,7 @@ __all__ = [
     "merge",
     "names",
     "open_source",
+    "publish_standard",
     "rank",
     "record",
     "register",
@@ -105,11 +107,14 @@ __all__ = [
     "reproduce",
     "rescore",
     "run",
+    "run_standard",
     "run_trial",
     "score",
+    "submit",
     "sweep",
     "tune",
     "verify",
+    "verify_bundle",
 ]
 
 # Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
@@ -158,6 +163,7 @@ _HOMES = {
         "tune",
         "verify",
     ),
+    "leaderboard.publishing": ("check_standard", "publish_standard", "run_standard", "submit", "verify_bundle"),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -24,15 +24,20 @@ import types
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array", "Kernel", "cache_directory", "kernel", "kernels", "prune"]
+__all__ = ["Array", "Flags", "Integers", "Kernel", "cache_directory", "kernel", "kernels", "prune"]
 
 #: What kernels, and everything else in simnav, work on.
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+Parameters = ParamSpec("Parameters")
+Returned = TypeVar("Returned")
 
 #: Cache directories that were not used for this long are deleted by `prune` [s].
 KEEP = 60 * 86400.0
@@ -40,7 +45,7 @@ KEEP = 60 * 86400.0
 #: What loading a truncated or empty file of the cache raises.
 _DAMAGED = (EOFError, pickle.UnpicklingError, UnicodeDecodeError, IndexError, KeyError, struct.error)
 
-_kernels: list[Kernel] = []
+_kernels: list[Kernel[..., Any]] = []
 _compiling = threading.RLock()  # Numba takes the cache directory from a global setting
 
 
@@ -80,7 +85,7 @@ def _cache_directory(chosen: str, xdg: str) -> Path | None:
     return None
 
 
-class Kernel:
+class Kernel(Generic[Parameters, Returned]):
     """A function that Numba compiles on first use.
 
     Parameters
@@ -94,8 +99,9 @@ class Kernel:
         Liberties with floating-point arithmetic, handed to Numba.
     """
 
-    def __init__(self, function: types.FunctionType, signature: str | None, fastmath: bool | set[str]):
-        self.function = function
+    def __init__(self, function: Callable[Parameters, Returned], signature: str | None, fastmath: bool | set[str]):
+        assert isinstance(function, types.FunctionType)
+        self.function: types.FunctionType = function
         self.signature = signature
         self.fastmath = fastmath
         self._dispatcher: Callable[..., Any] | None = None
@@ -111,10 +117,10 @@ class Kernel:
     def __reduce__(self) -> str:
         return self.__qualname__  # pickled by name, like a function
 
-    def tree(self) -> list[Kernel]:
+    def tree(self) -> list[Kernel[..., Any]]:
         """This kernel and all that it calls, directly or not."""
-        found: list[Kernel] = []
-        todo: list[Kernel] = [self]
+        found: list[Kernel[..., Any]] = []
+        todo: list[Kernel[..., Any]] = [self]
         while todo:
             k = todo.pop()
             if k not in found:
@@ -224,8 +230,14 @@ class Kernel:
             config.CACHE_DIR = previous
         return compiled
 
-    def __call__(self, *args: Any) -> Any:
-        return (self._dispatcher or self.compile())(*args)
+    if TYPE_CHECKING:
+
+        def __call__(self, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Returned: ...
+
+    else:
+
+        def __call__(self, *args: Any) -> Any:
+            return (self._dispatcher or self.compile())(*args)
 
 
 def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
@@ -285,7 +297,7 @@ def _value_text(value: Any) -> list[str]:
 
 def kernel(
     signature: str | None = None, *, fastmath: bool | set[str] = False
-) -> Callable[[Callable[..., Any]], Kernel]:
+) -> Callable[[Callable[Parameters, Returned]], Kernel[Parameters, Returned]]:
     """Make a function a `Kernel`.
 
     Parameters
@@ -297,8 +309,7 @@ def kernel(
         Handed to Numba.
     """
 
-    def wrap(function: Callable[..., Any]) -> Kernel:
-        assert isinstance(function, types.FunctionType)
+    def wrap(function: Callable[Parameters, Returned]) -> Kernel[Parameters, Returned]:
         k = Kernel(function, signature, fastmath)
         _kernels.append(k)
         return k
@@ -306,7 +317,7 @@ def kernel(
     return wrap
 
 
-def kernels() -> list[Kernel]:
+def kernels() -> list[Kernel[..., Any]]:
     """All kernels of the modules imported so far that can be compiled ahead."""
     return [k for k in _kernels if k.signature is not None]
 

@@ -41,7 +41,7 @@ __all__ = ["increments", "integrate", "mechanize", "mechanize_step", "sample_fro
 
 
 @kernel()
-def local_rates(latitude, height, vm0, vm1, vm2, dt):  # type: ignore[no-untyped-def]
+def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: float, dt: float) -> tuple[float, ...]:
     """Earth and transport rate, gravity and radii at the middle of an interval that starts at a latitude and height.
 
     Returns
@@ -71,7 +71,10 @@ def local_rates(latitude, height, vm0, vm1, vm2, dt):  # type: ignore[no-untyped
 
 
 @kernel()
-def mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt):  # type: ignore[no-untyped-def]
+def mechanize_step(
+    position: Array, velocity: Array, dcm: Array, memory: Array, w0: float, w1: float, w2: float, f0: float, f1: float,
+    f2: float, dt: float,
+) -> None:  # fmt: skip
     """One interval of the mechanization (equations in the module), in place.
 
     Parameters
@@ -135,7 +138,7 @@ def mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt):
 
 
 @kernel()
-def rotate_right(dcm, r0, r1, r2, a, b):  # type: ignore[no-untyped-def]
+def rotate_right(dcm: Array, r0: float, r1: float, r2: float, a: float, b: float) -> None:
     """``dcm = dcm exp(r x)`` in place, with the coefficients a, b of `rotation_coefficients`."""
     for i in range(3):
         c0, c1, c2 = dcm[i, 0], dcm[i, 1], dcm[i, 2]
@@ -148,7 +151,10 @@ def rotate_right(dcm, r0, r1, r2, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
-def mechanize(position, velocity, dcm, memory, angular_rate, specific_force, interval):  # type: ignore[no-untyped-def]
+def mechanize(
+    position: Array, velocity: Array, dcm: Array, memory: Array, angular_rate: Array, specific_force: Array,
+    interval: Array,
+) -> None:  # fmt: skip
     """Integrate n IMU samples, in place.
 
     Parameters
@@ -174,7 +180,10 @@ def mechanize(position, velocity, dcm, memory, angular_rate, specific_force, int
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
-def _integrate(position, velocity, dcm, angular_rate, specific_force, interval, positions, velocities, dcms):  # type: ignore[no-untyped-def]
+def _integrate(
+    position: Array, velocity: Array, dcm: Array, angular_rate: Array, specific_force: Array, interval: Array,
+    positions: Array, velocities: Array, dcms: Array,
+) -> None:  # fmt: skip
     memory = np.zeros(6)
     for k in range(interval.size):
         mechanize_step(
@@ -220,7 +229,10 @@ def integrate(position: Array, velocity: Array, attitude: Array, samples: ImuSam
 
 
 @kernel()
-def sample_from_motion(latitude, height, v, w, c, d, memory, dt):  # type: ignore[no-untyped-def]
+def sample_from_motion(
+    latitude: float, height: float, v: tuple[float, float, float], w: tuple[float, float, float], c: tuple[float, ...],
+    d: tuple[float, ...], memory: Array, dt: float,
+) -> tuple[float, ...]:  # fmt: skip
     """What perfect instruments deliver over one interval: the exact inverse of `mechanize_step`.
 
     Parameters
@@ -308,7 +320,9 @@ def sample_from_motion(latitude, height, v, w, c, d, memory, dt):  # type: ignor
 
 
 @kernel()
-def _rotated(z0, z1, z2, a, b, c0, c1, c2):  # type: ignore[no-untyped-def]
+def _rotated(
+    z0: float, z1: float, z2: float, a: float, b: float, c0: float, c1: float, c2: float
+) -> tuple[float, float, float]:
     """``exp(z x) c`` with the coefficients a, b of `rotation_coefficients`."""
     x0, x1, x2 = cross(z0, z1, z2, c0, c1, c2)
     y0, y1, y2 = cross(z0, z1, z2, x0, x1, x2)
@@ -316,7 +330,9 @@ def _rotated(z0, z1, z2, a, b, c0, c1, c2):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _increments(time, velocity, dcm, memory, position, angular_rate, specific_force):  # type: ignore[no-untyped-def]
+def _increments(
+    time: Array, velocity: Array, dcm: Array, memory: Array, position: Array, angular_rate: Array, specific_force: Array
+) -> None:
     for k in range(time.size - 1):
         dt = time[k + 1] - time[k]
         a, b = dcm[k], dcm[k + 1]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Array
+from simnav.compiled import Array, Flags, Integers
 from simnav.kinds import KINDS, Kind, Role
 
 __all__ = [
@@ -25,10 +25,12 @@ __all__ = [
     "Array",
     "Datasheet",
     "Estimate",
+    "Flags",
     "ImuDatasheet",
     "ImuSamples",
     "InitialState",
     "Instruments",
+    "Integers",
     "Kind",
     "Measurement",
     "Measurements",

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
 from simnav.compiled import Kernel, kernels, prune
 
@@ -52,7 +53,7 @@ def warmup(progress: Callback | None = None, *, load: bool = True, processes: in
             report(done, len(every), _name(kernel))
 
 
-def _name(kernel: Kernel) -> str:
+def _name(kernel: Kernel[..., Any]) -> str:
     return f"{kernel.__module__}.{kernel.__name__}"
 
 
@@ -83,7 +84,7 @@ def _try_import(name: str) -> None:
         warnings.warn(f"{name} cannot be imported, so its kernels are not compiled ahead: {error}", stacklevel=3)
 
 
-def _compile_beside(missing: list[Kernel], processes: int) -> Iterator[str]:
+def _compile_beside(missing: list[Kernel[..., Any]], processes: int) -> Iterator[str]:
     """Compile kernels in several forked processes, which leave them in the cache; yield their names.
 
     Where processes cannot be forked, or one dies, the rest is left to the caller.
@@ -104,10 +105,10 @@ def _compile_beside(missing: list[Kernel], processes: int) -> Iterator[str]:
         _todo.clear()
 
 
-_todo: list[Kernel] = []
+_todo: list[Kernel[..., Any]] = []
 
 
-def _size(kernel: Kernel) -> int:
+def _size(kernel: Kernel[..., Any]) -> int:
     """About how long it takes to compile: the code of a kernel and of all that it calls."""
     return sum(len(k.function.__code__.co_code) for k in kernel.tree())
 

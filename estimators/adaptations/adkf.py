@@ -50,7 +50,7 @@ FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
 
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
-def _printed_residual(residual, predicted, noise):  # type: ignore[no-untyped-def]
+def _printed_residual(residual: Array, predicted: Array, noise: Array) -> float:
     """Eq. 31: v'v / sqrt(tr S)."""
     square, trace = 0.0, 0.0
     for i in range(residual.size):

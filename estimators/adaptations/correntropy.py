@@ -16,9 +16,10 @@ __all__ = ["MaximumCorrentropy", "correntropy_noise"]
 
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, i8, b1, f8[:, ::1])")
-def correntropy_noise(  # type: ignore[no-untyped-def]
-    innovation, predicted, nominal, bandwidth, smallest, iterations, from_update, noise
-):
+def correntropy_noise(
+    innovation: Array, predicted: Array, nominal: Array, bandwidth: float, smallest: float, iterations: int,
+    from_update: bool, noise: Array,
+) -> float:  # fmt: skip
     """The fixed-point iteration (see `MaximumCorrentropy`).
 
     Parameters

@@ -16,7 +16,7 @@ __all__ = ["FixedWindow", "InnovationBased", "adaptive_window"]
 
 
 @kernel("i8(f8, f8, f8, f8, i8, i8)")
-def adaptive_window(variance, nominal, low, high, shortest, longest):  # type: ignore[no-untyped-def]
+def adaptive_window(variance: float, nominal: float, low: float, high: float, shortest: int, longest: int) -> int:
     """Length of the window after Mao, Wang and Fu (2025), eq. 20: the more the innovations scatter, the longer.
 
     Parameters
@@ -37,7 +37,7 @@ def adaptive_window(variance, nominal, low, high, shortest, longest):  # type: i
 
 #: Of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
 @kernel("void(f8[:, ::1], i8, f8[::1], f8[::1], f8, f8[:, ::1])")
-def _push(rows, count, innovation, residual, sign, predicted):  # type: ignore[no-untyped-def]
+def _push(rows: Array, count: int, innovation: Array, residual: Array, sign: float, predicted: Array) -> None:
     """Write the row of one epoch over the oldest."""
     m, row = innovation.size, rows[count % rows.shape[0]]
     at = m
@@ -51,7 +51,7 @@ def _push(rows, count, innovation, residual, sign, predicted):  # type: ignore[n
 
 
 @kernel("f8(f8[:, ::1], i8, i8, i8)")
-def _sum(rows, count, n, column):  # type: ignore[no-untyped-def]
+def _sum(rows: Array, count: int, n: int, column: int) -> float:
     """Sum of a column over the last n of ``count`` rows."""
     total = 0.0
     for k in range(count - n, count):
@@ -60,9 +60,10 @@ def _sum(rows, count, n, column):  # type: ignore[no-untyped-def]
 
 
 @kernel("i8(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8, i8, f8, f8, b1, f8, f8[:, ::1])")
-def _average(  # type: ignore[no-untyped-def]
-    rows, count, predicted, nominal, shortest, longest, low, high, newest, forgetting, estimate
-):
+def _average(
+    rows: Array, count: int, predicted: Array, nominal: Array, shortest: int, longest: int, low: float, high: float,
+    newest: bool, forgetting: float, estimate: Array,
+) -> int:  # fmt: skip
     """Eqs. 16-20 over the last of ``count`` rows; ``estimate`` is overwritten; returns the length of the window."""
     m, ring = nominal.shape[0], rows.shape[0]
     length = shortest

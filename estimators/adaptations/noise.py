@@ -20,7 +20,7 @@ Scope = Literal["fixes", "all"]
 
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
-def posterior(innovation, predicted, noise, residual, after):  # type: ignore[no-untyped-def]
+def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array, after: Array) -> float:
     """Residual ``v - H P H' S^-1 v`` and ``H P+ H'`` after an update with ``S = H P H' + R``.
 
     A state of m components observed directly is the same problem, so the solver's own kernel computes it.
@@ -54,14 +54,14 @@ def posterior(innovation, predicted, noise, residual, after):  # type: ignore[no
 
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
-def normalised_square(innovation, predicted, noise):  # type: ignore[no-untyped-def]
+def normalised_square(innovation: Array, predicted: Array, noise: Array) -> float:
     """Normalised innovation squared ``v' S^-1 v``, ``S = H P H' + R``; -1 where S is singular."""
     m = innovation.size
     return posterior(innovation, predicted, noise, np.empty(m), np.empty((m, m)))
 
 
 @kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")
-def _scale(noise, f0, f1, f2, product):  # type: ignore[no-untyped-def]
+def _scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> None:
     r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
     for i in range(noise.shape[0]):
         a = r0 if i == 0 else r1 if i == 1 else r2
@@ -70,7 +70,7 @@ def _scale(noise, f0, f1, f2, product):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8, f8, f8[:, ::1])")
-def _bound(estimate, nominal, low, high, bounded):  # type: ignore[no-untyped-def]
+def _bound(estimate: Array, nominal: Array, low: float, high: float, bounded: Array) -> None:
     for i in range(nominal.shape[0]):
         bounded[i, i] = sqrt(min(max(estimate[i, i] / nominal[i, i], low), high))
     for i in range(nominal.shape[0]):
@@ -81,7 +81,7 @@ def _bound(estimate, nominal, low, high, bounded):  # type: ignore[no-untyped-de
 
 
 @kernel("UniTuple(f8, 3)(f8[:, ::1])")
-def _sigmas(noise):  # type: ignore[no-untyped-def]
+def _sigmas(noise: Array) -> tuple[float, float, float]:
     m = noise.shape[0]
     return sqrt(noise[0, 0]), sqrt(noise[1, 1]) if m > 1 else 0.0, sqrt(noise[2, 2]) if m > 2 else 0.0
 
@@ -121,7 +121,8 @@ def scaled(noise: Array, factors: list[float]) -> Array:
     if min(factors) == max(factors) == 1.0:
         return noise
     product: Array = np.empty((len(noise), len(noise)))
-    _scale(noise, *(*factors, 1.0, 1.0)[:3], product)
+    first, second, third = (*factors, 1.0, 1.0)[:3]
+    _scale(noise, first, second, third, product)
     return product
 
 

@@ -16,7 +16,7 @@ __all__ = ["PredictionTest", "standardised"]
 
 
 @kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")
-def standardised(residual, predicted, noise):  # type: ignore[no-untyped-def]
+def standardised(residual: Array, predicted: Array, noise: Array) -> tuple[float, float, float]:
     """The components of an innovation, each over its sigma in ``H P H' + R``; zeros up to three."""
     m = residual.size
     u0 = residual[0] / sqrt(predicted[0, 0] + noise[0, 0])

@@ -11,7 +11,7 @@ __all__ = ["SageHusa"]
 
 
 @kernel("void(f8[:, ::1], f8, f8[::1], f8[:, ::1])")
-def _fade(estimate, d, innovation, predicted):  # type: ignore[no-untyped-def]
+def _fade(estimate: Array, d: float, innovation: Array, predicted: Array) -> None:
     """The recursion, in place."""
     for i in range(innovation.size):
         for j in range(innovation.size):

@@ -14,7 +14,7 @@ __all__ = ["StudentT", "normalised_trace", "student_weight"]
 
 
 @kernel("f8(f8[:, ::1], f8[::1], f8[:, ::1])")
-def normalised_trace(noise, residual, spread):  # type: ignore[no-untyped-def]
+def normalised_trace(noise: Array, residual: Array, spread: Array) -> float:
     """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A; -1 where R is singular."""
     m = residual.size
     L, pivot = noise.copy(), np.empty(m)
@@ -36,7 +36,7 @@ def normalised_trace(noise, residual, spread):  # type: ignore[no-untyped-def]
 
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8)")
-def student_weight(innovation, predicted, noise, dof, iterations):  # type: ignore[no-untyped-def]
+def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float, iterations: int) -> float:
     """The weight of a measurement: its noise is R over it (see `StudentT`).
 
     Parameters

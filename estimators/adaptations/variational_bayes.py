@@ -15,9 +15,10 @@ __all__ = ["VariationalBayes", "variational_noise"]
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8, f8, f8, f8[::1], f8[:, ::1])")
-def variational_noise(  # type: ignore[no-untyped-def]
-    innovation, predicted, nominal, shape, iterations, lowest, highest, scales, noise
-):
+def variational_noise(
+    innovation: Array, predicted: Array, nominal: Array, shape: float, iterations: int, lowest: float, highest: float,
+    scales: Array, noise: Array,
+) -> None:  # fmt: skip
     """The iteration (see `VariationalBayes`).
 
     Parameters

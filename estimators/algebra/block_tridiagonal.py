@@ -37,6 +37,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.cholesky import factorise
+from simnav.types import Array, Integers
 
 __all__ = ["after_step", "half_squares", "keep_weights", "solve_chain", "whiten"]
 
@@ -45,7 +46,7 @@ LEAST_WEIGHT = 1e-9
 
 
 @kernel()
-def _predict(P, F, Q, weight, work, turned, out):  # type: ignore[no-untyped-def]
+def _predict(P: Array, F: Array, Q: Array, weight: float, work: Array, turned: Array, out: Array) -> None:
     """``out = F P F' + Q / weight``; F is sparse."""
     n = P.shape[0]
     for i in range(n):
@@ -75,7 +76,9 @@ def _predict(P, F, Q, weight, work, turned, out):  # type: ignore[no-untyped-def
 
 
 @kernel()
-def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-def]
+def _absorb(
+    P: Array, d: Array, H: Array, r: Array, R: Array, weight: float, m: int, L: Array, U: Array, G: Array, y: Array
+) -> bool:
     """Take m measurements with the covariance ``R / weight`` into P and d; False, and nothing done, if S is singular.
 
     With ``L L' = S = H P H' + R / weight`` they are left white: ``U = L^-1 H P``, ``G = L^-1 H`` and
@@ -130,7 +133,10 @@ def _absorb(P, d, H, r, R, weight, m, L, U, G, y):  # type: ignore[no-untyped-de
 
 
 @kernel()
-def _mean_of(i, end, instrument, components, H, r, R, weight, used, mean_H, mean_r, mean_R):  # type: ignore[no-untyped-def]
+def _mean_of(
+    i: int, end: int, instrument: Integers, components: Integers, H: Array, r: Array, R: Array, weight: Array,
+    used: Integers, mean_H: Array, mean_r: Array, mean_R: Array,
+) -> int:  # fmt: skip
     """The mean of measurement i and of the later ones before ``end`` that are its instrument's and count.
 
     Each has a share of ``w / trace(R)`` in it. ``used`` becomes 0 for those that i stands for.
@@ -177,7 +183,7 @@ def _mean_of(i, end, instrument, components, H, r, R, weight, used, mean_H, mean
 
 
 @kernel()
-def _whiten(error, whitener, whitened):  # type: ignore[no-untyped-def]
+def _whiten(error: Array, whitener: Array, whitened: Array) -> float:
     square = 0.0
     for i in range(error.size):
         x = 0.0
@@ -189,7 +195,7 @@ def _whiten(error, whitener, whitened):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _return(adjoint, U, G, y, m, z):  # type: ignore[no-untyped-def]
+def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> None:
     """Take the adjoint back through m measurements: ``a + G' (y - U a)``; z is work space."""
     n = adjoint.size
     for a in range(m):
@@ -207,11 +213,13 @@ def _return(adjoint, U, G, y, m, z):  # type: ignore[no-untyped-def]
     "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], "
     "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], f8[:, ::1], f8[::1])"
 )
-def solve_chain(  # type: ignore[no-untyped-def]
-    prior, prior_shift, transition, noise, error, motion_weight,
-    node, base, instrument, components, jacobian, residual, aid_noise, aid_weight, damping, first,
-    predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used, step, size,
-):  # fmt: skip
+def solve_chain(
+    prior: Array, prior_shift: Array, transition: Array, noise: Array, error: Array, motion_weight: Array,
+    node: Integers, base: int, instrument: Integers, components: Integers, jacobian: Array, residual: Array,
+    aid_noise: Array, aid_weight: Array, damping: float, first: int, predicted: Array, predicted_shift: Array,
+    filtered: Array, filtered_shift: Array, cross: Array, white: Array, innovation: Array, used: Integers, step: Array,
+    size: Array,
+) -> tuple[float, float]:  # fmt: skip
     """One step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
     Parameters
@@ -368,10 +376,11 @@ def solve_chain(  # type: ignore[no-untyped-def]
     "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], "
     "i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
 )
-def after_step(  # type: ignore[no-untyped-def]
-    step, predicted_shift, filtered_shift, transition, error, whitener, whitened, norm,
-    node, base, jacobian, residual, aid_whitener, aid_whitened, aid_norm,
-):  # fmt: skip
+def after_step(
+    step: Array, predicted_shift: Array, filtered_shift: Array, transition: Array, error: Array, whitener: Array,
+    whitened: Array, norm: Array, node: Integers, base: int, jacobian: Array, residual: Array, aid_whitener: Array,
+    aid_whitened: Array, aid_norm: Array,
+) -> None:  # fmt: skip
     """Shifts and residuals after a step, as the factors were linearised: what solving for it supposes them to be.
 
     Parameters
@@ -406,7 +415,7 @@ def after_step(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(i8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
-def whiten(first, error, whitener, whitened, norm):  # type: ignore[no-untyped-def]
+def whiten(first: int, error: Array, whitener: Array, whitened: Array, norm: Array) -> None:
     """Whiten N errors of n components.
 
     Parameters
@@ -427,7 +436,10 @@ def whiten(first, error, whitener, whitened, norm):  # type: ignore[no-untyped-d
 
 
 @kernel("i8(f8[::1], f8[::1], f8[::1], i8[::1], i8, f8[::1], f8[::1], f8[::1], f8)")
-def keep_weights(before, norm, weight, node, base, aid_before, aid_norm, aid_weight, tolerance):  # type: ignore[no-untyped-def]
+def keep_weights(
+    before: Array, norm: Array, weight: Array, node: Integers, base: int, aid_before: Array, aid_norm: Array,
+    aid_weight: Array, tolerance: float,
+) -> int:  # fmt: skip
     """Set weights back that have hardly changed.
 
     Parameters
@@ -464,7 +476,9 @@ def keep_weights(before, norm, weight, node, base, aid_before, aid_norm, aid_wei
 
 
 @kernel("f8(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def half_squares(whitener, shift, weight, norm, aid_weight, aid_norm):  # type: ignore[no-untyped-def]
+def half_squares(
+    whitener: Array, shift: Array, weight: Array, norm: Array, aid_weight: Array, aid_norm: Array
+) -> float:
     """The cost: half the sum of squares of all factors.
 
     Parameters

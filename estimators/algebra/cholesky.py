@@ -5,12 +5,13 @@ from __future__ import annotations
 from math import sqrt
 
 from simnav.compiled import kernel
+from simnav.types import Array
 
 __all__ = ["factorise"]
 
 
 @kernel()
-def factorise(L, m, least, pivot):  # type: ignore[no-untyped-def]
+def factorise(L: Array, m: int, least: float, pivot: Array) -> bool:
     """Overwrite the lower triangle of a covariance with its Cholesky factor; what lies above is left as it is.
 
     Parameters

@@ -10,12 +10,13 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.cholesky import factorise
+from simnav.types import Array
 
 __all__ = ["joseph_update", "project"]
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def project(covariance, jacobian, cross, predicted):  # type: ignore[no-untyped-def]
+def project(covariance: Array, jacobian: Array, cross: Array, predicted: Array) -> None:
     """What a covariance says of a measurement: ``P H'`` and ``H P H'``.
 
     Parameters
@@ -50,7 +51,9 @@ def project(covariance, jacobian, cross, predicted):  # type: ignore[no-untyped-
 
 
 @kernel("f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
-def joseph_update(covariance, cross, innovation_covariance, residual, correction):  # type: ignore[no-untyped-def]
+def joseph_update(
+    covariance: Array, cross: Array, innovation_covariance: Array, residual: Array, correction: Array
+) -> float:
     """Kalman gain, correction and Joseph-form update of the covariance, in place.
 
     With S = H P H' + R and K = P H' S^-1, Joseph's (I - K H) P (I - K H)' + K R K' is, multiplied out,

@@ -6,12 +6,13 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.cholesky import factorise
+from simnav.types import Array
 
 __all__ = ["whitening"]
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1])")
-def whitening(covariance, whitener):  # type: ignore[no-untyped-def]
+def whitening(covariance: Array, whitener: Array) -> None:
     """The inverse Cholesky factor of a covariance, so that ``whitener`` times an error has unit covariance.
 
     Parameters

@@ -28,13 +28,13 @@ from simnav.compiled import kernel
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
+from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Integers, Measurement
 
 __all__ = ["Chain", "Columns", "chain_of"]
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
-def _attach(noise, value, full, whitener, values):  # type: ignore[no-untyped-def]
+def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
     """The (m, m) noise and the value of a measurement, widened to three components; and the whitener."""
     for i in range(3):
         values[i] = value[i] if i < value.size else 0.0
@@ -44,7 +44,7 @@ def _attach(noise, value, full, whitener, values):  # type: ignore[no-untyped-de
 
 
 @kernel("void(i8, i8[::1], i8, f8[:, :, ::1], f8[:, :, ::1])")
-def through_motion(first, row, coupled, transition, jacobian):  # type: ignore[no-untyped-def]
+def through_motion(first: int, row: Integers, coupled: int, transition: Array, jacobian: Array) -> None:
     """Take Jacobians at folds back to their nodes, in place.
 
     Parameters
@@ -80,7 +80,10 @@ def through_motion(first, row, coupled, transition, jacobian):  # type: ignore[n
 
 
 @kernel("void(i8, i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], i8[::1])")
-def add_motion_noise(first, row, components, jacobian, motion_noise, noise, whitener, bare):  # type: ignore[no-untyped-def]
+def add_motion_noise(
+    first: int, row: Integers, components: Integers, jacobian: Array, motion_noise: Array, noise: Array,
+    whitener: Array, bare: Integers,
+) -> None:  # fmt: skip
     """Add the noise of the motion up to a fold to that of the measurements there, ``R + H Q H'``, once.
 
     Parameters

@@ -63,7 +63,7 @@ _GRAVITY = 9.81
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
-def _carry(transition, rate, elapsed, error):  # type: ignore[no-untyped-def]
+def _carry(transition: Array, rate: Array, elapsed: float, error: Array) -> None:
     """Take errors, the columns of an (n, k) array, through a motion in place; arguments: `propagate_covariance`."""
     m, columns = transition.shape[0], error.shape[1]
     X = np.zeros((m, columns))

@@ -27,7 +27,7 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import OWN, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
 from simnav.geometry.rotation import cross, rotation_coefficients
-from simnav.types import Array, InitialState, Instruments
+from simnav.types import Array, InitialState, Instruments, Integers
 
 __all__ = ["InertialChain"]
 
@@ -36,7 +36,9 @@ SERIES_ANGLE = 0.014
 
 
 @kernel()
-def _turn(a, b, r0, r1, r2, v0, v1, v2):  # type: ignore[no-untyped-def]
+def _turn(
+    a: float, b: float, r0: float, r1: float, r2: float, v0: float, v1: float, v2: float
+) -> tuple[float, float, float]:
     """``exp(r x) v``, with a and b the `rotation_coefficients` of r."""
     x0, x1, x2 = cross(r0, r1, r2, v0, v1, v2)
     y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
@@ -44,7 +46,7 @@ def _turn(a, b, r0, r1, r2, v0, v1, v2):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _compose(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+def _compose(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
     """Rotation vector of ``exp(a x) exp(b x)``.
 
     A series of third order (Baker, Campbell, Hausdorff) below `SERIES_ANGLE`, where it is good to 2e-9 rad; the product
@@ -72,7 +74,7 @@ def _compose(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _move(F, s, moved, J):  # type: ignore[no-untyped-def]
+def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
     """Where the motion takes a node that is shifted by s: the shift ``moved`` at its end, and its derivative J.
 
     The equations are those of the module. J must hold F, or what this function left there at another shift: only the
@@ -144,7 +146,7 @@ def _move(F, s, moved, J):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1])")
-def _less(shift, step, out):  # type: ignore[no-untyped-def]
+def _less(shift: Array, step: Array, out: Array) -> None:
     """A shift as seen from where a step leads: rotations compose."""
     for j in range(shift.size):
         out[j] = shift[j] - step[j]
@@ -152,7 +154,7 @@ def _less(shift, step, out):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _add(step, shift, out):  # type: ignore[no-untyped-def]
+def _add(step: Array, shift: Array, out: Array) -> None:
     """A shift and a step after it."""
     for j in range(shift.size):
         out[j] = shift[j] + step[j]
@@ -160,7 +162,7 @@ def _add(step, shift, out):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1])")
-def _turn_covariance(P, shift, out):  # type: ignore[no-untyped-def]
+def _turn_covariance(P: Array, shift: Array, out: Array) -> None:
     p0, p1, p2 = shift[6], shift[7], shift[8]
     angle2 = p0 * p0 + p1 * p1 + p2 * p2
     sine, a = rotation_coefficients(angle2)
@@ -180,7 +182,9 @@ def _turn_covariance(P, shift, out):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(i8, f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
-def _linearise_motion(first, transition, begin_shift, end_shift, residual, jacobian):  # type: ignore[no-untyped-def]
+def _linearise_motion(
+    first: int, transition: Array, begin_shift: Array, end_shift: Array, residual: Array, jacobian: Array
+) -> None:
     count, n = begin_shift.shape
     moved = np.empty(n)
     for k in range(first, count):
@@ -189,7 +193,9 @@ def _linearise_motion(first, transition, begin_shift, end_shift, residual, jacob
 
 
 @kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _along_motion(transition, jacobian, residual, begin_shift, end_shift, step, along):  # type: ignore[no-untyped-def]
+def _along_motion(
+    transition: Array, jacobian: Array, residual: Array, begin_shift: Array, end_shift: Array, step: Array, along: Array
+) -> None:
     count, n = begin_shift.shape
     shift, moved, error, J = np.empty(n), np.empty(n), np.empty(n), np.zeros((n, n))
     along[0] = step[0]
@@ -209,10 +215,11 @@ def _along_motion(transition, jacobian, residual, begin_shift, end_shift, step, 
     "void(i8, i8[::1], i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8[:, ::1], "
     "f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], i8[::1])"
 )
-def _linearise_aids(  # type: ignore[no-untyped-def]
-    first, row, instrument, value, codes, arms, bias_at, scale_at,
-    position, velocity, dcm, rate, bias, calibration, residual, jacobian, components,
-):  # fmt: skip
+def _linearise_aids(
+    first: int, row: Integers, instrument: Integers, value: Array, codes: Integers, arms: Array, bias_at: Integers,
+    scale_at: Integers, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, calibration: Array,
+    residual: Array, jacobian: Array, components: Integers,
+) -> None:  # fmt: skip
     innovation = np.empty(3)
     for i in range(first, row.size):
         k, s = row[i], instrument[i]
@@ -229,9 +236,10 @@ def _linearise_aids(  # type: ignore[no-untyped-def]
 @kernel(
     "void(i8, f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
 )
-def _move_folds(  # type: ignore[no-untyped-def]
-    first, transition, shift, position, velocity, dcm, bias, calibration, jacobian
-):
+def _move_folds(
+    first: int, transition: Array, shift: Array, position: Array, velocity: Array, dcm: Array, bias: Array,
+    calibration: Array, jacobian: Array,
+) -> None:  # fmt: skip
     """Correct the states of folds by where their nodes' shifts lead, in place."""
     count, n = shift.shape
     moved, dx = np.empty(n), np.zeros(15 + calibration.shape[1])
@@ -243,13 +251,16 @@ def _move_folds(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[:, ::1], i8[::1], i8, f8[:, ::1])")
-def _retract_folds(step, node, base, shift):  # type: ignore[no-untyped-def]
+def _retract_folds(step: Array, node: Integers, base: int, shift: Array) -> None:
     for i in range(node.size):
         _add(step[node[i] - base], shift[i].copy(), shift[i])
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _retract(step, position, velocity, dcm, bias, calibration, begin_shift, end_shift):  # type: ignore[no-untyped-def]
+def _retract(
+    step: Array, position: Array, velocity: Array, dcm: Array, bias: Array, calibration: Array, begin_shift: Array,
+    end_shift: Array,
+) -> None:  # fmt: skip
     count, n = step.shape
     dx = np.zeros(max(n, 15))
     for k in range(count):

@@ -38,7 +38,7 @@ PIECE = 0.5
 
 
 @kernel()
-def _turn(dcm, r0, r1, r2, turned):  # type: ignore[no-untyped-def]
+def _turn(dcm: Array, r0: float, r1: float, r2: float, turned: Array) -> None:
     """``turned = exp(r x) dcm``."""
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
     for j in range(3):
@@ -49,9 +49,10 @@ def _turn(dcm, r0, r1, r2, turned):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8[:, ::1])")
-def propagate_points(  # type: ignore[no-untyped-def]
-    position, velocity, dcm, next_velocity, next_dcm, interval, gyro_decay, accelerometer_decay, errors
-):
+def propagate_points(
+    position: Array, velocity: Array, dcm: Array, next_velocity: Array, next_dcm: Array, interval: float,
+    gyro_decay: float, accelerometer_decay: float, errors: Array,
+) -> None:  # fmt: skip
     """Take points through one piece of a state's motion, in place.
 
     Parameters
@@ -131,9 +132,10 @@ def propagate_points(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def observe_points(  # type: ignore[no-untyped-def]
-    code, arm, bias_at, scale_at, position, velocity, dcm, rate, bias, calibration, errors, differences
-):
+def observe_points(
+    code: int, arm: Array, bias_at: int, scale_at: int, position: Array, velocity: Array, dcm: Array, rate: Array,
+    bias: Array, calibration: Array, errors: Array, differences: Array,
+) -> None:  # fmt: skip
     """What an instrument should read at points, minus what it should read at the state.
 
     In position and calibration the readings are linear (see the module), and so computed; the rest is the instrument's

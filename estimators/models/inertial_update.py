@@ -14,6 +14,7 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.measurements import observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
+from simnav.types import Array
 
 __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
 
@@ -22,10 +23,10 @@ __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
     "b1(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], "
     "f8[:, ::1], f8[:, ::1])"
 )
-def innovate_inertial(  # type: ignore[no-untyped-def]
-    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, covariance,
-    innovation, cross, predicted,
-):  # fmt: skip
+def innovate_inertial(
+    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
+    rate: Array, bias: Array, calibration: Array, covariance: Array, innovation: Array, cross: Array, predicted: Array,
+) -> bool:  # fmt: skip
     """Innovation of a measurement, and what the covariance says of it.
 
     Parameters
@@ -59,9 +60,10 @@ def innovate_inertial(  # type: ignore[no-untyped-def]
     "f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], "
     "f8[::1])"
 )
-def absorb_inertial(  # type: ignore[no-untyped-def]
-    covariance, cross, predicted, noise, innovation, position, velocity, dcm, bias, calibration, correction
-):
+def absorb_inertial(
+    covariance: Array, cross: Array, predicted: Array, noise: Array, innovation: Array, position: Array,
+    velocity: Array, dcm: Array, bias: Array, calibration: Array, correction: Array,
+) -> float:  # fmt: skip
     """Correct a state and its covariance by an innovation, in place.
 
     Parameters
@@ -95,9 +97,10 @@ def absorb_inertial(  # type: ignore[no-untyped-def]
     "UniTuple(f8, 2)(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], "
     "f8[:, ::1], f8[:, ::1], f8[::1])"
 )
-def assimilate_inertial(  # type: ignore[no-untyped-def]
-    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, covariance, noise, correction
-):
+def assimilate_inertial(
+    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
+    rate: Array, bias: Array, calibration: Array, covariance: Array, noise: Array, correction: Array,
+) -> tuple[float, float]:  # fmt: skip
     """`innovate_inertial` and `absorb_inertial` in one.
 
     Returns

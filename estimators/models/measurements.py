@@ -65,9 +65,10 @@ def radii(latitude: float) -> tuple[float, float]:
 
 
 @kernel()
-def observe_inertial(  # type: ignore[no-untyped-def]
-    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, innovation, jacobian
-):
+def observe_inertial(
+    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
+    rate: Array, bias: Array, calibration: Array, innovation: Array, jacobian: Array,
+) -> int:  # fmt: skip
     """Innovation and Jacobian of one measurement (equations in the module).
 
     Parameters
@@ -196,9 +197,10 @@ def observe_inertial(  # type: ignore[no-untyped-def]
 @kernel(
     "i8(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])"
 )
-def observe(  # type: ignore[no-untyped-def]
-    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, innovation, jacobian
-):
+def observe(
+    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
+    rate: Array, bias: Array, calibration: Array, innovation: Array, jacobian: Array,
+) -> int:  # fmt: skip
     """`observe_inertial`, to be called from Python."""
     return observe_inertial(
         code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, innovation, jacobian

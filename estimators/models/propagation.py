@@ -49,14 +49,14 @@ BLOCK_COLUMNS = 22
 
 
 @kernel()
-def _usable(w0, w1, w2, f0, f1, f2):  # type: ignore[no-untyped-def]
+def _usable(w0: float, w1: float, w2: float, f0: float, f1: float, f2: float) -> bool:
     rate = abs(w0) + abs(w1) + abs(w2)
     force = abs(f0) + abs(f1) + abs(f2)
     return rate < LARGEST_RATE and force < LARGEST_FORCE  # false for NaN
 
 
 @kernel()
-def _dynamics(F, block, gyro_decay, accelerometer_decay):  # type: ignore[no-untyped-def]
+def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: float) -> None:
     """The matrix F of the error over one block."""
     height = block[3]
     s, cl = sin(block[2]), cos(block[2])
@@ -106,7 +106,7 @@ def _dynamics(F, block, gyro_decay, accelerometer_decay):  # type: ignore[no-unt
 
 
 @kernel()
-def _advance_rows(F, dt, M, first, A, B):  # type: ignore[no-untyped-def]
+def _advance_rows(F: Array, dt: float, M: Array, first: int, A: Array, B: Array) -> None:
     """``M = (I + F dt + F F dt^2 / 2) M`` from a column on, with work space A, B; F is sparse."""
     n = M.shape[1]
     for i in range(15):
@@ -131,7 +131,7 @@ def _advance_rows(F, dt, M, first, A, B):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _add_noise(M, block, noise):  # type: ignore[no-untyped-def]
+def _add_noise(M: Array, block: Array, noise: Array) -> None:
     """Add half the noise of a block, to the columns from 15 on: white, biases, turns, a time without data."""
     dt, held = 0.5 * block[0], 0.5 * block[1]
     scale, misalignment = noise[6], noise[7]
@@ -150,7 +150,7 @@ def _add_noise(M, block, noise):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[:, ::1], i8, f8[::1], f8[:, ::1], f8[:, ::1])")
-def accumulate_error(blocks, count, noise, transition, process_noise):  # type: ignore[no-untyped-def]
+def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array, process_noise: Array) -> None:
     """Transition matrix and process noise of the error over successive blocks.
 
     Parameters
@@ -191,7 +191,10 @@ def accumulate_error(blocks, count, noise, transition, process_noise):  # type: 
 
 
 @kernel()
-def next_stretch(clock, time, interval, rate, force, i, t, until, nominal):  # type: ignore[no-untyped-def]
+def next_stretch(
+    clock: Array, time: Array, interval: Array, rate: Array, force: Array, i: int, t: float, until: float,
+    nominal: float,
+) -> tuple[int, float, float, bool]:  # fmt: skip
     """The stretch from a time on in which one sample holds, or none.
 
     Parameters
@@ -249,10 +252,10 @@ def next_stretch(clock, time, interval, rate, force, i, t, until, nominal):  # t
     "UniTuple(i8, 2)(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], "
     "f8[:, ::1], i8, f8, f8[::1], f8[:, ::1])"
 )
-def advance_inertial(  # type: ignore[no-untyped-def]
-    position, velocity, dcm, memory, bias, turn, clock,
-    time, interval, rate, force, first, until, noise, blocks,
-):  # fmt: skip
+def advance_inertial(
+    position: Array, velocity: Array, dcm: Array, memory: Array, bias: Array, turn: Array, clock: Array, time: Array,
+    interval: Array, rate: Array, force: Array, first: int, until: float, noise: Array, blocks: Array,
+) -> tuple[int, int]:  # fmt: skip
     """Advance an inertial state to a time that need not be a sample's, in place.
 
     A sample that spans ``until`` is used in part, the rest by the next call. Where samples are missing or absurd the
@@ -376,9 +379,10 @@ def propagate_inertial(
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
-def propagate_covariance(  # type: ignore[no-untyped-def]
-    covariance, transition, process_noise, calibration, rate, density, elapsed
-):
+def propagate_covariance(
+    covariance: Array, transition: Array, process_noise: Array, calibration: Array, rate: Array, density: Array,
+    elapsed: float,
+) -> None:  # fmt: skip
     """``P = Phi P Phi' + Q`` in place, where the states from the m-th on are Gauss-Markov biases of their own.
 
     Parameters
@@ -435,7 +439,7 @@ def propagate_covariance(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
-def correct_inertial(position, velocity, dcm, bias, calibration, dx):  # type: ignore[no-untyped-def]
+def correct_inertial(position: Array, velocity: Array, dcm: Array, bias: Array, calibration: Array, dx: Array) -> None:
     """Add the correction ``dx`` to a state, in place; the attitude is turned by ``exp(dx[6:9] x)`` from the left."""
     meridian, prime = radii_scalar(sin(position[0]))
     position[1] += dx[1] / ((prime + position[2]) * cos(position[0]))

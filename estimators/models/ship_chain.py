@@ -31,13 +31,15 @@ from simnav.estimators.models.ship_kernels import (
     steps_of,
 )
 from simnav.geometry.earth import radii_scalar
-from simnav.types import Array, InitialState, Instruments
+from simnav.types import Array, InitialState, Instruments, Integers
 
 __all__ = ["ShipChain"]
 
 
 @kernel("void(i8, f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1])")
-def _linearise_motion(first, time, position, x, rate, turn_time, residual, jacobian):  # type: ignore[no-untyped-def]
+def _linearise_motion(
+    first: int, time: Array, position: Array, x: Array, rate: Array, turn_time: float, residual: Array, jacobian: Array
+) -> None:
     count, n = residual.shape
     p, y, decay = np.empty(3), np.empty(n), np.empty(n)
     for k in range(first, count):
@@ -62,9 +64,10 @@ def _linearise_motion(first, time, position, x, rate, turn_time, residual, jacob
 @kernel(
     "void(i8, i8[::1], i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
 )
-def _linearise_aids(  # type: ignore[no-untyped-def]
-    first, row, instrument, value, codes, aids, position, x, residual, jacobian
-):
+def _linearise_aids(
+    first: int, row: Integers, instrument: Integers, value: Array, codes: Integers, aids: Array, position: Array,
+    x: Array, residual: Array, jacobian: Array,
+) -> None:  # fmt: skip
     for i in range(first, row.size):
         k, s = row[i], instrument[i]
         if k < 0:
@@ -81,9 +84,10 @@ def _linearise_aids(  # type: ignore[no-untyped-def]
     "void(i8, i8[::1], i8, f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, ::1], "
     "f8[:, :, ::1])"
 )
-def _move_folds(  # type: ignore[no-untyped-def]
-    first, node, base, fold_time, time, position, x, rate, turn_time, now_position, now_x, jacobian
-):
+def _move_folds(
+    first: int, node: Integers, base: int, fold_time: Array, time: Array, position: Array, x: Array, rate: Array,
+    turn_time: float, now_position: Array, now_x: Array, jacobian: Array,
+) -> None:  # fmt: skip
     decay = np.empty(rate.size)
     for i in range(first, node.size):
         k = node[i] - base
@@ -99,15 +103,16 @@ def _move_folds(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _retract(step, position, x):  # type: ignore[no-untyped-def]
+def _retract(step: Array, position: Array, x: Array) -> None:
     for k in range(step.shape[0]):
         shift_ship(position[k], x[k], step[k])
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])")
-def _along_motion(  # type: ignore[no-untyped-def]
-    time, position, x, rate, turn_time, residual, jacobian, step, along
-):
+def _along_motion(
+    time: Array, position: Array, x: Array, rate: Array, turn_time: float, residual: Array, jacobian: Array,
+    step: Array, along: Array,
+) -> None:  # fmt: skip
     count, n = residual.shape
     p, y, decay, error, F = np.empty(3), np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
     along[0] = step[0]

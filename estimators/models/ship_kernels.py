@@ -18,6 +18,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.geometry.earth import radii_scalar
+from simnav.types import Array, Integers
 
 __all__ = [
     "BODY_VELOCITY",
@@ -47,7 +48,7 @@ STEP = 1.0
 
 
 @kernel()
-def steps_of(elapsed, turn_time):  # type: ignore[no-untyped-def]
+def steps_of(elapsed: float, turn_time: float) -> tuple[int, float, float]:
     """Number of integration steps of a stretch, their length, and the integral of the decaying turn rate over one."""
     steps = max(1, ceil(elapsed / STEP - 1e-9))
     dt = elapsed / steps
@@ -55,14 +56,14 @@ def steps_of(elapsed, turn_time):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def decay_of(rate, dt, decay):  # type: ignore[no-untyped-def]
+def decay_of(rate: Array, dt: float, decay: Array) -> None:
     """Fill in by what the states shrink in a step. (Loops, here and below: they compile faster than expressions.)"""
     for i in range(rate.size):
         decay[i] = exp(-rate[i] * dt)
 
 
 @kernel()
-def set_identity(M):  # type: ignore[no-untyped-def]
+def set_identity(M: Array) -> None:
     """``M = 1``."""
     for i in range(M.shape[0]):
         for j in range(M.shape[1]):
@@ -71,7 +72,7 @@ def set_identity(M):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def sail(x, decay, turning, dt):  # type: ignore[no-untyped-def]
+def sail(x: Array, decay: Array, turning: float, dt: float) -> tuple[float, ...]:
     """Move x on by a step; return metres north and east, the speed, and cosine and sine of the mean heading."""
     u, turn = x[U], turning * x[R]
     middle = x[PSI] + 0.5 * turn
@@ -84,7 +85,7 @@ def sail(x, decay, turning, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def displace_ship(position, north, east):  # type: ignore[no-untyped-def]
+def displace_ship(position: Array, north: float, east: float) -> None:
     """Move a position by metres, with the radii where it was."""
     meridian, prime = radii_scalar(sin(position[0]))
     position[1] += east / ((prime + position[2]) * cos(position[0]))
@@ -92,7 +93,7 @@ def displace_ship(position, north, east):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def carry_rows(M, decay, turning, dt, u, c, s):  # type: ignore[no-untyped-def]
+def carry_rows(M: Array, decay: Array, turning: float, dt: float, u: float, c: float, s: float) -> None:
     """``M = F M`` in place, F the transition matrix of `sail`'s step."""
     n = M.shape[1]
     for j in range(n):
@@ -108,7 +109,9 @@ def carry_rows(M, decay, turning, dt, u, c, s):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def sail_step(position, x, transition, decay, turning, dt):  # type: ignore[no-untyped-def]
+def sail_step(
+    position: Array, x: Array, transition: Array, decay: Array, turning: float, dt: float
+) -> tuple[float, float, float]:
     """Move a state on by a step, and a transition matrix with it; return what `carry_rows` takes."""
     north, east, u, c, s = sail(x, decay, turning, dt)
     displace_ship(position, north, east)
@@ -117,9 +120,10 @@ def sail_step(position, x, transition, decay, turning, dt):  # type: ignore[no-u
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8)")
-def advance_ship(  # type: ignore[no-untyped-def]
-    position, x, covariance, transition, rate, density, turn_time, elapsed
-):
+def advance_ship(
+    position: Array, x: Array, covariance: Array, transition: Array, rate: Array, density: Array, turn_time: float,
+    elapsed: float,
+) -> None:  # fmt: skip
     """Advance a state and its covariance, in place.
 
     Half of a step's noise enters before it and half after: second order in its length.
@@ -163,7 +167,7 @@ def advance_ship(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8, f8)")
-def move_ships(states, rate, turn_time, elapsed):  # type: ignore[no-untyped-def]
+def move_ships(states: Array, rate: Array, turn_time: float, elapsed: float) -> None:
     """Advance (k, n) states by the same motion; their positions are metres."""
     steps, dt, turning = steps_of(elapsed, turn_time)
     decay = np.empty(rate.size)
@@ -176,7 +180,7 @@ def move_ships(states, rate, turn_time, elapsed):  # type: ignore[no-untyped-def
 
 
 @kernel()
-def reading(code, aid, x):  # type: ignore[no-untyped-def]
+def reading(code: Integers, aid: Array, x: Array) -> tuple[float, float]:
     """What an instrument should read, up to two components; a position in metres from that of the state."""
     kind, at, scale = code[0], code[1], code[2]
     u, psi, r = x[U], x[PSI], x[R]
@@ -205,7 +209,7 @@ def reading(code, aid, x):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def fill_jacobian(code, aid, x, jacobian):  # type: ignore[no-untyped-def]
+def fill_jacobian(code: Integers, aid: Array, x: Array, jacobian: Array) -> None:
     """The derivative of `reading`, into a matrix of zeros (or of the same instrument's last one)."""
     kind, at, scale = code[0], code[1], code[2]
     u, psi, r, lx, ly = x[U], x[PSI], x[R], aid[0], aid[1]
@@ -241,7 +245,9 @@ def fill_jacobian(code, aid, x, jacobian):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def residual_of(code, aid, position, x, first, second):  # type: ignore[no-untyped-def]
+def residual_of(
+    code: Integers, aid: Array, position: Array, x: Array, first: float, second: float
+) -> tuple[float, float]:
     """Measured minus predicted: metres, radians or metres per second; the second is 0 of a single component."""
     a, b = reading(code, aid, x)
     if code[0] == POSITION:
@@ -257,9 +263,10 @@ def residual_of(code, aid, position, x, first, second):  # type: ignore[no-untyp
 
 
 @kernel("void(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8[::1], f8[:, ::1], f8[:, ::1])")
-def observe_ship(  # type: ignore[no-untyped-def]
-    code, aid, position, x, first, second, residual, jacobian, noise
-):
+def observe_ship(
+    code: Integers, aid: Array, position: Array, x: Array, first: float, second: float, residual: Array,
+    jacobian: Array, noise: Array,
+) -> None:  # fmt: skip
     """One measurement, linearised.
 
     Parameters
@@ -302,7 +309,7 @@ def observe_ship(  # type: ignore[no-untyped-def]
 
 
 @kernel("void(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def read_ships(code, aid, states, readings):  # type: ignore[no-untyped-def]
+def read_ships(code: Integers, aid: Array, states: Array, readings: Array) -> None:
     """Fill in (k, m) what an instrument should read at (k, n) states; a position in metres."""
     for k in range(states.shape[0]):
         a, b = reading(code, aid, states[k])
@@ -312,7 +319,7 @@ def read_ships(code, aid, states, readings):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def shift_ship(position, x, dx):  # type: ignore[no-untyped-def]
+def shift_ship(position: Array, x: Array, dx: Array) -> None:
     """Add an error to a state, in place."""
     displace_ship(position, dx[N], dx[E])
     for i in range(2, x.size):
@@ -320,13 +327,13 @@ def shift_ship(position, x, dx):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1])")
-def correct_ship(position, x, dx):  # type: ignore[no-untyped-def]
+def correct_ship(position: Array, x: Array, dx: Array) -> None:
     """Add the correction ``dx`` (n,) to a state, in place."""
     shift_ship(position, x, dx)
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1])")
-def describe_ship(x, covariance, sway, velocity, out):  # type: ignore[no-untyped-def]
+def describe_ship(x: Array, covariance: Array, sway: float, velocity: Array, out: Array) -> None:
     """Ground velocity of a state, and the covariance of what it says of position, velocity and heading.
 
     Parameters

@@ -21,11 +21,8 @@ class _Robust(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, e
 
 
 @register("huber-fgo")
-class HuberFgo(_Robust, weighting=piece(TunedMEstimator, defaults={"efficiency": 0.98}, weight=huber)):
+class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
     """Sliding window with Huber's weights: a residual beyond c sigma pulls no harder than one of c sigma.
-
-    With the usual 95 % of efficiency it pays twice as much on clean data, and gains nothing with gross errors in 1 or
-    5 % of the measurements.
 
     Source: P. J. Huber, *Robust Statistics*, 1981.
     """

@@ -43,9 +43,10 @@ _BIAS_ORDER = [3, 4, 5, 0, 1, 2]
 @kernel(
     "i8(i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])"
 )
-def observe_tangent(  # type: ignore[no-untyped-def]
-    code, arm, value, origin, axes, rotation, place, speed, rate, bias, error, jacobian
-):
+def observe_tangent(
+    code: int, arm: Array, value: Array, origin: Array, axes: Array, rotation: Array, place: Array, speed: Array,
+    rate: Array, bias: Array, error: Array, jacobian: Array,
+) -> int:  # fmt: skip
     """Prediction less measurement, and its Jacobian, of a state in a `TangentFrame`.
 
     Parameters

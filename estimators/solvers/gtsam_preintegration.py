@@ -46,7 +46,10 @@ _EYE = np.eye(3)
 
 
 @kernel("UniTuple(i8, 2)(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8, f8[:, ::1])")
-def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, nominal, pieces):  # type: ignore[no-untyped-def]
+def imu_pieces(
+    clock: Array, memory: Array, bias: Array, time: Array, interval: Array, rate: Array, force: Array, first: int,
+    until: float, nominal: float, pieces: Array,
+) -> tuple[int, int]:  # fmt: skip
     """Cut the stretch up to a time into pieces of constant rate and force, as GTSAM integrates them.
 
     A sample that spans ``until`` is used in part, the rest by the next call; where samples are missing there is a piece
@@ -111,6 +114,11 @@ def imu_pieces(clock, memory, bias, time, interval, rate, force, first, until, n
     return i, count
 
 
+def _own(values: Array) -> Array:
+    """A contiguous copy."""
+    return np.array(values, dtype=np.float64, order="C")
+
+
 class Preintegration:
     """What happened since the newest node: GTSAM's preintegrated measurements, and where they lead.
 
@@ -161,11 +169,11 @@ class Preintegration:
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self._first = 0
+        self._samples: tuple[Array, Array, Array, Array]
         if imu is None or len(imu) == 0:
-            self._samples: tuple[Array, ...] = (np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-            return
-        arrays = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-        self._samples = tuple(np.array(a, dtype=np.float64, order="C") for a in arrays)
+            self._samples = np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3))
+        else:
+            self._samples = _own(imu.time), _own(imu.interval), _own(imu.angular_rate), _own(imu.specific_force)
 
     def begin(self, state: Any, bias: Any) -> None:
         """Start anew at a node."""

@@ -23,9 +23,10 @@ __all__ = ["ImmEstimator", "mixture_update"]
 @kernel(
     "UniTuple(f8, 2)(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])"
 )
-def mixture_update(  # type: ignore[no-untyped-def]
-    covariance, cross, predicted, noise, residual, variances, transition, probability, correction
-):
+def mixture_update(
+    covariance: Array, cross: Array, predicted: Array, noise: Array, residual: Array, variances: Array,
+    transition: Array, probability: Array, correction: Array,
+) -> tuple[float, float]:  # fmt: skip
     """Kalman update with every noise level, weighed by likelihood and merged by moments, in place.
 
     With ``S_j = H P H' + variances_j R``, ``y_j = S_j^-1 v`` and mu_j proportional to the probability times N(v; 0,

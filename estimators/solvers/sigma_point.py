@@ -48,7 +48,7 @@ __all__ = ["SigmaPointEstimator", "draw_points"]
 
 
 @kernel("void(f8[:, ::1], f8, f8[:, ::1])")
-def draw_points(covariance, spread, points):  # type: ignore[no-untyped-def]
+def draw_points(covariance: Array, spread: float, points: Array) -> None:
     """Rows ``+spread L_j``, then ``-spread L_j``, of the columns of the Cholesky factor of a covariance.
 
     Parameters

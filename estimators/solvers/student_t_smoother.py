@@ -36,7 +36,7 @@ from simnav.estimators.adaptations.student_t import normalised_trace
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.solvers.smoother import Smoother, smoother_gains
-from simnav.types import Array, Datasheet
+from simnav.types import Array, Datasheet, Integers
 
 __all__ = ["StudentTSmoother"]
 
@@ -54,9 +54,10 @@ class _Used(NamedTuple):
 
 
 @kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1])")  # fmt: skip  # noqa: E501
-def _forward(  # type: ignore[no-untyped-def]
-    transition, process, moved, first, sizes, jacobians, known, noises, weights, before, predicted, after, covariance
-):
+def _forward(
+    transition: Array, process: Array, moved: Array, first: Integers, sizes: Integers, jacobians: Array, known: Array,
+    noises: Array, weights: Array, before: Array, predicted: Array, after: Array, covariance: Array,
+) -> None:  # fmt: skip
     """Kalman filter over the stops; overwrites the last four arrays but for their first stop.
 
     Parameters

@@ -41,9 +41,10 @@ _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARE
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
-def tangent_state(  # type: ignore[no-untyped-def]
-    origin, axes, rotation, place, speed, position, velocity, dcm, error_map, attraction
-):
+def tangent_state(
+    origin: Array, axes: Array, rotation: Array, place: Array, speed: Array, position: Array, velocity: Array,
+    dcm: Array, error_map: Array, attraction: Array,
+) -> None:  # fmt: skip
     """Geodetic state of a state in the frame, and how its error changes.
 
     Parameters

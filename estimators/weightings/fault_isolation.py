@@ -18,7 +18,7 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.weightings.base import Factors
-from simnav.types import Instruments
+from simnav.types import Array, Instruments, Integers
 
 __all__ = ["MotionTest"]
 
@@ -27,7 +27,7 @@ LOOSE = 1e-6
 
 
 @kernel("Tuple((i8, i8))(f8[::1], f8, f8[::1], i8[::1], f8[::1])")
-def _failing(time, tested, norm, components, limits):  # type: ignore[no-untyped-def]
+def _failing(time: Array, tested: float, norm: Array, components: Integers, limits: Array) -> tuple[int, int]:
     """The first measurement after a time, and how many from there on fail the test."""
     first, failing = time.size, 0
     while first > 0 and time[first - 1] > tested:

@@ -38,7 +38,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.kinds import POSITION, VELOCITY
-from simnav.types import Array, Instruments
+from simnav.types import Array, Instruments, Integers
 
 __all__ = ["GradientAdaptive", "Shape", "medians"]
 
@@ -50,7 +50,7 @@ _CHI_MEDIAN = np.array([1.0, 0.674490, 1.177410, 1.538172])
 
 
 @kernel("void(f8[::1], i8[::1], i8, f8[::1])")
-def medians(values, group, fewest, out):  # type: ignore[no-untyped-def]
+def medians(values: Array, group: Integers, fewest: int, out: Array) -> None:
     """Medians of groups.
 
     Parameters
@@ -79,7 +79,10 @@ def medians(values, group, fewest, out):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], i8[::1], i8[::1], f8[:, ::1], f8, f8, i8, f8[::1], f8[::1])")
-def _adapt(norm, kappa, kind, group, shapes, epsilon, floor, fewest, scales, weight):  # type: ignore[no-untyped-def]
+def _adapt(
+    norm: Array, kappa: Array, kind: Integers, group: Integers, shapes: Array, epsilon: float, floor: float,
+    fewest: int, scales: Array, weight: Array,
+) -> None:  # fmt: skip
     """Scales of the groups and weights of the members (eqs. 19-21); kappa is that of a norm's kind."""
     scaled = np.empty(norm.size)
     for i in range(norm.size):

@@ -13,7 +13,8 @@ function          weight                          c for m = 1, 2, 3
 
 so that iterated weighted least squares minimises ``sum rho(r)`` with ``rho'(r) = w(r) r``. One weight for all
 components of a measurement keeps it invariant to rotations of its axes; the price is that c must grow with m, for r is
-chi distributed: the constants listed are those of 95 % efficiency (`efficiency`).
+chi distributed. The constants listed are those of 95 % efficiency (`efficiency`), the textbooks' choice; the default
+is 98 %.
 
 Huber's cost alone is convex. The others redescend, and what the iteration finds depends on where it begins: here at
 the weights of the epoch before, with new measurements at full weight (`RobustWeighting`).
@@ -161,8 +162,10 @@ class TunedMEstimator(MEstimator):
     weight : callable
         As for `MEstimator`.
     efficiency : float
-        On Gaussian noise, above 0.5 and below 1.
+        On Gaussian noise, above 0.5 and below 1. The textbooks' 0.95 lets an estimate differ from the best one by 23 %
+        of its sigma; 0.98 by 14 %, and is not worse with gross errors of 5 to 30 sigma in 5 % of the measurements
+        (``docs/explanation/windows.md``).
     """
 
-    def __init__(self, weight: WeightFunction, efficiency: float = 0.95, smallest: float = 1e-3):
+    def __init__(self, weight: WeightFunction, efficiency: float = 0.98, smallest: float = 1e-3):
         super().__init__(weight, constants(weight, efficiency), smallest)

@@ -16,7 +16,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.estimators.weightings.fault_isolation import MotionTest
-from simnav.types import Instruments
+from simnav.types import Array, Instruments
 
 __all__ = ["RobustWeighting", "weigh_motion"]
 
@@ -28,7 +28,7 @@ def _quantile(n: int) -> float:
 
 
 @kernel("void(f8, f8[::1], f8[::1])")
-def _weigh_motion(quantile, norm, weight):  # type: ignore[no-untyped-def]
+def _weigh_motion(quantile: float, norm: Array, weight: Array) -> None:
     for k in range(norm.size):
         u = quantile / max(norm[k], quantile)
         weight[k] = u * u

@@ -11,6 +11,8 @@ from __future__ import annotations
 import contextlib
 import importlib
 import importlib.util
+import itertools
+import math
 import os
 import time
 import warnings
@@ -42,7 +44,7 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["CampaignError", "Progress", "Summary", "run_campaign"]
+__all__ = ["MEMORY", "RUNS", "CampaignError", "Progress", "Summary", "run_campaign"]
 
 #: Seeds of a campaign, by default.
 RUNS = 50
@@ -116,6 +118,11 @@ class Summary:
         return sum(self.statuses.values())
 
     @property
+    def left(self) -> int:
+        """Results that are still missing, because the time was up."""
+        return self.total - self.skipped - self.computed
+
+    @property
     def failed(self) -> int:
         """Results computed now that are failures (an unsuitable scenario is none)."""
         return self.computed - self.statuses.get("ok", 0) - self.statuses.get("unsuitable", 0)
@@ -148,6 +155,7 @@ def run_campaign(
     shard: tuple[int, int] = (1, 1),
     confinement: str = "auto",
     seal: Seal | None = None,
+    minutes: float | None = None,
 ) -> Summary:
     """Run estimators on scenarios and seeds, and store the results.
 
@@ -189,6 +197,8 @@ def run_campaign(
         that works.
     seal : Seal, optional
         Derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
+    minutes : float, optional
+        Time after which no further run is started. The same campaign, started again, continues.
 
     Returns
     -------
@@ -215,6 +225,8 @@ def run_campaign(
         raise RequestError(f"timeout = {timeout:g} s should be greater than 0")
     if memory < 16 << 20:
         raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
+    if minutes is not None and not minutes >= 0.0:
+        raise RequestError(f"minutes = {minutes:g} should not be negative")
     if not covariance_interval >= 0.0:
         raise RequestError(f"covariance_interval = {covariance_interval:g} s should not be negative")
     if isinstance(seeds, range):  # its ends say it, without a look at each seed
@@ -302,7 +314,9 @@ def run_campaign(
         run_started = time.monotonic()
         weight, left, loose = 0.0, plan.weight, 0
         report(Progress("run", skipped, total))
-        with contextlib.closing(_outcomes(plan.units(unit), path, workers, backend, scheduler)) as outcomes:
+        end = math.inf if minutes is None else started + 60.0 * minutes
+        units = itertools.takewhile(lambda _: time.monotonic() < end, plan.units(unit))
+        with contextlib.closing(_outcomes(units, path, workers, backend, scheduler)) as outcomes:
             for done_unit, outcome in outcomes:
                 statuses.update(outcome)
                 loose += outcome.total()

@@ -33,6 +33,8 @@ class Entrant:
         The class itself, where no other process can import it.
     point : str
         Entry point of another package that registers it; empty where there is none.
+    search : tuple of str
+        Folders in which the estimator's process looks for packages first.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Entrant:
     source: str
     code: bytes = b""
     point: str = ""
+    search: tuple[str, ...] = ()
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

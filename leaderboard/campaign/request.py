@@ -43,12 +43,19 @@ class EstimatorRequest:
         What tables call it; default: name and parameters.
     cls : type or None
         The class itself, where it was given as such: workers are sent it, for they may not find it by its name.
+    point : str
+        Entry point of a package that this process must not import, such as that of a submission. Only the estimator's
+        own process loads it.
+    search : tuple of str
+        Folders in which that process looks for packages first.
     """
 
     name: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
     cls: type[Estimator] | None = None
+    point: str = ""
+    search: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.label:
@@ -98,7 +105,8 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
     if isinstance(given, EstimatorRequest):
         if not parameters:
             return given
-        return EstimatorRequest(given.name, {**parameters, **given.parameters}, cls=given.cls)
+        return EstimatorRequest(given.name, {**parameters, **given.parameters}, cls=given.cls, point=given.point,
+                                search=given.search)  # fmt: skip
     if isinstance(given, type):
         with mistakes():
             name = enlist(given)
@@ -144,7 +152,7 @@ def requests(
             mine = common if len(items) == 1 or not common else _known(item, common)
             unused -= set(mine)
             found = request(item, mine)
-            if ".py" not in found.name and comes_with_simnav(found.cls or find(found.name)):
+            if ".py" not in found.name and not found.point and comes_with_simnav(found.cls or find(found.name)):
                 found.make()  # so that a mistake shows now; the code of others runs in a process of its own
         made.setdefault(found.label, found)
     if unused:

@@ -36,6 +36,10 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
     if file:
         name = f"{Path(file[1]).resolve()}{file[2] or ''}"
         entrant = Entrant(name, parameters, request.label, False, "")
+    elif request.point:
+        if confinement == "none":
+            raise RequestError(f"estimator {request.name!r}: a package that is not trusted is not run unconfined")
+        entrant = Entrant(name, parameters, request.label, False, "", point=request.point, search=request.search)
     else:
         _import_estimators()
         with mistakes(EstimatorError):

@@ -30,6 +30,8 @@ from simnav.leaderboard.cli import (
     rescore,
     run,
     simulate,
+    standard,
+    submit,
     sweep,
     train,
     tune,
@@ -99,9 +101,11 @@ for _module in (
     verify,
     cite,
     merge,
+    submit,
     tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
+standard.register(app)
 train.register(app)
 
 

@@ -85,6 +85,9 @@ def command(
     oracle: Annotated[
         bool, typer.Option(help="Run the oracles on simulated scenarios, too: the reference of a board, not ranked.")
     ] = True,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -104,12 +107,14 @@ def command(
                 covariance_interval=covariance_interval, confinement=confinement, sealed=sealed,
                 oracle=oracle,
                 backend=(Backend.DASK if scheduler else backend).value, scheduler=scheduler, shard=_shard(shard),
-                progress=campaign_progress(bar),
+                minutes=minutes, progress=campaign_progress(bar),
             )  # fmt: skip
         summary = report.summary
         out.document(report.to_dict())
         out.print(*ranking_tables(report.ranking), *failure_table(report.results))
         out.print(*filter(None, [confinement_line(report.results)]))
+        if summary.left:
+            out.print(f"{summary.left} of {summary.total} runs are left; the same command continues")
         out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
                   f"{tables.duration(summary.seconds)})",
                   f"next:    simnav leaderboard {quote(str(summary.folder))}")  # fmt: skip

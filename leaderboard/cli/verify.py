@@ -1,33 +1,54 @@
-"""``simnav verify``: seals, and a sample of results that is repeated."""
+"""``simnav verify``: seals, submissions, and a sample of results that is repeated."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simnav.leaderboard.cli.console import FAILED, session
+from simnav.leaderboard.cli.console import FAILED, Output, session
 from simnav.leaderboard.cli.options import Debug, Estimators, Json
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.submission.verifying import SubmissionReport
 
 __all__ = ["command"]
 
 
 def command(
-    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder of results.")],
+    results: Annotated[
+        Path, typer.Argument(metavar="RESULTS", help="Folder of results, or a bundle of 'simnav submit'.")
+    ],
     key: Annotated[
-        Path | None, typer.Option("--key", metavar="KEYFILE", help="Published key of a sealed campaign.")
+        Path | None,
+        typer.Option("--key", metavar="KEYFILE", help="Key of sealed seeds: of the results, or for a bundle."),
     ] = None,
     sample: Annotated[int, typer.Option(min=1, help="Runs that are repeated at most.")] = 10,
     scenario: Annotated[
         list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")
     ] = None,
     estimator: Estimators = None,
+    present: Annotated[
+        bool, typer.Option("--present", help="Of a bundle: use the packages that are here, not a new environment.")
+    ] = False,
+    tolerance: Annotated[
+        float | None, typer.Option(min=0.0, help="Of a bundle: relative difference that is accepted. [1e-6]")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Check the seal of results, and repeat some of them to the bit."""
+    """Check results or a submission, and repeat some of the runs to the bit."""
     with session(json, debug) as out:
+        if results.is_file():
+            from simnav.leaderboard import publishing
+
+            with out.progress("repeating") as progress:
+                told = publishing.verify_bundle(
+                    results, key=key, sample=sample, present=present, tolerance=tolerance, progress=progress
+                )
+            _print(out, told)
+            return
         from simnav.leaderboard import interface
 
         with out.progress("repeating") as progress:
@@ -45,3 +66,27 @@ def command(
         lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit")
         out.print(*lines)
         out.code = 0 if done.passed else FAILED
+
+
+def _print(out: Output, report: SubmissionReport) -> None:
+    out.document(report.to_dict())
+    lines = [
+        f"bundle:  {report.title}: {', '.join(report.estimators)} ({report.results} results, profile {report.profile})",
+        f"sha256:  {report.digest}",
+        f"where:   {report.environment}",
+        *(f"finding: {text}" for text in report.findings),
+        *(f"differs: {text}" for text in report.different),
+    ]
+    for s in report.sealed:
+        worse = "worse than public" if s in report.worse else "not worse than public"
+        lines.append(
+            f"sealed:  {s.label} on {s.scenario}: {worse}, {s.ratio:.3g} times the median error, p = {s.p_value:.2g} "
+            f"({s.sealed} sealed and {s.public} public runs, {s.failed} sealed runs failed)"
+        )
+    lines.append(
+        f"{report.identical} of {report.repeated} repeated runs are the same to the bit, {report.close} more within "
+        f"{report.tolerance:.0e}"
+    )
+    lines.append("the submission holds" if report.passed else "the submission does not hold")
+    out.print(*lines)
+    out.code = 0 if report.passed else FAILED

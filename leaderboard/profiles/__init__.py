@@ -10,7 +10,9 @@ has a title and one or more parts::
     estimators = ["ekf", "sw-fgo"]    # left out: all that are not slow
     runs = 10                         # seeds a scenario, from 0 on
 
-A part that names tracks may bound the length of its scenarios by ``shortest_s`` (exclusive) and ``longest_s``.
+A part that names tracks may bound the length of its scenarios by ``shortest_s`` (exclusive) and ``longest_s``. Rows
+that several parts share are named once: ``[groups]`` with ``chosen = ["ekf", "sw-fgo"]``, and
+``estimators = "chosen"``. What an earlier part has run is not run again.
 """
 
 from __future__ import annotations
@@ -101,11 +103,15 @@ def load(profile: str | os.PathLike[str]) -> Profile:
     parts = table.get("part")
     if not isinstance(parts, list) or not parts or not all(isinstance(p, dict) for p in parts):
         raise RequestError(f"{path}: a profile has one or more tables [[part]]")
-    found = tuple(_part(f"{path}: part {k + 1}", part) for k, part in enumerate(parts))
+    groups = table.get("groups", {})
+    if not isinstance(groups, dict):
+        raise RequestError(f"{path}: groups = {groups!r:.80} should be a table of lists of names")
+    groups = {name: list(_texts(f"{path}: groups", groups, name)) for name in groups}
+    found = tuple(_part(f"{path}: part {k + 1}", part, groups) for k, part in enumerate(parts))
     return Profile(path.stem, str(table.get("title", path.stem)), found)
 
 
-def _part(where: str, table: dict[str, Any]) -> Part:
+def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Part:
     for key in table:
         if key not in _KEYS:
             raise RequestError(f"{where}: {key!r} is no key of a part{closest(key, list(_KEYS))}")
@@ -120,6 +126,11 @@ def _part(where: str, table: dict[str, Any]) -> Part:
         tracks = _texts(where, table, "tracks")
         low, high = float(table.get("shortest_s", 0.0)), float(table.get("longest_s", math.inf))
         scenarios = tuple(h.name for h in headers() if h.track in tracks and low < h.duration <= high)
+    asked = table.get("estimators")
+    if isinstance(asked, str):
+        if asked not in groups:
+            raise RequestError(f"{where}: there is no group {asked!r} of estimators{closest(asked, list(groups))}")
+        table = table | {"estimators": groups[asked]}
     everyone = tuple(n for n in names() if not describe(n).slow)
     return Part(scenarios, _texts(where, table, "estimators") if "estimators" in table else everyone, runs)
 

@@ -218,11 +218,12 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
             yield table.replace_schema_metadata(schema().metadata)
 
 
-def write_tables(file: BinaryIO, tables: Iterator[pa.Table]) -> None:
-    """Write a file of results, with check sums."""
+def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | None = None) -> None:
+    """Write a file of results, with check sums; ``level`` is that of the compression."""
     import pyarrow.parquet as pq
 
-    with pq.ParquetWriter(file, schema(), compression="zstd", write_page_checksum=True) as writer:
+    options = {"compression": "zstd", "compression_level": level, "write_page_checksum": True}
+    with pq.ParquetWriter(file, schema(), **options) as writer:
         for table in tables:
             writer.write_table(table)
 

@@ -62,6 +62,7 @@ __all__ = [
     "create",
     "described",
     "drop",
+    "keep_provenance",
     "keys",
     "load",
     "provenances",
@@ -345,12 +346,13 @@ def write(folder: str | os.PathLike[str], result: Result) -> None:
         If it cannot be written, e.g. because the disk is full; nothing is left behind.
     """
     table = to_table(result)
-    _keep_provenance(Path(folder), result.provenance)
+    keep_provenance(Path(folder), result.provenance)
     with atomic(Path(folder) / _LOOSE / f"{result.key}.parquet") as file:
         write_tables(file, iter([table]))
 
 
-def _keep_provenance(path: Path, provenance: Provenance) -> None:
+def keep_provenance(path: Path, provenance: Provenance) -> None:
+    """Keep a provenance in a folder of results, unless it is there."""
     target = path / _PROVENANCE / f"{provenance.id}.json"
     if not provenance.id or provenance.identity or target.exists():
         return

@@ -84,7 +84,7 @@ class ScenarioEntry:
 
 
 class ExtraPage(Protocol):
-    """A page that something other than a campaign's results brings to the site: a reproduction of a paper."""
+    """A page that something other than a campaign's results brings to the site: a paper, an edition of the board."""
 
     @property
     def page(self) -> str:
@@ -92,7 +92,7 @@ class ExtraPage(Protocol):
 
     @property
     def paper(self) -> str:
-        """Key of the paper, for the menu."""
+        """What the menu calls it: authors and year of the paper, number of the edition."""
 
     @property
     def title(self) -> str:
@@ -119,6 +119,8 @@ class SiteFacts:
     scenarios, estimators : sequence
     papers : sequence of ExtraPage
         Pages of the comparisons of papers.
+    editions : sequence of ExtraPage
+        Pages of the editions of the board.
     command : str
         That makes the results again.
     benchmark : str
@@ -135,6 +137,7 @@ class SiteFacts:
     scenarios: Sequence[ScenarioEntry] = ()
     estimators: Sequence[EstimatorEntry] = ()
     papers: Sequence[ExtraPage] = ()
+    editions: Sequence[ExtraPage] = ()
     command: str = ""
     benchmark: str = ""
     provenance: Sequence[Provenance] = field(default_factory=tuple)

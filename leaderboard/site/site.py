@@ -53,6 +53,7 @@ def build(
     progress: Callable[..., None] | None = None,
     workers: int = 1,
     papers: Sequence[ExtraPage] = (),
+    editions: Sequence[ExtraPage] = (),
     runs_shown: int = RUNS_SHOWN,
     figures: bool = False,
 ) -> Path:
@@ -74,6 +75,8 @@ def build(
         Processes that prepare the scenarios.
     papers : sequence of ExtraPage, optional
         Reproductions of papers (`simnav.leaderboard.papers.page.find`).
+    editions : sequence of ExtraPage, optional
+        Editions of the board (`simnav.leaderboard.standard.editions.pages_of`).
     runs_shown : int
         Runs of each scenario of which track and errors are on the site.
     figures : bool
@@ -100,7 +103,7 @@ def build(
     try:
         draft.chmod(0o755)
         report = progress or (lambda *_, **__: None)
-        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers)
+        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions)
         site.write(runs_shown, figures)
         _swap(draft, output)
     finally:
@@ -176,6 +179,7 @@ class _Site:
         progress: Callable[..., None],
         workers: int,
         papers: Sequence[ExtraPage],
+        editions: Sequence[ExtraPage],
     ):
         from importlib.metadata import version
 
@@ -203,6 +207,7 @@ class _Site:
             scenarios=described,
             estimators=list(self.estimators.values()),
             papers=papers,
+            editions=editions,
             command=command,
             benchmark=benchmark_of(provenances),
             provenance=distinct(provenances),
@@ -235,7 +240,7 @@ class _Site:
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
         self._page(pages, "compare.html", "compare.html", {"kind": "compare", "rows": rows})
         self._page(pages, "about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
-        for extra in self.facts.papers:
+        for extra in (*self.facts.papers, *self.facts.editions):
             extra.install(self.folder, self.facts)
         for name in _STATIC:
             shutil.copyfile(TEMPLATES / name, self.folder / name)

@@ -24,6 +24,7 @@ __all__ = [
     "discover_own",
     "discover_point",
     "forget",
+    "is_own",
     "is_own_reference",
     "kebab",
     "names",
@@ -158,6 +159,13 @@ def is_own_reference(name: str) -> bool:
     if cls is None or not cls.reference or not cls.__module__.startswith("simnav.estimators."):
         return False
     return getattr(sys.modules.get(cls.__module__), cls.__qualname__, None) is cls
+
+
+def is_own(name: str) -> bool:
+    """Whether a name or alias is that of an estimator that comes with simnav."""
+    discover_own()
+    cls = _classes.get(_aliases.get(name, name))
+    return cls is not None and cls.__module__.startswith("simnav.estimators.")
 
 
 def _is_ours(point: EntryPoint) -> bool:

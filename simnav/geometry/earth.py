@@ -55,7 +55,7 @@ _CURVATURE = 3.0 / SEMI_MAJOR_AXIS**2
 
 
 @kernel()
-def radii_scalar(sin_latitude):  # type: ignore[no-untyped-def]
+def radii_scalar(sin_latitude: float) -> tuple[float, float]:
     """Meridian and prime-vertical radius [m] at a sine of latitude (Groves eqs. 2.105-2.106)."""
     x = 1.0 - ECCENTRICITY_SQUARED * sin_latitude * sin_latitude
     prime_vertical = SEMI_MAJOR_AXIS / sqrt(x)
@@ -65,7 +65,7 @@ def radii_scalar(sin_latitude):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def gravity_scalar(sin_latitude, height):  # type: ignore[no-untyped-def]
+def gravity_scalar(sin_latitude: float, height: float) -> float:
     """Normal gravity [m/s^2], positive down: Somigliana with height terms (Groves eqs. 2.134, 2.139)."""
     s2 = sin_latitude * sin_latitude
     surface = EQUATORIAL_GRAVITY * (1.0 + SOMIGLIANA * s2) / sqrt(1.0 - ECCENTRICITY_SQUARED * s2)

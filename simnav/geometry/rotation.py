@@ -206,13 +206,13 @@ def quaternion_from_dcm(dcm: Array) -> Array:
 
 
 @kernel()
-def cross(a0, a1, a2, b0, b1, b2):  # type: ignore[no-untyped-def]
+def cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
     """Vector product of two 3-vectors of scalars."""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
 @kernel()
-def rotation_coefficients(angle2):  # type: ignore[no-untyped-def]
+def rotation_coefficients(angle2: float) -> tuple[float, float]:
     """sin(x)/x and (1 - cos(x))/x^2 for x^2 = ``angle2``, good to rounding."""
     if angle2 < 1e-3:
         # Reciprocals are folded when compiled: a division costs as much as five products.

@@ -1,4 +1,4 @@
-"""Thinned errors and tracks of a trial: what plots are made of."""
+"""Thinned errors, tracks and diagnostics of a trial: what plots are made of."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from numpy.typing import NDArray
 
 from simnav.geometry.earth import relative_position
 from simnav.recording import Recording
+from simnav.scoring.integrity import protection_levels
 from simnav.scoring.navigation_error import errors, horizontal
 from simnav.trial import Trial
 from simnav.types import Array
 
-__all__ = ["series"]
+__all__ = ["DIAGNOSTICS", "series"]
+
+#: Diagnostics of single instruments that are kept, as ``NAME.INSTRUMENT``: length of the innovation, normalised
+#: innovation squared, length of the residual after the adjustment in sigmas, weight.
+DIAGNOSTICS: tuple[str, ...] = ("innovation", "nis", "residual", "weight")
 
 
-def series(trial: Trial, recording: Recording, *, points: int = 500) -> dict[str, Array]:
-    """Errors over time and tracks of a trial, thinned to every so many epochs; the last epoch is always in.
+def series(trial: Trial, recording: Recording, *, points: int = 500, bins: int = 100) -> dict[str, Array]:
+    """Errors over time, tracks and diagnostics of a trial, thinned; the last epoch is always in.
 
     Parameters
     ----------
@@ -24,11 +29,14 @@ def series(trial: Trial, recording: Recording, *, points: int = 500) -> dict[str
         The one that it was run on.
     points : int
         Largest number of epochs k.
+    bins : int
+        Largest number b of equal parts of the run over which diagnostics are averaged: an instrument may deliver at
+        few epochs only, and those must not be missed.
 
     Returns
     -------
     dict of str to array
-        All (k,), NaN where unknown, but ``quantiles``:
+        All (k,), NaN where unknown, unless another shape is given:
 
         - ``time`` [s]
         - ``horizontal``, ``vertical`` (down), ``north``, ``east``: errors [m]
@@ -37,6 +45,9 @@ def series(trial: Trial, recording: Recording, *, points: int = 500) -> dict[str
         - ``estimate_north``, ``estimate_east``, ``estimate_down``, ``truth_north``, ``truth_east``, ``truth_down``:
           tracks relative to the true start [m]
         - ``quantiles`` (101,): 0th to 100th percentile of the horizontal error over all epochs [m]
+        - ``protection_level`` [m]: only where the estimator gives one of its own
+        - ``innovation.NAME`` (unit of the instrument), ``nis.NAME``, ``residual.NAME`` (sigma), ``weight.NAME``: all
+          (b,), of those instruments for which the estimator has them; ``diagnostics_time`` (b,): middle of the bins [s]
     """
     error = errors(trial, recording)
     n = len(trial)
@@ -62,7 +73,29 @@ def series(trial: Trial, recording: Recording, *, points: int = 500) -> dict[str
     for j, axis in enumerate(("north", "east", "down")):
         result[f"truth_{axis}"] = truth[:, j]
         result[f"estimate_{axis}"] = estimate[:, j]
-    return result
+    if "protection_level" in trial.diagnostics:
+        result["protection_level"] = protection_levels(trial)[keep]
+    return result | _diagnostics(trial, bins)
+
+
+def _diagnostics(trial: Trial, bins: int) -> dict[str, Array]:
+    """Means of the diagnostics of single instruments over equal numbers of epochs; NaN where there is none."""
+    kept = {
+        name: np.asarray(values, dtype=np.float64)
+        for name, values in trial.diagnostics.items()
+        if name.partition(".")[0] in DIAGNOSTICS and "." in name and np.ndim(values) == 1
+    }
+    if not kept or not len(trial):
+        return {}
+    edges = np.unique(np.linspace(0, len(trial), min(bins, len(trial)) + 1).round().astype(np.int64))
+    starts = edges[:-1]
+    found = {"diagnostics_time": 0.5 * (trial.time[starts] + trial.time[edges[1:] - 1])}
+    for name, values in kept.items():
+        known = np.isfinite(values)
+        count = np.add.reduceat(known.astype(np.int64), starts)
+        total = np.add.reduceat(np.where(known, values, 0.0), starts)
+        found[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return found
 
 
 def _three_sigma(trial: Trial, keep: NDArray[np.int64]) -> Array:

@@ -21,7 +21,7 @@ __all__ = ["GaussMarkov", "HeldGaussMarkov", "quantize_scalar", "ready"]
 
 
 @kernel()
-def quantize_scalar(increment, step, residual):  # type: ignore[no-untyped-def]
+def quantize_scalar(increment: float, step: float, residual: float) -> tuple[float, float]:
     """Nearest multiple of ``step`` to increment + residual, and what is left for the next sample."""
     total = increment + residual
     output = step * floor(total / step + 0.5)
@@ -29,7 +29,9 @@ def quantize_scalar(increment, step, residual):  # type: ignore[no-untyped-def]
 
 
 @kernel("b1(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8, f8)")
-def _gauss_markov(variates, state, sigma, time, previous, correlation_time):  # type: ignore[no-untyped-def]
+def _gauss_markov(
+    variates: Array, state: Array, sigma: Array, time: Array, previous: float, correlation_time: float
+) -> bool:
     """Turn unit variates (n, d) into the process, in place; false where time runs backwards.
 
     x_k = a x_{k-1} + b sigma w_k, a = exp(-dt/T), b = sqrt(1 - a^2); for infinite T: a = 1, b = sqrt(dt).

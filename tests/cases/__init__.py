@@ -1,4 +1,4 @@
-"""Scenario files that several tests use."""
+"""Scenario files, recordings, trials and logs that several tests use."""
 
 from pathlib import Path
 

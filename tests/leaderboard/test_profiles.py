@@ -34,12 +34,22 @@ def test_quick_has_few_rows_and_seeds_enough_to_decide():
     assert not any(describe(e).slow for p in profile.parts for e in p.estimators)
 
 
-def test_standard_covers_the_tracks_and_runs_long_scenarios_less():
+def test_standard_covers_all_tracks_with_fewer_seeds_of_other_rows_and_of_long_scenarios():
     known = {h.name: h for h in headers()}
-    short, long = load("standard").parts
-    assert {known[s].track for s in short.scenarios} >= {"aided-ins", "no-imu", "underwater", "recorded"}
-    assert max(known[s].duration for s in short.scenarios) <= 3600.0 < min(known[s].duration for s in long.scenarios)
-    assert (short.runs, long.runs) == (30, 10)
+    most: dict[tuple[str, str], int] = {}
+    for part in load("standard").parts:
+        for scenario in part.scenarios:
+            for row in part.estimators:
+                most[scenario, row] = max(part.runs, most.get((scenario, row), 0))
+    assert {known[s].track for s, _ in most} == {h.track for h in headers() if not h.training}
+    assert {s for s, _ in most} == {h.name for h in headers() if not h.training}
+    chosen = {row for (_, row), runs in most.items() if runs == 30}
+    assert 20 <= len(chosen) <= 25
+    assert {row for _, row in most} == {n for n in names() if not describe(n).slow}
+    for (scenario, row), runs in most.items():
+        short = known[scenario].duration <= 3600.0 and known[scenario].track != "papers"
+        assert runs == ((30 if row in chosen else 10) if short else 3 if scenario == "twelve-hours" else 10)
+        assert short or row in chosen
 
 
 def test_a_profile_of_ones_own(tmp_path: Path):
@@ -52,6 +62,8 @@ def test_a_profile_of_ones_own(tmp_path: Path):
         ("[[part]]\nruns = 1", "name scenarios or tracks"),
         ('[[part]]\nscenario = ["a"]\nruns = 1', "'scenario' is no key of a part; did you mean 'scenarios'"),
         ('[[part]]\nscenarios = "a"\nruns = 1', "should be a list of names"),
+        ('[[part]]\nscenarios = ["a"]\nestimators = "few"\nruns = 1', "there is no group 'few' of estimators"),
+        ('[groups]\nfew = "ekf"\n[[part]]\nscenarios = ["a"]\nruns = 1', "few = 'ekf' should be a list of names"),
         ("[[part]", "mine.toml"),
     ):
         file.write_text(text)

@@ -75,7 +75,7 @@ class _Session:
         """Import and construct the estimator; of a file or a session that is the first time that its code runs."""
         try:
             entrant, path, words = pickle.loads(body)
-            sys.path[:] = path
+            sys.path[:] = [*entrant.search, *path]
             _seed(words)
             self._estimator = entrant.make()
             cls = type(self._estimator)
@@ -90,7 +90,7 @@ class _Session:
         """What the estimator is, and why it cannot be made: by a wrong request, or in its constructor."""
         try:
             entrant, path, words = pickle.loads(body)
-            sys.path[:] = path
+            sys.path[:] = [*entrant.search, *path]
             _seed(words)
             cls = entrant.find()
             told = {"reference": bool(cls.reference), "source": estimator_source(cls), "failure": ""}

@@ -40,7 +40,7 @@ _ENVIRONMENT = (
     "CUDA_VISIBLE_DEVICES",
 )  # fmt: skip
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "NUMBA_NUM_THREADS")
-_START = 600.0  # for a server to be ready, compiling included [s]
+_START = 900.0  # for a server to be ready; on a slow and busy machine compiling takes minutes [s]
 _END = 20.0  # for a server to look after what is left of an estimator process [s]
 _PIECE = 1 << 16
 _TICK = 1000.0  # the longest wait between two looks at the clock [ms]
@@ -178,7 +178,7 @@ class EstimatorServer:
             if told is None or not told.get("ready"):
                 self._process.kill()
                 words = (self._process.stderr.read() if self._process.stderr else b"").decode(errors="replace")
-                last = words.strip().splitlines()[-1:] or ["it ended without a word"]
+                last = words.strip().splitlines()[-1:] or ["it ended, or was silent for 15 minutes"]
                 self.close()
                 raise ServerError(f"the process for estimators does not start: {last[0][:300]}")
             self._ready = True

@@ -308,7 +308,8 @@ def test_a_sandbox_hides_results_and_has_no_network(recording: Recording, tmp_pa
                 return False
             return True
         found = [os.listdir({str(results)!r}), writes({str(outside)!r}), writes(os.environ['TMPDIR']),
-                 len(open('/proc/net/dev').readlines()) - 2, sorted(int(p) for p in os.listdir('/proc') if p.isdigit())[0]]
+                 len(open('/proc/net/dev').readlines()) - 2,
+                 sorted(int(p) for p in os.listdir('/proc') if p.isdigit())[0]]
         diagnostics = {{json.dumps(found): 1.0}}"""
         there = ended(server, recording, tmp_path, update)
         assert there.status == "ok", there.reason

@@ -10,8 +10,7 @@ from simnav.geometry.rotation import dcm_from_rpy
 from simnav.log import LogError, LogSource, LogWarning
 from simnav.recording import Block
 from simnav.strapdown import integrate
-
-from .conftest import CLOCK, RATE, write_csv
+from tests.cases.tiny_log import CLOCK, RATE, write_csv
 
 OUTAGE = """
 [[fault]]

@@ -220,6 +220,24 @@ def test_series_are_thinned_and_hold_the_tracks(make_recording: Any, make_trial:
     assert {len(v) for n, v in s.items() if n != "quantiles"} == {500}
 
 
+def test_series_hold_the_means_of_the_diagnostics_of_each_instrument(make_recording: Any, make_trial: Any) -> None:
+    """An instrument that delivers at one epoch in seven is in every part of the run."""
+    from dataclasses import replace
+
+    recording = make_recording(steps=1000)
+    seldom = np.where(np.arange(1000) % 7 == 0, np.arange(1000.0), np.nan)
+    given = {"weight.gnss": seldom, "nis.gnss": np.full(1000, np.nan), "iterations": np.ones(1000)}
+    given["protection_level"] = np.linspace(10.0, 20.0, 1000)
+    s = series(replace(make_trial(recording, np.zeros(9)), diagnostics=given), recording)
+    assert s["weight.gnss"].shape == s["diagnostics_time"].shape == (100,)
+    assert "iterations" not in s
+    assert np.isnan(s["nis.gnss"]).all()
+    assert s["weight.gnss"][0] == 3.5  # of 0 and 7
+    np.testing.assert_allclose(s["weight.gnss"], s["diagnostics_time"] - 1.0, atol=4.0)
+    assert (s["protection_level"][0], s["protection_level"][-1]) == (10.0, 20.0)
+    assert s["protection_level"].shape == s["time"].shape
+
+
 def test_series_of_a_trial_that_gave_nothing(recording: Recording, make_trial: Any) -> None:
     s = series(make_trial(recording, np.zeros((0, 9))), recording)
     assert len(s["time"]) == len(s["truth_north"]) == 0

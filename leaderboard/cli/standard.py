@@ -1,0 +1,103 @@
+"""``simnav standard``: the result that comes with simnav."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simnav.leaderboard.cli.console import FAILED, session
+from simnav.leaderboard.cli.options import Debug, Json, Workers, campaign_progress
+
+__all__ = ["register"]
+
+_app = typer.Typer(help="Run, check and publish the result that comes with simnav.", no_args_is_help=True)
+_Results = Annotated[Path, typer.Option("--results", help="Folder to work in.")]
+_Profile = Annotated[str, typer.Option(help="What is run: a profile of simnav, or a file.")]
+_Shipped = Annotated[Path | None, typer.Option(help="Folder of the packed results. [that of simnav]")]
+_WORKING = Path("results/standard")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.add_typer(_app, name="standard")
+
+
+@_app.command()
+def run(
+    minutes: Annotated[
+        float, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
+    ] = 110.0,
+    results: _Results = _WORKING,
+    profile: _Profile = "standard",
+    shipped: _Shipped = None,
+    workers: Workers = 2,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Run what is missing of the standard result, or has changed since."""
+    with session(json, debug) as out:
+        from simnav.leaderboard import publishing
+
+        with out.progress("starting") as bar:
+            report = publishing.run_standard(
+                minutes=minutes, profile=profile, results=results, shipped=shipped, workers=workers,
+                progress=campaign_progress(bar),
+            )  # fmt: skip
+        s = report.summary
+        out.document({"results": str(s.folder), "computed": s.computed, "skipped": s.skipped, "left": s.left})
+        out.print(
+            f"results: {s.folder} ({s.computed} computed, {s.skipped} were there, {s.left} are left)",
+            "next:    simnav standard run" if s.left else "next:    simnav standard publish",
+        )
+
+
+@_app.command()
+def check(
+    results: Annotated[Path | None, typer.Option("--results", help="Folder of results. [those of simnav]")] = None,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Say which rows and scenarios have changed since the standard result was computed."""
+    with session(json, debug) as out:
+        from simnav.leaderboard import publishing
+
+        found = publishing.check_standard(results)
+        out.document(found.to_dict())
+        out.print(*(found.sentences() or ["the standard result is what the code of today gives"]))
+        out.code = FAILED if found else 0
+
+
+@_app.command()
+def publish(
+    results: _Results = _WORKING,
+    profile: _Profile = "standard",
+    shipped: _Shipped = None,
+    history: Annotated[Path | None, typer.Option(help="File of the editions. [that of simnav]")] = None,
+    readme: Annotated[Path | None, typer.Option(help="Whose tables are written. [README.md, if it is here]")] = None,
+    site: Annotated[Path, typer.Option(help="Folder of the site.")] = Path("site"),
+    workers: Workers = 2,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Pack the standard result, and make its site, the README's tables and the history of rows from it."""
+    with session(json, debug) as out:
+        from simnav.leaderboard import publishing
+        from simnav.leaderboard.standard.readme import BEGIN
+
+        here = Path("README.md")
+        if readme is None and here.is_file() and BEGIN in here.read_text(encoding="utf-8", errors="replace"):
+            readme = here
+        with out.progress("site") as bar:
+            made = publishing.publish_standard(
+                results=results, profile=profile, shipped=shipped, history=history, readme=readme, site=site,
+                workers=workers, progress=bar,
+            )  # fmt: skip
+        out.document({**made.to_dict(), "site": str(site)})
+        out.print(
+            f"results: {made.folder} ({len(made.results)} runs, {made.size / 2**20:.1f} MiB)",
+            f"edition: {made.edition}",
+            *([f"tables:  {made.readme}"] if made.readme is not None else []),
+            f"site:    {site / 'index.html'}",
+        )

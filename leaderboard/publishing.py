@@ -1,0 +1,337 @@
+"""Calls about results that others are to rely on: submissions, and the standard result that comes with simnav.
+
+`simnav.leaderboard.interface` has the calls that compute and compare; these build on them.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.given import absolute
+from simnav.leaderboard.interface import CampaignProgress, campaign
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.standard.currency import Outdated
+    from simnav.leaderboard.standard.publication import Published
+    from simnav.leaderboard.submission.verifying import SubmissionReport
+
+__all__ = ["Submission", "check_standard", "publish_standard", "run_standard", "submit", "verify_bundle"]
+
+
+@dataclass(frozen=True)
+class Submission:
+    """A bundle that was written.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    digest : str
+        Its SHA-256.
+    estimators : tuple of str
+        Labels.
+    profile : str
+    results, failed : int
+        Results in it, and how many of them are failures.
+    remarks : tuple of str
+        What others will see as a lack.
+    """
+
+    path: Path
+    digest: str
+    estimators: tuple[str, ...]
+    profile: str
+    results: int
+    failed: int
+    remarks: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain."""
+        return {**vars(self), "path": str(self.path)}
+
+
+def submit(
+    estimator: str,
+    *,
+    profile: str | os.PathLike[str] = "standard",
+    parameters: Mapping[str, Any] | None = None,
+    requires: Sequence[str] = (),
+    output: str | os.PathLike[str] | None = None,
+    results: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    minutes: float | None = None,
+    progress: CampaignProgress = None,
+) -> Submission:
+    """Run an estimator on a profile, and write its source and results as a bundle.
+
+    Parameters
+    ----------
+    estimator : str
+        A file, an installed package that registers estimators, or the name of one of its estimators.
+    profile : str or path
+        Which scenarios and seeds are run.
+    parameters : mapping, optional
+        Of the estimators.
+    requires : sequence of str
+        Packages that a file needs beside simnav, as pip takes them. Those of a package are known.
+    output : path, optional
+        The bundle; default: ``NAME.simnav.zip``.
+    results : path, optional
+        Folder in which the results are kept; default: ``results/submit-NAME``. The same call continues there.
+    workers : int
+        Processes.
+    minutes : float, optional
+        Time after which no further run is started.
+    progress : callable, optional
+        As for `simnav.leaderboard.interface.campaign`.
+
+    Returns
+    -------
+    Submission
+
+    Raises
+    ------
+    RequestError
+        If there is no such estimator or profile, the estimator cannot be passed on, or runs are left after ``minutes``.
+    """
+    from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.results.packing import pack
+    from simnav.leaderboard.results.provenance import BENCHMARK
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.submission.bundle import SUFFIX, Row, write_bundle
+    from simnav.leaderboard.submission.source import source_of
+    from simnav.leaderboard.submission.verifying import runs_of
+
+    name = load(profile).name
+    with mistakes(ValueError):
+        confinement = chosen_confinement("auto")
+    with tempfile.TemporaryDirectory(prefix="simnav-submit-") as scratch:
+        source = source_of(str(estimator), dict(parameters or {}), Path(scratch), tuple(requires))
+        folder = absolute(results or Path("results") / f"submit-{source.title}")
+        target = absolute(output or f"{source.title}{SUFFIX}")
+        if not target.parent.is_dir():
+            raise RequestError(f"{target.parent} is no folder")
+        report = campaign(
+            estimators=list(source.requests), output=folder, profile=profile, workers=workers, minutes=minutes,
+            confinement=confinement, progress=progress,
+        )  # fmt: skip
+        if report.summary.left:
+            raise RequestError(
+                f"{report.summary.left} of {report.summary.total} runs are left after {minutes:g} minutes; the same "
+                "command continues"
+            )
+        with mistakes(StoreError):
+            found = pack(folder, Path(scratch) / "results", [r.label for r in source.requests])
+        ran = {r.scenario for r in found}
+        runs = {s: n for s, n in runs_of(str(profile)).items() if s in ran}
+        points = {r.label: _point(r.name) for r in source.requests}
+        rows = [
+            Row(label=r.label, name=_within(r.name), point=points[r.label], parameters=dict(r.parameters))
+            for r in source.requests
+        ]
+        digest = write_bundle(
+            target, title=source.title, benchmark=BENCHMARK, profile=name, runs=runs, main=source.main, estimators=rows,
+            requires=source.requires, source=source.files, results=Path(scratch) / "results",
+        )  # fmt: skip
+    remarks = []
+    if any(r.provenance.dirty for r in found):
+        remarks.append("the checkout of simnav has changes that no commit holds, so others cannot repeat the results")
+    if confinement == "none":
+        remarks.append("the results were computed without confinement, which no board accepts")
+    tried = [r for r in found if r.tried]
+    failed = sum(r.status != "ok" for r in tried)
+    return Submission(target, digest, tuple(r.label for r in rows), name, len(found), failed, tuple(remarks))
+
+
+def _point(name: str) -> str:
+    from simnav.estimator.registry import point_of
+
+    return "" if ".py" in name else point_of(name)
+
+
+def _within(name: str) -> str:
+    """The name of an estimator without the folder of its file."""
+    return os.path.basename(name) if ".py" in name else name
+
+
+def verify_bundle(
+    bundle: str | os.PathLike[str],
+    *,
+    key: str | os.PathLike[str] | None = None,
+    sample: int = 10,
+    present: bool = False,
+    tolerance: float | None = None,
+    progress: Callable[..., None] | None = None,
+) -> SubmissionReport:
+    """Check a submission, and repeat a sample of its runs where it can do no harm.
+
+    Parameters
+    ----------
+    bundle : path
+        That `submit` wrote.
+    key : path, optional
+        File of a secret key: the estimators also run on seeds that are derived from it.
+    sample : int
+        Runs that are repeated at most.
+    present : bool
+        Use the packages of this environment, which is quick and needs no network. By default a new environment is made.
+    tolerance : float, optional
+        Largest relative difference of a score that counts as the same; default: 1e-6. Differences of bits are counted.
+    progress : callable, optional
+        Called with how many of how many runs are done, and ``note=`` the next.
+
+    Returns
+    -------
+    simnav.leaderboard.submission.verifying.SubmissionReport
+
+    Raises
+    ------
+    RequestError
+        If the file is no bundle, was changed, or cannot be run here.
+    """
+    from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.leaderboard.submission.verifying import TOLERANCE
+    from simnav.leaderboard.submission.verifying import verify_bundle as verify
+
+    return verify(
+        absolute(bundle), None if key is None else read_seal(key), sample=sample, present=present,
+        tolerance=TOLERANCE if tolerance is None else tolerance, progress=progress,
+    )  # fmt: skip
+
+
+def run_standard(
+    *,
+    minutes: float | None = 110.0,
+    profile: str | os.PathLike[str] = "standard",
+    results: str | os.PathLike[str] = "results/standard",
+    shipped: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    progress: CampaignProgress = None,
+) -> CampaignReport:
+    """Run what is missing of the standard result, for some time. The same call continues.
+
+    A new folder starts with the results that come with simnav. So only what has changed since is run.
+
+    Parameters
+    ----------
+    minutes : float or None
+        Time after which no further run is started; None for no end.
+    profile : str or path
+        What is run.
+    results : path
+        Folder to work in.
+    shipped : path, optional
+        The results to start with; default: those that come with simnav.
+    workers : int
+        Processes.
+    progress : callable, optional
+        As for `simnav.leaderboard.interface.campaign`.
+
+    Returns
+    -------
+    CampaignReport
+        Its summary says how many runs are left.
+    """
+    from simnav.leaderboard import standard
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.standard.publication import begin
+
+    folder = absolute(results)
+    with mistakes(StoreError):
+        begin(folder, standard.RESULTS if shipped is None else absolute(shipped))
+    return campaign(output=folder, profile=profile, workers=workers, minutes=minutes, progress=progress)
+
+
+def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
+    """Whether the standard result is what the code of today gives; nothing is run.
+
+    Parameters
+    ----------
+    results : path, optional
+        Folder of results; default: those that come with simnav.
+
+    Returns
+    -------
+    simnav.leaderboard.standard.currency.Outdated
+
+    Raises
+    ------
+    RequestError
+        If there are no results.
+    """
+    from simnav.leaderboard import standard
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.standard.currency import outdated
+
+    folder = standard.RESULTS if results is None else absolute(results)
+    if not standard.shipped(folder):
+        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    with mistakes(StoreError):
+        return outdated(folder)
+
+
+def publish_standard(
+    *,
+    results: str | os.PathLike[str] = "results/standard",
+    profile: str | os.PathLike[str] = "standard",
+    shipped: str | os.PathLike[str] | None = None,
+    history: str | os.PathLike[str] | None = None,
+    readme: str | os.PathLike[str] | None = None,
+    site: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    progress: Callable[..., None] | None = None,
+) -> Published:
+    """Make what comes with simnav from the results of `run_standard`: packed results, history, README, and a site.
+
+    Parameters
+    ----------
+    results : path
+        Folder of the results. If it is not there, the results that come with simnav are taken.
+    profile : str or path
+        That the results should hold as a whole.
+    shipped, history : path, optional
+        Folder of the packed results, and file of the editions; default: those that come with simnav.
+    readme : path, optional
+        Whose tables are written; default: none.
+    site : path, optional
+        Folder of a site that is drawn; default: none.
+    workers : int
+        Processes that draw.
+    progress : callable, optional
+        Called with how many of how many pages are done.
+
+    Raises
+    ------
+    RequestError
+        If runs are missing or out of date; then nothing is written.
+    """
+    from simnav.leaderboard import standard
+    from simnav.leaderboard.interface import results_of
+    from simnav.leaderboard.papers.page import find
+    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.site.site import build
+    from simnav.leaderboard.standard.editions import pages_of
+    from simnav.leaderboard.standard.history import read
+    from simnav.leaderboard.standard.publication import publish
+
+    folder = standard.RESULTS if shipped is None else absolute(shipped)
+    file = standard.HISTORY if history is None else absolute(history)
+    working = absolute(results)
+    if not working.exists():
+        working = folder
+    with mistakes(StoreError):
+        made = publish(working, load(profile), folder, file, None if readme is None else absolute(readme))
+    if site is not None:
+        found = results_of(working, series=True)
+        build(found, made.ranking, absolute(site), progress=progress, workers=workers, papers=find(Path("reproduced")),
+              editions=pages_of(read(file)))  # fmt: skip
+    return made

@@ -1,0 +1,102 @@
+"""Results as they are passed on: a folder of results without series, with one file for each estimator.
+
+A packed folder is a folder of results like any other: it can be ranked, merged, verified and shown. Another run of one
+estimator changes one file of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.result import Result, to_table, write_tables
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["pack"]
+
+_ROWS = 4096  # of a group in a file
+
+
+def pack(
+    folder: str | os.PathLike[str], target: str | os.PathLike[str], estimators: Collection[str] | None = None
+) -> list[Result]:
+    """Write the current results of a folder into another one, without series and trials.
+
+    Parameters
+    ----------
+    folder : path
+        Of the results. It stays as it is.
+    target : path
+        New, or a folder of results, which is replaced.
+    estimators : collection of str, optional
+        Labels of those that are taken. Default: all.
+
+    Returns
+    -------
+    list of Result
+        That were written, in order of scenario, estimator and seed.
+
+    Raises
+    ------
+    StoreError
+        If a folder cannot be used, or the target holds something else. Then the target is as it was.
+    """
+    source, place = Path(folder), Path(target)
+    found = [
+        replace(r, series={}, seconds=round(r.seconds, 3))
+        for r in store.load(source, series=False)
+        if estimators is None or r.estimator in estimators
+    ]
+    if place.exists():
+        store.create(place)  # refuses a folder of something else
+    place.parent.mkdir(parents=True, exist_ok=True)
+    draft = Path(tempfile.mkdtemp(prefix=f".{place.name}.", dir=place.parent))
+    try:
+        made = store.create(draft / "results")
+        by: dict[str, list[Result]] = {}
+        current: dict[str, tuple[str, dict[str, str]]] = {}
+        for result in found:
+            by.setdefault(result.estimator, []).append(result)
+            current.setdefault(result.scenario, (result.recording, {}))[1][result.estimator] = result.variant
+            store.keep_provenance(made, result.provenance)
+        for label, mine in by.items():
+            with store.atomic(made / "compacted" / f"part-{_file_name(label)}.parquet") as file:
+                write_tables(file, _tables(mine), level=15)
+        store.select(made, current)
+        shutil.rmtree(made / "results")
+        old = draft / "old"
+        if place.exists():
+            os.replace(place, old)
+        os.replace(made, place)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+    return found
+
+
+def _tables(results: list[Result]) -> Iterator[pa.Table]:
+    import pyarrow as pa
+
+    for first in range(0, len(results), _ROWS):
+        yield pa.concat_tables([to_table(r) for r in results[first : first + _ROWS]]).combine_chunks()
+
+
+def _file_name(label: str) -> str:
+    """A file name for a label: plain characters only, and none twice.
+
+    >>> _file_name("ekf"), _file_name("ekf(gate=3)")
+    ('ekf', 'ekf-gate-3-499a09')
+    """
+    plain: Any = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")[:60]
+    if plain == label:
+        return label
+    return f"{plain}-{hashlib.blake2b(label.encode(), digest_size=3).hexdigest()}"

@@ -1,0 +1,134 @@
+"""From results of the standard profile to what comes with simnav: packed results, the history of rows, the README."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.profiles import Profile
+from simnav.leaderboard.ranking.board import Ranking
+from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.gathering import gather
+from simnav.leaderboard.results.packing import pack
+from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.standard import shipped
+from simnav.leaderboard.standard.currency import outdated
+from simnav.leaderboard.standard.history import append
+from simnav.leaderboard.standard.readme import replaced, tables
+from simnav.scenario import load
+
+__all__ = ["Published", "begin", "missing", "publish"]
+
+
+@dataclass(frozen=True)
+class Published:
+    """What was published.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the packed results.
+    edition : int
+        Number of the edition.
+    results : sequence of Result
+    ranking : Ranking
+    size : int
+        Of the files in the folder [bytes].
+    readme : Path or None
+        That was brought up to date.
+    """
+
+    folder: Path
+    edition: int
+    results: Sequence[Result]
+    ranking: Ranking
+    size: int
+    readme: Path | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav standard publish --json`` prints."""
+        return {
+            "folder": str(self.folder),
+            "edition": self.edition,
+            "runs": len(self.results),
+            "size": self.size,
+            "readme": None if self.readme is None else str(self.readme),
+            "ranking": self.ranking.to_dict(),
+        }
+
+
+def begin(working: Path, folder: Path) -> None:
+    """Let a new folder start with the results that come with simnav: what has not changed since is not run again."""
+    if shipped(folder) and not store.described(working) and not outdated(folder).benchmark:
+        gather(working, [folder])
+
+
+def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
+    """How many runs of a profile are not there, by scenario and estimator: ``{"ekf on open-sea-v1": 3}``.
+
+    Recorded logs that were not run at all are left out, because their files are not everywhere.
+    """
+    there = {(r.scenario, r.estimator, r.seed) for r in results}
+    ran = {r.scenario for r in results}
+    found: dict[str, int] = {}
+    for part in profile.parts:
+        for name in part.scenarios:
+            scenario = load(name)
+            if scenario.log is not None and scenario.id not in ran:
+                continue
+            for label in part.estimators:
+                lacking = sum((scenario.id, label, seed) not in there for seed in range(part.runs))
+                if lacking:
+                    found[f"{label} on {scenario.id}"] = max(lacking, found.get(f"{label} on {scenario.id}", 0))
+    return found
+
+
+def publish(working: Path, profile: Profile, folder: Path, history: Path, readme: Path | None) -> Published:
+    """Pack the results of a profile, add an edition to the history, and write the tables of the README.
+
+    Parameters
+    ----------
+    working : Path
+        Folder of the results; it may be the one that is written.
+    profile : Profile
+        That they should hold as a whole.
+    folder, history : Path
+        Packed results and file of the history.
+    readme : Path or None
+        With the marks of `simnav.leaderboard.standard.readme`.
+
+    Raises
+    ------
+    RequestError
+        If runs of the profile are missing, or some were made with other code than today's. Then nothing is written.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", store.StoreWarning)
+        results = store.load(working, series=False)
+    old = outdated(working)
+    if old:
+        raise RequestError(
+            f"these results are out of date: {'; '.join(old.sentences())}; 'simnav standard run' does it"
+        )
+    lacking = missing(profile, results)
+    if lacking:
+        first = next(iter(lacking))
+        raise RequestError(
+            f"{sum(lacking.values())} runs of the profile {profile.name} are missing, such as of {first}; "
+            "'simnav standard run' continues"
+        )
+    ranking = rank(results)
+    text = replaced(readme, tables(ranking, results)) if readme is not None else ""  # fails before anything is written
+    if working.resolve() != folder.resolve():
+        results = pack(working, folder)
+    edition = append(history, ranking, results)
+    if readme is not None:
+        write_whole(readme, text)
+    size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
+    return Published(folder, edition, results, ranking, size, readme)

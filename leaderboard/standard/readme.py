@@ -1,0 +1,84 @@
+"""The tables of the README, made from results, between two marks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from simnav.leaderboard.ranking.board import Ranking, TrackRanking
+from simnav.leaderboard.ranking.ranking_table import between, ratio
+from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.provenance import distinct
+from simnav.leaderboard.results.result import Result
+
+__all__ = ["BEGIN", "END", "marked", "replaced", "tables"]
+
+BEGIN, END = "<!-- standard result: begin -->", "<!-- standard result: end -->"
+_MAIN = "aided-ins"
+_ROWS = 12  # of the table of the main track
+_BEST = 4  # rows that a cell names
+
+
+def tables(ranking: Ranking, results: Sequence[Result]) -> str:
+    """A table of the tracks, and one of the best rows of the main track, as Markdown."""
+    known = distinct(r.provenance for r in results)
+    commits = ", ".join(sorted({f"`{p.commit[:12]}`" for p in known if p.commit})) or "a version without a commit"
+    days = sorted({p.date for p in known if p.date})
+    when = f", computed from {days[0]} to {days[-1]}" if len(days) > 1 else f", computed on {days[0]}" if days else ""
+    benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
+    tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
+    parts = [
+        f"{len(results)} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the error, "
+        "divided by the scenario's reference figure; smaller is better."
+    ]
+    if tracks:
+        parts.append("\n".join([
+            "| track | scenarios | runs of a row | rows | first by score | may be the best (95 %) | `ekf` |",
+            "|---|---|---|---|---|---|---|", *map(_track, tracks),
+        ]))  # fmt: skip
+    main = next((t for t in tracks if t.track == _MAIN), tracks[0] if tracks else None)
+    if main is not None:
+        parts.append(f"The first {min(_ROWS, sum(r.ranked for r in main.rows))} rows of the track *{main.title}*:")
+        parts.append("\n".join([
+            "| rank | estimator | score, 95 % interval | worst run | failed runs |", "|---|---|---|---|---|",
+            *(f"| {r.ranks} | `{r.estimator}` | {ratio(r.score)} [{between(r.low, r.high, ratio)}] | {ratio(r.worst)} "
+              f"| {r.failed} of {r.runs} |" for r in [r for r in main.rows if r.ranked][:_ROWS]),
+        ]))  # fmt: skip
+    return "\n\n".join(parts)
+
+
+def _track(track: TrackRanking) -> str:
+    ranked = [r for r in track.rows if r.ranked]
+    best = [f"`{r.estimator}`" for r in ranked if r.may_be_best]
+    may = ", ".join(best) if len(best) <= _BEST else f"{len(best)} rows"
+    plain = next((ratio(r.score) for r in ranked if r.estimator == "ekf"), "")
+    runs = sorted({r.runs for r in ranked})
+    count = f"{runs[0]} to {runs[-1]}" if len(runs) > 1 else str(runs[0])
+    first = f"`{ranked[0].estimator}` {ratio(ranked[0].score)}"
+    return f"| {track.title} | {len(track.scenarios)} | {count} | {len(ranked)} | {first} | {may} | {plain} |"
+
+
+def marked(readme: Path) -> str:
+    """What stands between the marks.
+
+    Raises
+    ------
+    RequestError
+        If the marks are missing.
+    """
+    return _split(readme)[1].strip()
+
+
+def replaced(readme: Path, content: str) -> str:
+    """The text of the README with other content between the marks."""
+    before, _, after = _split(readme)
+    return f"{before}{BEGIN}\n\n{content}\n\n{END}{after}"
+
+
+def _split(readme: Path) -> tuple[str, str, str]:
+    text = readme.read_text(encoding="utf-8")
+    found = re.fullmatch(f"(.*?){re.escape(BEGIN)}(.*){re.escape(END)}(.*)", text, re.DOTALL)
+    if found is None:
+        raise RequestError(f"{readme} lacks the marks of the standard result: {BEGIN} and {END}")
+    return found[1], found[2], found[3]

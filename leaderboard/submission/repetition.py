@@ -1,0 +1,163 @@
+"""Runs of a submission, repeated: ``python -m simnav.leaderboard.submission.repetition`` in any environment.
+
+The request is one line of JSON on standard input. On standard output come lines that begin with ``P`` (progress) and
+one that begins with ``R`` (the answer, in JSON). The estimators run confined; this process imports nothing of them.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.seal import Seal
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import sentence
+from simnav.leaderboard.results.provenance import here
+from simnav.scenario import load
+
+__all__ = ["Again", "Asked", "Wanted", "answer"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Runs of one estimator on one scenario.
+
+    Attributes
+    ----------
+    scenario, label : str
+    seeds : list of int
+        Numbers of the runs, where they are sealed.
+    time_limit : float
+        [s]
+    memory_limit : int
+        [bytes]
+    sealed : bool
+    """
+
+    scenario: str
+    label: str
+    seeds: list[int]
+    time_limit: float = 0.0
+    memory_limit: int = 0
+    sealed: bool = False
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be repeated.
+
+    Attributes
+    ----------
+    folder : str
+        For results; a new one.
+    estimators : list of EstimatorRequest
+    runs : list of Wanted
+    key : str
+        Of sealed seeds, in hexadecimal.
+    confinement : str
+    """
+
+    folder: str
+    estimators: list[EstimatorRequest]
+    runs: list[Wanted]
+    key: str = ""
+    confinement: str = "auto"
+
+    def text(self) -> str:
+        """As one line."""
+        rows = [{"name": e.name, "parameters": dict(e.parameters), "label": e.label, "point": e.point,
+                 "search": list(e.search)} for e in self.estimators]  # fmt: skip
+        return json.dumps({**vars(self), "estimators": rows, "runs": [asdict(w) for w in self.runs]})
+
+    @classmethod
+    def read(cls, text: str) -> Asked:
+        """From what `text` gave."""
+        told: dict[str, Any] = json.loads(text)
+        rows = [EstimatorRequest(**{**row, "search": tuple(row["search"])}) for row in told.pop("estimators")]
+        return cls(estimators=rows, runs=[Wanted(**w) for w in told.pop("runs")], **told)
+
+
+@dataclass(frozen=True)
+class Again:
+    """A run that was repeated.
+
+    Attributes
+    ----------
+    scenario, label, seed, sealed
+        Which one.
+    status, reason : str
+        As in `simnav.leaderboard.results.result.Result`; ``not-run`` where it could not be tried.
+    key, recording : str
+        Likewise.
+    scores : mapping of str to str
+        Each as `float.hex` writes it, so that all bits and NaN travel.
+    """
+
+    scenario: str
+    label: str
+    seed: int
+    sealed: bool
+    status: str
+    reason: str
+    key: str = ""
+    recording: str = ""
+    scores: Mapping[str, str] = field(default_factory=dict)
+
+
+def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
+    """Repeat the runs; returns them, and the provenance of this environment."""
+    requests = {e.label: e for e in asked.estimators}
+    seal = Seal(bytes.fromhex(asked.key)) if asked.key else None
+    failed: list[Again] = []
+    total, done = sum(len(w.seeds) for w in asked.runs), 0
+    for wanted in asked.runs:
+        progress(done, total, f"{wanted.label} on {wanted.scenario}")
+        folder = Path(asked.folder) / ("sealed" if wanted.sealed else "public")
+        try:
+            run_campaign(
+                [load(wanted.scenario)], [requests[wanted.label]], wanted.seeds, folder, workers=1,
+                timeout=wanted.time_limit or None, confinement=asked.confinement,
+                seal=seal if wanted.sealed else None, memory=wanted.memory_limit or MEMORY,
+            )  # fmt: skip
+        except Exception as error:
+            failed += [
+                Again(wanted.scenario, wanted.label, seed, wanted.sealed, "not-run", sentence(error))
+                for seed in wanted.seeds
+            ]
+        done += len(wanted.seeds)
+        progress(done, total, wanted.scenario)
+    found = [
+        Again(
+            r.scenario, r.estimator, r.seed, sealed, r.status, r.reason, r.key, r.recording,
+            {name: float(value).hex() for name, value in r.scores.items()},
+        )
+        for sealed in (False, True)
+        if (place := Path(asked.folder) / ("sealed" if sealed else "public")).is_dir()
+        for r in store.load(place, series=False)
+    ]  # fmt: skip
+    return {"runs": [asdict(a) for a in (*found, *failed)], "provenance": here().to_dict()}
+
+
+def main() -> None:
+    """Answer the request on standard input."""
+    out, sys.stdout = sys.stdout, sys.stderr
+    warnings.simplefilter("ignore")
+
+    def progress(done: int, total: int, note: str) -> None:
+        out.write(f"P {json.dumps([done, total, note])}\n")
+        out.flush()
+
+    told = answer(Asked.read(sys.stdin.readline()), progress)
+    out.write(f"R {json.dumps(told)}\n")
+    out.flush()
+
+
+if __name__ == "__main__":
+    main()

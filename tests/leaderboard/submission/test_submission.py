@@ -1,0 +1,334 @@
+"""A submission holds where it is repeated, and one that was tampered with does not."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import stat
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import CliRunner
+
+from simnav.leaderboard import publishing
+from simnav.leaderboard.cli.application import app
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.provenance import Provenance
+from simnav.leaderboard.submission import archive, source, verifying
+from simnav.leaderboard.submission.bundle import open_bundle
+from simnav.leaderboard.submission.repetition import Again, Asked, answer
+
+PROFILE = """
+title = "two short voyages"
+[[part]]
+scenarios = ["clean-voyages"]
+runs = 2
+"""
+
+MINE = """
+import json
+from pathlib import Path
+from simnav import Estimate, Estimator, register
+from helper import last
+
+GAIN = json.loads(Path(__file__).with_name("gain.json").read_text())["gain"]
+
+@register("my-last-fix")
+class MyLastFix(Estimator):
+    '''The last fix.'''
+
+    def __init__(self, gain: float = 1.0):
+        self.gain = gain * GAIN
+
+    def reset(self, start, instruments):
+        self.position = start.position
+        witness = Path(__file__).parents[1] / "witness"
+        try:
+            witness.write_text("it was written outside")
+        except OSError:
+            pass
+
+    def update(self, measurements):
+        self.position = self.position + self.gain * (last(measurements, self.position) - self.position)
+        return Estimate(measurements.time, position=self.position)
+"""
+
+HELPER = """
+def last(measurements, otherwise):
+    fix = measurements.latest("gnss_position")
+    return otherwise if fix is None else fix.value
+"""
+
+
+def written(folder: Path, *, package: str = "") -> Path:
+    """The estimator as a file with what it needs, or as an installed package."""
+    folder.mkdir(parents=True)
+    if not package:
+        (folder / "my_last_fix.py").write_text(MINE)
+        (folder / "helper.py").write_text(HELPER)
+        (folder / "gain.json").write_text('{"gain": 0.5}')
+        return folder / "my_last_fix.py"
+    inside = folder / package
+    inside.mkdir()
+    (inside / "__init__.py").write_text("")
+    (inside / "rows.py").write_text(MINE.replace("from helper", "from .helper").replace("my-last-fix", "packed-fix"))
+    (inside / "helper.py").write_text(HELPER)
+    (inside / "gain.json").write_text('{"gain": 0.5}')
+    info = folder / f"{package}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\nRequires-Dist: simnav\n")
+    (info / "WHEEL").write_text("Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+    (info / "entry_points.txt").write_text(f"[simnav.estimators]\nrows = {package}.rows\n")
+    names = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()]
+    (info / "RECORD").write_text("".join(f"{n},,\n" for n in names))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bundle of a file; its source is gone."""
+    home = tmp_path_factory.mktemp("submission")
+    (home / "short.toml").write_text(PROFILE)
+    mine = written(home / "mine")
+    done = publishing.submit(f"{mine}:MyLastFix:gain=0.9", profile=home / "short.toml", output=home / "made.zip",
+                             results=home / "results", workers=1)  # fmt: skip
+    assert (done.results, done.failed, done.profile) == (2, 0, "short")
+    assert done.digest == hashlib.sha256(done.path.read_bytes()).hexdigest()
+    shutil.rmtree(home / "mine")
+    shutil.rmtree(home / "results")
+    return done.path
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs are repeated in this process: another one takes seconds to start."""
+
+    def repeated(python: Path, asked: Asked, *_: object) -> tuple[list[Again], Provenance]:
+        told = answer(Asked.read(asked.text()), lambda *_: None)
+        return [Again(**run) for run in told["runs"]], Provenance.from_dict(told["provenance"])
+
+    monkeypatch.setattr(verifying, "_repeated", repeated)
+
+
+def test_a_bundle_holds_what_is_needed_and_no_more(made: Path, tmp_path: Path) -> None:
+    bundle = open_bundle(made, tmp_path)
+    assert sorted(p.name for p in (tmp_path / "source").iterdir()) == ["gain.json", "helper.py", "my_last_fix.py"]
+    (row,) = bundle.contents.estimators
+    assert (row.label, row.name) == ("my_last_fix:MyLastFix(gain=0.9)", "my_last_fix.py:MyLastFix")
+    assert row.parameters == {"gain": "0.9"}
+    assert bundle.contents.runs == {"clean-voyages-v1": 2}
+    results = store.load(bundle.results)
+    assert [r.seed for r in results] == [0, 1]
+    assert not any(r.series for r in results)
+    assert all(r.provenance.numpy and r.provenance.confinement != "none" for r in results)
+
+
+def test_it_holds_to_the_bit_and_on_sealed_seeds_and_runs_confined(made: Path, tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_text("0123456789abcdef0123456789abcdef")
+    done = CliRunner().invoke(app, ["verify", str(made), "--present", "--key", str(key), "--json"])
+    told = json.loads(done.stdout)
+    assert (done.exit_code, told["findings"], told["different"]) == (0, [], [])
+    assert (told["repeated"], told["identical"], told["close"], told["passed"]) == (2, 2, 0, True)
+    (sealed,) = told["sealed"]
+    assert (sealed["sealed"], sealed["failed"]) == (8, 0)
+    assert 0.2 < sealed["ratio"] < 5.0
+    assert sealed["p_value"] > 0.01
+    assert "numpy" in told["environment"]
+    assert not list(tmp_path.parent.glob("**/witness"))
+
+
+def test_a_package_travels_as_a_wheel_and_is_never_imported_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clean_registry: None, request: pytest.FixtureRequest
+) -> None:
+    from simnav.estimator import registry
+
+    folder = written(tmp_path / "site", package="simnav_packed_fix")
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.setattr(registry, "_discovered", False)
+    (tmp_path / "short.toml").write_text(PROFILE.replace("runs = 2", "runs = 1"))
+    done = publishing.submit("simnav-packed-fix", profile=tmp_path / "short.toml", output=tmp_path / "made.zip",
+                             results=tmp_path / "results", workers=1)  # fmt: skip
+    assert done.estimators == ("packed-fix",)
+    shutil.rmtree(folder)
+    monkeypatch.undo()
+    for name in [n for n in sys.modules if n.startswith("simnav_packed_fix")]:
+        del sys.modules[name]
+    request.getfixturevalue("here")
+    told = publishing.verify_bundle(done.path, present=True)
+    assert told.passed, told
+    assert (told.identical, told.title) == (1, "simnav_packed_fix")
+    assert not [n for n in sys.modules if n.startswith("simnav_packed_fix")]
+
+
+# -- tampering ---------------------------------------------------------------------------------------------------
+
+
+def changed(made: Path, target: Path, change: Callable[[Path], None], *, hashes: bool) -> Path:
+    """The bundle after a change of its files, with its old hashes or with those of the new content."""
+    folder = target.with_suffix("")
+    with zipfile.ZipFile(made) as before:
+        before.extractall(folder)
+    change(folder)
+    manifest = folder / "bundle.json"
+    if hashes:
+        told = json.loads(manifest.read_text())
+        files = {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file() and p != manifest}
+        told["files"] = {n: {"sha256": archive.digest_of(p), "size": p.stat().st_size} for n, p in files.items()}
+        manifest.write_text(json.dumps(told))
+    with zipfile.ZipFile(target, "w") as after:
+        for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+            after.write(path, path.relative_to(folder).as_posix())
+    return target
+
+
+def better_result(folder: Path) -> None:
+    (part,) = folder.glob("results/compacted/*.parquet")
+    table = pq.read_table(part)
+    scores = [[(k, 0.9 * v if k == "horizontal_rmse" else v) for k, v in row] for row in table["scores"].to_pylist()]
+    at = table.schema.get_field_index("scores")
+    pq.write_table(table.set_column(at, "scores", pa.array(scores, table.schema.field(at).type)), part)
+
+
+def better_source(folder: Path) -> None:
+    (folder / "source" / "gain.json").write_text('{"gain": 0.55}')
+
+
+def without_the_worst(folder: Path) -> None:
+    (part,) = folder.glob("results/compacted/*.parquet")
+    pq.write_table(pq.read_table(part).slice(0, 1), part)
+
+
+@pytest.mark.parametrize(
+    ("change", "hashes", "said"),
+    [
+        (better_result, False, r"results/compacted/.*parquet was changed: its hash is not that of bundle.json"),
+        (better_source, False, "source/gain.json was changed: its hash is not"),
+        (lambda f: (f / "source" / "more.py").write_text("1"), False, "source/more.py does not belong to it"),
+        (lambda f: (f / "source" / "helper.py").unlink(), False, "source/helper.py is missing"),
+        (lambda f: (f / "setup.py").write_text("1"), True, "setup.py does not belong to it"),
+        (lambda f: (f / "bundle.json").write_text("{"), False, "bundle.json is no JSON"),
+        (lambda f: (f / "bundle.json").write_text('{"format": 9}'), False, "has format 9"),
+        (lambda f: (f / "bundle.json").write_text('{"format": 1}'), False, "bundle.json: title: Field required"),
+        (lambda f: (f / "bundle.json").unlink(), False, "bundle.json is missing; 'simnav submit' makes one"),
+    ],
+)  # fmt: skip
+def test_a_changed_file_is_named(
+    made: Path, tmp_path: Path, change: Callable[[Path], None], hashes: bool, said: str
+) -> None:
+    with pytest.raises(RequestError, match=said):
+        open_bundle(changed(made, tmp_path / "bad.zip", change, hashes=hashes), tmp_path / "open")
+
+
+def worse_and_fewer(folder: Path) -> None:
+    better_result(folder)
+    without_the_worst(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (worse_and_fewer, ("1 runs are missing, such as seed 1", "horizontal_rmse is", "relative difference 0.1)")),
+        (better_source, ("the results were not made with this source",)),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_a_change_that_renews_the_hashes_does_not_hold(
+    made: Path, tmp_path: Path, change: Callable[[Path], None], said: tuple[str, ...]
+) -> None:
+    bad = changed(made, tmp_path / "bad.zip", change, hashes=True)
+    done = CliRunner().invoke(app, ["verify", str(bad), "--present"])
+    assert done.exit_code == 1
+    for text in said:
+        assert text in " ".join(done.stdout.split())
+    assert "the submission does not hold" in done.stdout
+
+
+def entry(name: str, *, mode: int = stat.S_IFREG | 0o644) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name)
+    info.external_attr = mode << 16
+    return info
+
+
+@pytest.mark.parametrize("name", ["../evil.py", "/etc/evil.py", "source/../../evil.py", "source\\evil.py", "C:evil.py"])
+def test_a_name_that_leads_out_is_refused(tmp_path: Path, name: str) -> None:
+    with zipfile.ZipFile(tmp_path / "bad.zip", "w") as bad:
+        bad.writestr(entry(name), "1")
+    with pytest.raises(RequestError, match="leads out of the folder"):
+        open_bundle(tmp_path / "bad.zip", tmp_path / "open")
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.zip"]
+
+
+def test_links_doubles_and_floods_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bad = tmp_path / "bad.zip"
+
+    def refused(said: str) -> None:
+        with pytest.raises(RequestError, match=said):
+            open_bundle(bad, tmp_path / "open")
+        assert not (tmp_path / "open").exists()
+
+    with zipfile.ZipFile(bad, "w") as file:
+        file.writestr(entry("source/link", mode=stat.S_IFLNK | 0o777), "/etc/passwd")
+    refused("is no plain file")
+    with zipfile.ZipFile(bad, "w") as file:
+        file.writestr(entry("source/a.py"), "1")
+        file.writestr(entry("source/A.py"), "2")
+    refused("source/A.py is in it twice")
+    monkeypatch.setattr(archive, "MOST_BYTES", 1 << 20)
+    with zipfile.ZipFile(bad, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr(entry("source/zeros"), bytes(2 << 20), zipfile.ZIP_DEFLATED)
+    assert bad.stat().st_size < 10_000
+    refused("more than 1 MiB when they are unpacked")
+    monkeypatch.setattr(archive, "_MOST_FILES", 3)
+    with zipfile.ZipFile(bad, "w") as file:
+        for k in range(4):
+            file.writestr(entry(f"source/{k}"), "1")
+    refused("holds 4 files; at most 3")
+    bad.write_bytes(b"no archive")
+    refused("is no whole ZIP file")
+
+
+def test_a_size_that_is_a_lie_is_noticed(made: Path, tmp_path: Path) -> None:
+    """A member states a small size in both headers, and unpacks to more."""
+    with zipfile.ZipFile(tmp_path / "bad.zip", "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("source/zeros", bytes(100_000))
+    data = (tmp_path / "bad.zip").read_bytes()
+    (tmp_path / "bad.zip").write_bytes(data.replace((100_000).to_bytes(4, "little"), (7).to_bytes(4, "little")))
+    with pytest.raises(RequestError, match=r"longer than|cannot be unpacked"):
+        open_bundle(tmp_path / "bad.zip", tmp_path / "open")
+    broken = bytearray(made.read_bytes())
+    broken[len(broken) // 3] ^= 0xFF
+    (tmp_path / "broken.zip").write_bytes(bytes(broken))
+    with pytest.raises(RequestError):
+        open_bundle(tmp_path / "broken.zip", tmp_path / "other")
+
+
+# -- what cannot be submitted -------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_passed_on_gets_a_sentence(tmp_path: Path) -> None:
+    def refused(given: str, said: str, **parameters: str) -> None:
+        with pytest.raises(RequestError, match=said):
+            source.source_of(given, parameters, tmp_path)
+
+    mine = written(tmp_path / "mine")
+    refused("ekf", "ekf comes with simnav")
+    refused("no-such-row", "unknown estimator 'no-such-row'")
+    refused(str(tmp_path / "none.py"), "there is no file")
+    refused(str(mine), "a parameter names a file of this machine", gain=str(mine))
+
+
+def test_a_name_of_simnav_is_refused(made: Path, tmp_path: Path) -> None:
+    def renamed(folder: Path) -> None:
+        text = (folder / "bundle.json").read_text()
+        (folder / "bundle.json").write_text(text.replace("my_last_fix:MyLastFix(gain=0.9)", "oracle"))
+
+    with pytest.raises(RequestError, match="oracle is a name of one of simnav's own estimators"):
+        open_bundle(changed(made, tmp_path / "bad.zip", renamed, hashes=False), tmp_path / "open")
