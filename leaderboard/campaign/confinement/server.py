@@ -82,6 +82,8 @@ def _load() -> None:
     from simnav.estimator.registry import discover_own
 
     discover_own()
+    importlib.import_module("simnav.leaderboard.campaign.entrant")  # or each estimator process would
+    importlib.import_module("numpy.random")
     source, target = os.environ.pop(COPY_FROM, ""), cache_directory()
     if source and target is not None and "kernels" in sys.argv[2:]:
         for part in {k.fingerprint() for kernel in kernels() for k in kernel.tree()}:
