@@ -14,8 +14,9 @@ rotation vector phi of C_est C_true' [rad], all in north-east-down, and the bias
 
 Beyond the 15 there are calibration states, as the datasheets ask for them: a bias for every component of an aiding
 instrument that has a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor
-and the current along the keel. With instruments of white noise only, n is 15; with ``calibrate=False`` it always is,
-and those errors count as white noise.
+and the current, north and east, through which it is carried. The current belongs to the water: when the vessel turns,
+the part of it along the keel changes at once, and a bias along the keel could not follow. With instruments of white
+noise only and no log, n is 15; with ``calibrate=False`` it always is, and those errors count as white noise.
 
 An IMU's scale factor and misalignment are not states. On a level vehicle gravity turns the accelerometers' into a bias,
 which is added to the turn-on bias; the gyroscopes' act in turns, as noise in proportion to the turn rate, averaged over
@@ -25,10 +26,12 @@ step: it counts for nothing.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, exp, hypot
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
@@ -54,7 +57,7 @@ from simnav.types import (
 
 __all__ = ["InertialModel"]
 
-#: Sigma and correlation time of the current along the keel, for a speed log [m/s], [s].
+#: Sigma and correlation time of each component of the current, for a speed log [m/s], [s].
 CURRENT, CURRENT_TIME = 0.5, 1800.0
 
 _NAV = 15
@@ -205,13 +208,13 @@ class InertialModel(ErrorModel):
                 gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
                 for b, s in zip(sheet.bias, sheet.bias_instability)
             ]
-            if sheet.equation == WATER_SPEED:
-                current = GaussMarkov(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME, 0.0)
-                states = [GaussMarkov(states[0].variance + current.variance, current.decay, current.noise, 0.0)]
             fast = sheet.correlation_time < 0.5 / sheet.rate
             white = sheet.bias_instability**2 if fast else np.zeros(len(states))
+            if sheet.equation == WATER_SPEED and self.calibrate:
+                states += 2 * [GaussMarkov(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME, 0.0)]
             if not self.calibrate:
-                white = white + [s.variance for s in states]
+                along_keel = CURRENT**2 if sheet.equation == WATER_SPEED else 0.0
+                white = white + [s.variance + along_keel for s in states]
             elif any(s.variance or s.noise for s in states):
                 self.bias_at[sheet.name] = _NAV + len(self._states)
                 self._states += [(s.variance, s.decay, s.noise) for s in states]
@@ -244,6 +247,39 @@ class InertialModel(ErrorModel):
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument that has a measurement equation."""
         return instrument.equation in CODES or KINDS[instrument.kind].observation is not None
+
+    def arrays(self, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
+        """The state and the constants, for a kernel that goes through many filters.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Instruments, in the order in which the kernel counts them.
+
+        Returns
+        -------
+        dict of str to array, or None
+            The state under the names of its attributes; ``sensors``, the noise of the IMU (`accumulate_error`); by
+            instrument ``codes`` (its code, components, and the places of its bias and scale factor; no components:
+            it is not used), ``arms``, ``noises`` (flat) and ``limits`` (values of this size are not plausible). None
+            where the model uses an instrument in a way of its own.
+        """
+        if self._fused != set(self.noise):
+            return None
+        codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
+        noises, limits = np.zeros((len(names), 9)), np.zeros((len(names), 3))
+        for i, name in enumerate(names):
+            if name in self.noise:
+                code, arms[i], bias_at, scale_at = self.aid_parameters[name]
+                d = len(self.noise[name])
+                codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
+                limits[i, :d] = KINDS[self.instruments[name].kind].limits
+        return {
+            "position": self.position, "velocity": self.velocity, "dcm": self.dcm, "memory": self._memory,
+            "bias": self.bias, "turn": self._turn, "clock": self._clock, "sensors": self._noise,
+            "calibration": self.calibration, "decay": self._decay, "density": self._density,
+            "codes": codes, "arms": arms, "noises": noises, "limits": limits,
+        }  # fmt: skip
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""

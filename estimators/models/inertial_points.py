@@ -24,7 +24,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import HEADING, observe_inertial
+from simnav.estimators.models.measurements import HEADING, NAVIGATION_STATES, SPEED_LOG, observe_inertial
 from simnav.estimators.models.points import PointModel
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import cross, rotation_coefficients
@@ -155,11 +155,17 @@ def observe_points(
     at_state, reading = np.zeros(3), np.zeros(3)
     value = position  # any will do; for a fix, one nearby is the more accurate
     v, b, m = velocity.copy(), bias[:3].copy(), dcm.copy()
+    through = velocity.copy()  # the water, for a log
+    if code == SPEED_LOG and bias_at >= 0:
+        for j in range(2):
+            through[j] -= calibration[bias_at + 1 + j - NAVIGATION_STATES]
     # First the state, for the Jacobian; then the state as if calibrated, and the points likewise.
     for k in range(-2, errors.shape[0]):
+        if k == -1:
+            v[:] = through
         if k >= 0:
             for j in range(3):
-                v[j], b[j] = velocity[j] + errors[k, 3 + j], bias[j] + errors[k, 9 + j]
+                v[j], b[j] = through[j] + errors[k, 3 + j], bias[j] + errors[k, 9 + j]
             _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
         full = k == -2
         known = observe_inertial(

@@ -10,7 +10,8 @@ takes many. With position p, velocity v, DCM C, lever arm l, body rate relative 
   velocity ``C'``; attitude ``C' [v x]``; gyroscope bias ``[l x]``
 - heading: ``atan2(C_10, C_00)``; attitude ``(tan(pitch) cos(yaw), tan(pitch) sin(yaw), 1)``
 - depth: ``-h + (C l)_D``; the mean sea surface is taken as the ellipsoid
-- speed log: forward component of the DVL's, through the water; the current is part of the bias
+- speed log: forward component of the DVL's, of the velocity through the water ``v - c``, with the current c (north,
+  east) as two states behind the bias; current ``-C'``
 - terrain fix: horizontal part of ``p + C l``
 
 A bias adds to every one of them, with a Jacobian of 1. The effect of scale and misalignment on the Jacobians of the
@@ -79,7 +80,7 @@ def observe_inertial(
         Lever arm, body axes [m].
     bias_at, scale_at : int
         Place in the error state of the instrument's first bias, and of its scale factor (behind a DVL's scale factor
-        come three misalignments); -1 for none.
+        come three misalignments, behind a log's bias the current, north and east); -1 for none.
     value : (d,) array
         As measured.
     position, velocity : (3,) arrays
@@ -158,6 +159,10 @@ def observe_inertial(
             for i in range(3):  # row i of C times [l x]
                 jacobian[i, 9], jacobian[i, 10], jacobian[i, 11] = cross(dcm[i, 0], dcm[i, 1], dcm[i, 2], l0, l1, l2)
         else:
+            if code == SPEED_LOG and bias_at >= 0:
+                k = bias_at - NAVIGATION_STATES
+                v0, v1 = v0 - calibration[k + 1], v1 - calibration[k + 2]
+                jacobian[0, bias_at + 1], jacobian[0, bias_at + 2] = -dcm[0, 0], -dcm[1, 0]
             for i in range(d):
                 c0, c1, c2 = dcm[0, i], dcm[1, i], dcm[2, i]
                 jacobian[i, 3], jacobian[i, 4], jacobian[i, 5] = c0, c1, c2

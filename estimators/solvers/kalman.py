@@ -3,6 +3,9 @@
 Every measurement is used at its own time of validity: the state is propagated to it, inside the step. The covariance is
 updated in Joseph's form (`simnav.estimators.algebra.joseph`).
 
+The filter tests its innovations, as a window tests its cost: where they stay improbably large, the diagnostic
+``inconsistent`` is 1 (`simnav.estimators.solvers.innovation_consistency`).
+
 Measurements that cannot be used are counted, in the diagnostic ``skipped``: values that mean nothing (not finite, not
 on Earth), those older than the state, repetitions, and innovations whose covariance is singular.
 
@@ -22,6 +25,7 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.admission import Admission
+from simnav.estimators.solvers.innovation_consistency import InnovationTest
 from simnav.estimators.solvers.iterated import Iteration, absorb_iterated
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
@@ -85,6 +89,7 @@ class KalmanEstimator(Solver):
             self.adaptation.reset(instruments)
         self._names = [name for name, sheet in instruments.items() if self.model.observes(sheet)]
         self._admission = Admission(instruments, self._names)
+        self._innovation_test = InnovationTest()
         self._correction = np.empty(self.model.size)
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
@@ -109,6 +114,9 @@ class KalmanEstimator(Solver):
             self._take(m, diagnostics, flagged)
         advance(measurements.time)
         diagnostics["skipped"] = float(self._admission.skipped)
+        self._innovation_test.end_epoch()
+        diagnostics["variance_factor"] = self._innovation_test.variance_factor
+        diagnostics["inconsistent"] = float(self._innovation_test.inconsistent)
         if self.adaptation is not None:
             diagnostics.update(self.adaptation.diagnostics())
         estimate = self._estimate()
@@ -199,6 +207,7 @@ class KalmanEstimator(Solver):
         if nis < 0.0:
             self._admission.skipped += 1
             return
+        self._innovation_test.add(nis, len(m.value))
         innovation, normalised = self._keys[m.instrument]
         diagnostics[innovation], diagnostics[normalised] = size, nis
         if self.smoother is not None:

@@ -43,19 +43,15 @@ class MotionTest:
     ----------
     instruments : Instruments
         Datasheets of the run's instruments.
-    together : int
-        Failures running, of a fix and of a log, that make the motion suspect.
-    recent : float
-        A failure older than this [s] is no company.
-    probability : float
-        Of a good measurement to pass.
+    together, recent, sound
+        As of `simnav.estimators.weightings.robust_weighting.RobustWeighting`.
     """
 
-    def __init__(self, instruments: Instruments, together: int = 3, recent: float = 5.0, probability: float = 0.999):
-        self.together, self.recent, self.probability = together, recent, probability
-        self._limits = np.array(chi_square_limits(probability))
+    def __init__(self, instruments: Instruments, together: int = 3, recent: float = 5.0, sound: float = 0.999):
+        self.together, self.recent, self.sound = together, recent, sound
+        self._limits = np.array(chi_square_limits(sound))
         self._is_fix = fixes_and_logs(instruments)
-        if len(set(self._is_fix.values())) < 2:
+        if len(set(self._is_fix.values())) < 2 or not together:
             self._is_fix = {}  # the test needs instruments of both groups
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
@@ -139,7 +135,7 @@ class MotionTest:
         for i, name in enumerate(factors.names):
             its = asked & (factors.instrument == i)
             freedom = int(factors.components[its].sum())
-            if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.probability):
+            if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.sound):
                 agreeing[i] = True
                 kinds.add(self._is_fix.get(name))
         return agreeing if kinds >= {True, False} else None

@@ -84,6 +84,7 @@ def command(
 def _table(report: RunReport) -> Fitted:
     """Scores of the estimators, the best horizontal RMSE first."""
     from simnav.leaderboard.ranking import tables
+    from simnav.scoring.consistency import ending
 
     def order(k: int) -> tuple[bool, float]:
         value = report.estimators[k].scores.get("horizontal_rmse", math.inf)
@@ -92,7 +93,8 @@ def _table(report: RunReport) -> Fitted:
     ordered = [report.estimators[k] for k in sorted(range(len(report.estimators)), key=order)]
     plain = ("horizontal_rmse", "r95", "horizontal_max", "vertical_rmse", "velocity_horizontal_rmse")
     cells = [
-        [e.estimator + (" *" if e.reference else ""), e.status, *(tables.number(e.scores.get(s)) for s in plain),
+        [e.estimator + (" *" if e.reference else ""), ending(e.status, e.scores),
+         *(tables.number(e.scores.get(s)) for s in plain),
          tables.number(math.degrees(e.scores.get("heading_rmse", math.nan))),
          tables.number(e.scores.get("nees_horizontal")), tables.percent(e.scores.get("coverage_95")),
          tables.duration(e.scores.get("update_median"))]

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 import os
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,10 +30,19 @@ from simnav.estimator import describe, names
 from simnav.leaderboard.results.errors import RequestError
 from simnav.spec import closest
 
-__all__ = ["Part", "Profile", "load", "profiles"]
+__all__ = ["KEYS", "Part", "Profile", "load", "profiles"]
 
 _FOLDER = Path(__file__).parent
-_KEYS = ("scenarios", "tracks", "estimators", "runs", "shortest_s", "longest_s")
+
+#: The keys of a part, and what they mean.
+KEYS: Mapping[str, str] = {
+    "scenarios": "names of scenarios; this or `tracks`",
+    "tracks": "names of tracks, which stand for their scenarios",
+    "estimators": "names of estimators, or the name of a group; default: all that are not slow",
+    "runs": "required: seeds of each scenario, from 0 on",
+    "shortest_s": "with `tracks`: only scenarios that take longer than this",
+    "longest_s": "with `tracks`: only scenarios that take no longer than this",
+}
 
 
 @dataclass(frozen=True)
@@ -113,8 +123,8 @@ def load(profile: str | os.PathLike[str]) -> Profile:
 
 def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Part:
     for key in table:
-        if key not in _KEYS:
-            raise RequestError(f"{where}: {key!r} is no key of a part{closest(key, list(_KEYS))}")
+        if key not in KEYS:
+            raise RequestError(f"{where}: {key!r} is no key of a part{closest(key, list(KEYS))}")
     runs = table.get("runs")
     if not isinstance(runs, int) or isinstance(runs, bool) or runs < 1:
         raise RequestError(f"{where}: runs = {runs!r} should be a number of seeds, 1 or more")

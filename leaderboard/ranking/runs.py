@@ -88,8 +88,8 @@ class Runs:
 
     @cached_property
     def statuses(self) -> dict[str, int]:
-        """How many runs ended how."""
-        found = [r.status for r in self.tried]
+        """How many runs ended how (`Result.ending`)."""
+        found = [r.ending for r in self.tried]
         return {s: found.count(s) for s in sorted(set(found))}
 
     def unsuitable(self) -> str:

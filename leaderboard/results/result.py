@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.leaderboard.results.provenance import Provenance
+from simnav.scoring.consistency import ending
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -133,6 +134,11 @@ class Result:
     def variant(self) -> str:
         """The key without the seed."""
         return self.key.rpartition("-")[0]
+
+    @property
+    def ending(self) -> str:
+        """The status, or ``inconsistent`` (`simnav.scoring.consistency.ending`)."""
+        return ending(self.status, self.scores)
 
     @property
     def tried(self) -> bool:

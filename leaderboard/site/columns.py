@@ -105,6 +105,16 @@ SCORES_SHOWN: tuple[tuple[Column, float], ...] = (
     ),
     (
         Column(
+            "inconsistent",
+            "Says inconsistent",
+            "Share of the epochs at which the estimator reports that its measurements contradict it.",
+            "percent",
+            hidden=True,
+        ),
+        1.0,
+    ),
+    (
+        Column(
             "detection_rate",
             "Faults detected",
             "Share of the faulty measurements that the estimator flags or gives little weight.",

@@ -84,7 +84,7 @@ def runs_data(
             "error": [short(v, 5) for v in row.ratios.values()],
             "seed": [r.seed for r in results],
             "note": [r.note for r in results] if any(r.note for r in results) else None,
-            "status": [r.status for r in results],
+            "status": [r.ending for r in results],
             "reason": [r.reason for r in results] if any(r.reason for r in results) else None,
             "seconds": [short(r.seconds, 3) for r in results],
             "scores": _scores(results),

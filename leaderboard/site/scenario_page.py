@@ -173,13 +173,15 @@ def _table(
 
 
 def _failures(ranking: ScenarioRanking, runs: Mapping[str, Runs]) -> list[dict[str, Any]]:
-    """How many runs of each row ended with which status, and why the first did."""
+    """How many runs of each row ended how, but for those that ended well, and why the first did."""
     found = []
     for row in ranking.rows:
         for status, count in row.statuses.items():
             if status != "ok":
-                results = [r for r in runs[row.estimator].results if r.status == status]
+                results = [r for r in runs[row.estimator].results if r.ending == status]
                 reason = results[0].reason if results else ""
+                if status == "inconsistent":
+                    reason = "it reports for most of the time that its measurements contradict it; its error counts"
                 found.append({"name": row.estimator, "status": status, "runs": count, "reason": reason})
     return found
 

@@ -303,11 +303,13 @@ def _repeated(
     """Run the repetition in another process; returns the runs, and the provenance there."""
     command = [str(python), "-m", "simnav.leaderboard.submission.repetition"]
     told: dict[str, Any] = {}
+    variables = search_variables(clean)
+    if clean:  # kernels are kept by the path of their file, and this one will not be there again
+        variables["SIMNAV_CACHE_DIR"] = str(home / "kernels")
     with (
         open(home / "errors", "w+b") as errors,
         subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, cwd=home,
-            env=search_variables(clean), text=True,
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, cwd=home, env=variables, text=True,
         ) as process,
     ):  # fmt: skip
         assert process.stdin is not None

@@ -11,11 +11,15 @@ needed for a mean over time.
 
 The horizontal NEES and the coverage are also scored by parts: before the first measurement that a fault touched, and
 from then on. An estimator may be consistent while nothing is wrong, and not know when something is.
+
+An estimator can test itself, too: one whose measurements contradict it sets the diagnostic ``inconsistent`` to 1. A run
+in which it does so for most of the time ends as ``inconsistent``, not as ``ok``.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -32,6 +36,7 @@ __all__ = [
     "Badge",
     "badge",
     "coverage",
+    "ending",
     "first_fault",
     "nees",
     "nees_band",
@@ -210,6 +215,37 @@ for _percent in (50, 95):
 for _of in ("_clean", "_faulty"):
     _register_nees("horizontal", "horizontal position", _of)
     _register_coverage(95, _of)
+
+
+@register_score(
+    "inconsistent", title="Share of the epochs at which it reports that it is inconsistent", unit="-", better="lower"
+)
+def _inconsistent(given: ScoringInput) -> float:
+    """NaN for an estimator that does not test itself."""
+    reported = given.trial.diagnostics.get("inconsistent", np.empty(0))
+    known = np.isfinite(reported) if reported.ndim == 1 else np.zeros(0, dtype=bool)
+    return float(np.mean(reported[known] > 0.5)) if known.any() else float("nan")
+
+
+def ending(status: str, scores: Mapping[str, float]) -> str:
+    """How a run ended: its status, or ``inconsistent``.
+
+    A run that is ``ok`` ended as inconsistent where the estimator reported for most of the time that its measurements
+    contradict it. It is no failure: a ranking takes its error as it is, so that nobody loses by being honest.
+
+    Parameters
+    ----------
+    status : str
+        Of the trial.
+    scores : mapping of str to float
+        Of the run.
+
+    Examples
+    --------
+    >>> ending("ok", {"inconsistent": 0.98}), ending("timeout", {}), ending("ok", {"inconsistent": 0.1})
+    ('inconsistent', 'timeout', 'ok')
+    """
+    return "inconsistent" if status == "ok" and scores.get("inconsistent", 0.0) > 0.5 else status
 
 
 def badge(nees_by_run: Array, degrees: int = 2) -> Badge:

@@ -33,7 +33,7 @@ from simnav.warmup import warmup
 
 ROWS = (
     "dead-reckoning", "gnss-only", "ship-ekf", "ekf", "gated-ekf", "huber-kf", "iae", "vb-akf", "student-t", "ukf",
-    "inekf", "ekf-rts", "sw-fgo", "huber-fgo", "gnc-fgo", "tukey-fgo", "ship-ukf", "ship-fgo", "ekf-23", "fading-kf",
+    "inekf", "ekf-rts", "sw-fgo", "huber-fgo", "gnc-fgo", "tukey-fgo", "ship-ukf", "ship-fgo", "ekf-23", "fading-ekf",
 )  # fmt: skip
 _TICK = os.sysconf("SC_CLK_TCK")
 

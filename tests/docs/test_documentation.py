@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -64,6 +65,17 @@ def test_every_page_is_in_the_navigation():
     navigation = (ROOT / "mkdocs.yml").read_text()
     for page in DOCS.rglob("*.md"):
         assert str(page.relative_to(DOCS)) in navigation, page
+
+
+def test_tables_of_keys_are_those_of_the_code():
+    """``python docs/keys.py`` writes them."""
+    keys = runpy.run_path(str(DOCS / "keys.py"))
+    for page in keys["PAGES"]:
+        before = page.read_text(encoding="utf-8")
+        assert keys["current"](before) == before, f"{page.name}: run 'python docs/keys.py'"
+        without = re.sub(r"^\| `(version|runs)` \|.*\n", "", before, count=1, flags=re.MULTILINE)
+        assert without != before
+        assert re.search(r"^\| `(version|runs)` \|", keys["current"](without), re.MULTILINE)
 
 
 # -- tutorials -----------------------------------------------------------------------------------------------

@@ -90,7 +90,8 @@ def test_what_is_written_is_read(folder: Path) -> None:
     assert all(not r.series and r.scores for r in store.load(folder, series=False))
 
 
-def test_more_results_than_are_held_in_memory(folder: Path) -> None:
+def test_more_results_than_are_held_in_memory(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "BATCH", 16)
     written = [result(s) for s in range(store.BATCH + 10)]
     for r in written:
         store.write(folder, r)

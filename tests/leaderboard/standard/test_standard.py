@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,14 @@ runs = 2
 """
 
 README = f"# A board\n\n{readme.BEGIN}\nold\n{readme.END}\n\nThe end.\n"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _unconfined() -> Iterator[None]:
+    """The rows are simnav's own; a process that confines them takes a second to start for each folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SIMNAV_CONFINEMENT", "none")
+        yield
 
 
 @pytest.fixture(scope="module")

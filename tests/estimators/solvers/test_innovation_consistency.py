@@ -1,0 +1,82 @@
+"""A filter that cannot explain its measurements says so; one that can is quiet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import simnav
+from simnav.estimator import make
+from simnav.estimators.solvers.innovation_consistency import EPOCHS, InnovationTest
+from simnav.leaderboard.ranking.runs import Runs
+from simnav.leaderboard.results.result import Result
+from tests.agreement.voyages import turned
+
+
+def reports(scale: float, epochs: int, seed: int = 0, each: int = 3) -> list[bool]:
+    """What the test says of innovations whose variance is ``scale`` times the one that was claimed."""
+    rng, test, found = np.random.default_rng(seed), InnovationTest(), []
+    for _ in range(epochs):
+        for _ in range(each):
+            test.add(scale * rng.chisquare(3), 3)
+        test.end_epoch()
+        found.append(test.inconsistent)
+    return found
+
+
+def test_right_innovations_are_consistent():
+    assert np.mean(reports(1.0, 20_000)) < 1e-3
+
+
+def test_wrong_innovations_are_not():
+    assert np.mean(reports(2.0, 500)) > 0.95
+    assert np.mean(reports(0.3, 500)) == 0.0  # too cautious is no contradiction
+
+
+def test_an_epoch_without_measurements_says_nothing():
+    test = InnovationTest()
+    test.end_epoch()
+    assert np.isnan(test.variance_factor)
+    assert not test.inconsistent
+    for _ in range(EPOCHS):
+        test.add(60.0, 3)
+        test.end_epoch()
+    assert test.inconsistent
+    assert test.variance_factor == 20.0
+    test.end_epoch()
+    assert test.inconsistent
+
+
+@pytest.fixture(scope="module")
+def voyage():
+    scenario = simnav.load("clean-voyages").with_values({"draw.heading": 1.0})
+    return simnav.record(scenario.drawn(1).model_copy(update={"duration": 60.0}), 1)
+
+
+@pytest.mark.parametrize("row", ["ekf", "ukf", "heading-bank"])
+def test_a_clean_voyage_is_consistent(voyage, row: str):
+    trial = simnav.run_trial(make(row), voyage)
+    assert trial.status == "ok"
+    assert simnav.score(trial, voyage, ["inconsistent"]) == {"inconsistent": 0.0}
+
+
+def test_a_start_beyond_recovery_is_reported(voyage):
+    """A heading that is off by 170 degrees, at one degree of sigma: the filter does not recover, and it says so."""
+    recording = turned(voyage, 170.0)
+    trial = simnav.run_trial(make("ekf"), recording)
+    scores = simnav.score(trial, recording)
+    assert trial.status == "ok"
+    assert scores["heading_rmse"] > 0.5
+    assert scores["inconsistent"] > 0.8
+    result = Result(voyage.scenario, 1, "ekf", {}, False, trial.status, "", scores)
+    assert result.ending == "inconsistent"
+    assert Runs([result]).statuses == {"inconsistent": 1}
+    assert Runs([result]).failed == 0
+
+
+def test_a_filter_follows_the_current_through_a_turn():
+    """With the current along the keel as a bias the velocity's NEES was 26 on this voyage."""
+    recording = simnav.record(simnav.load("auv-water-track").drawn(1).model_copy(update={"duration": 500.0}), 1)
+    scores = simnav.score(simnav.run_trial(make("ekf"), recording), recording, ["nees_velocity", "inconsistent"])
+    assert scores["nees_velocity"] < 2.0
+    assert scores["inconsistent"] == 0.0

@@ -1,0 +1,53 @@
+"""Two boards agree as far as their orders do."""
+
+from __future__ import annotations
+
+import pytest
+
+from simnav.leaderboard.ranking.agreement import correlation_table, rank_correlations
+from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.results.result import Result
+
+
+def board(scenario: str, errors: dict[str, float]):
+    """A board of one scenario, its errors the same on three seeds but for a per mille."""
+    results = [
+        Result(scenario, seed, name, {}, False, "ok", "", {"horizontal_rmse": error * (1.0 + 0.001 * seed)})
+        for name, error in errors.items()
+        for seed in range(3)
+    ]
+    return rank(results, tracks={scenario: f"track-of-{scenario}"})
+
+
+NAMES = "abcdefgh"
+
+
+def test_the_same_order_in_other_figures_is_one():
+    first = board("one-v1", {n: float(k + 1) for k, n in enumerate(NAMES)})
+    second = board("two-v1", {n: 10.0 * 2.0**k for k, n in enumerate(NAMES)} | {"new": 1.0})
+    (found,) = rank_correlations(first, second)
+    assert (found.track, found.other) == ("track-of-one-v1", "track-of-two-v1")
+    assert found.rows == tuple(NAMES)
+    assert found.value == pytest.approx(1.0)
+    assert found.low > 0.99
+
+
+def test_the_reverse_order_is_minus_one_and_a_swap_costs_little():
+    first = board("one-v1", {n: float(k + 1) for k, n in enumerate(NAMES)})
+    (reverse,) = rank_correlations(first, board("two-v1", {n: 9.0 - k for k, n in enumerate(NAMES)}))
+    assert reverse.value == pytest.approx(-1.0)
+    swapped = dict(zip("bacdefgh", range(1, 9)))
+    (found,) = rank_correlations(first, board("two-v1", {n: float(e) for n, e in swapped.items()}))
+    assert found.value == pytest.approx(1.0 - 6.0 * 2.0 / (8.0 * 63.0))
+    assert found.low < found.value < found.high
+    assert "0.98" in str(correlation_table([found]).columns[3]._cells)
+
+
+def test_a_few_rows_say_nothing():
+    four = {n: float(k + 1) for k, n in enumerate("abcd")}
+    assert rank_correlations(board("one-v1", four), board("two-v1", four)) == []
+
+
+def test_tracks_of_one_board_are_compared_once():
+    first = board("one-v1", {n: float(k + 1) for k, n in enumerate(NAMES)})
+    assert rank_correlations(first, first) == []
