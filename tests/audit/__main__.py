@@ -1,8 +1,8 @@
 """Measure what the benchmark promises, and print one table: ``python -m tests.audit [SECTION ...]``, or ``make audit``.
 
 A section is a module of this folder. Its function ``parts()`` gives what is measured, by name: each part takes a few
-minutes at most and gives JSON. Its function ``rows(found)`` makes of these (what, figure, promised, kept). With
-``--folder`` each part is a file there, parts that are there are not measured again, and ``--minutes`` ends the command
+minutes at most and gives JSON. Its function ``rows(found)`` makes of these (what, figure, promised, kept); a section
+without ``parts()`` is one part, and its ``rows()`` measures. With ``--folder`` each part is a file there, parts that are there are not measured again, and ``--minutes`` ends the command
 early, so that a long audit can be made in pieces.
 """
 
@@ -32,7 +32,25 @@ def sections() -> dict[str, Section]:
     """The modules of this folder that measure something."""
     found = sorted(p.stem for p in Path(__file__).parent.glob("*.py") if not p.stem.startswith("_"))
     modules = {name: importlib.import_module(f"tests.audit.{name}") for name in found}
-    return {name: cast(Section, module) for name, module in modules.items() if hasattr(module, "rows")}
+    return {
+        name: cast(Section, module if hasattr(module, "parts") else _Whole(module))
+        for name, module in modules.items()
+        if hasattr(module, "rows")
+    }
+
+
+class _Whole:
+    """A section of one part."""
+
+    def __init__(self, module: Any):
+        self._module = module
+
+    def parts(self) -> Mapping[str, Callable[[], Any]]:
+        return {"all": lambda: list(self._module.rows())}
+
+    def rows(self, found: Mapping[str, Any]) -> Iterator[Row]:
+        for row in found["all"]:
+            yield tuple(row)
 
 
 def measured(name: str, section: Section, folder: Path | None, deadline: float) -> dict[str, Any]:
