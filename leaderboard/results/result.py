@@ -224,11 +224,27 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
             yield table.replace_schema_metadata(schema().metadata)
 
 
-def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | None = None) -> None:
-    """Write a file of results, with check sums; ``level`` is that of the compression."""
+def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | None = None, split: bool = False) -> None:
+    """Write a file of results, with check sums.
+
+    Parameters
+    ----------
+    file : file
+    tables : iterator of pyarrow.Table
+    level : int, optional
+        Of the compression.
+    split : bool
+        Store the bytes of scores by their place, which makes them smaller.
+    """
     import pyarrow.parquet as pq
 
-    options = {"compression": "zstd", "compression_level": level, "write_page_checksum": True}
+    options: dict[str, Any] = {"compression": "zstd", "compression_level": level, "write_page_checksum": True}
+    if split:
+        values = "scores.key_value.value"
+        options["column_encoding"] = {values: "BYTE_STREAM_SPLIT"}
+        options["use_dictionary"] = [n for n in schema().names if n not in ("scores", "series")] + [
+            "scores.key_value.key"
+        ]
     with pq.ParquetWriter(file, schema(), **options) as writer:
         for table in tables:
             writer.write_table(table)
