@@ -2,8 +2,8 @@
 
 A section is a module of this folder. Its function ``parts()`` gives what is measured, by name: each part takes a few
 minutes at most and gives JSON. Its function ``rows(found)`` makes of these (what, figure, promised, kept); a section
-without ``parts()`` is one part, and its ``rows()`` measures. With ``--folder`` each part is a file there, and parts that
-are there are not measured again. ``--minutes`` ends the command early, so that a long audit can be made in pieces.
+without ``parts()`` is one part, and its ``rows()`` measures. With ``--folder`` each part is a file there, and one that
+is there is not measured again. ``--minutes`` ends the command early, so that a long audit can be made in pieces.
 """
 
 from __future__ import annotations
