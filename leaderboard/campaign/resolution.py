@@ -6,6 +6,7 @@ import contextlib
 import importlib
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ _IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
 _MEMORY = 2 << 30  # likewise [bytes]
 
 
-def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bool) -> Entrant:
+def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path], alone: bool) -> Entrant:
     """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
     name, source = request.name, ""
     file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
@@ -59,7 +60,7 @@ def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bo
         found, why = outcome.value, outcome.reason
     else:
         try:
-            server = prepare(confinement, folder, loaded=alone)
+            server = prepare(confinement, hidden, loaded=alone)
             found, why = describe(server, entrant, Limits(_IMPORT_TIME, _MEMORY)), ""
         except ValueError as error:
             found, why = None, str(error)

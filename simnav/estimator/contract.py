@@ -32,11 +32,15 @@ class Estimator(ABC):
     slow : bool
         True for rows that take several milliseconds an epoch or more; a quick campaign leaves them out unless it is
         asked for them.
+    real_time_as : str
+        Name of the estimator whose real-time estimates this one gives, to the bit, and only smooths beside; empty for
+        all others. Boards then rank it by what it smooths.
     """
 
     name: ClassVar[str] = ""
     reference: ClassVar[bool] = False
     slow: ClassVar[bool] = False
+    real_time_as: ClassVar[str] = ""
 
     @property
     def needs(self) -> Needs:
