@@ -81,7 +81,7 @@ class Pool:
         self.faulty = np.zeros(c * self._room, np.bool_)
         self.edges, self.length = np.zeros((c, s + 1), np.int64), np.zeros(c, np.int64)
         self.end, self.context = np.zeros((c, s)), np.zeros((c, s, voyage.context.shape[1]))
-        self.error, self.oracle = np.zeros((c, s, 9)), np.zeros((c, s, 2))
+        self.error, self.oracle = np.zeros((c, s, 9)), np.zeros((c, s, 3))
         self.covariance = np.zeros((c, self.n, self.n))
         self.period = np.ones((c, len(o.layout.names)))
         self.start: list[InitialState | None] = [None] * c

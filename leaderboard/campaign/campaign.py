@@ -37,6 +37,7 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.resolution import resolve, variant_of
 from simnav.leaderboard.campaign.seal import Seal
+from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -256,6 +257,8 @@ def run_campaign(
         entrants = [resolve(request, chosen, hidden, workers == 1 and backend == "loky") for request in estimators]
     except ServerError as error:
         raise CampaignError(str(error)) from None
+    if seal is None:  # the seeds of a sealed campaign are drawn from 2**63
+        require_unseen(entrants, scenarios, seeds)
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     if seal is not None:
         recordings = {name: seal.recording(known) for name, known in recordings.items()}

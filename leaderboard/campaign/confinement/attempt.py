@@ -179,7 +179,8 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     Returns
     -------
     dict
-        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty).
+        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty), and
+        ``learned_from`` as it was told, not checked.
 
     Raises
     ------
@@ -195,4 +196,5 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     source, failure = told.get("source"), told.get("failure")
     if not isinstance(source, str) or not isinstance(failure, str) or len(source) > 200:
         raise ValueError("it says nothing of itself that can be read")
-    return {"reference": told.get("reference") is True, "source": source, "failure": failure[:1000]}
+    known = {"reference": told.get("reference") is True, "source": source, "failure": failure[:1000]}
+    return {**known, "learned_from": told.get("learned_from", [])}
