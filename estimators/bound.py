@@ -16,14 +16,14 @@ Kinds, and the oracle that each belongs to:
   the density of its noise, ``J = integral of (p')^2 / p`` (``oracle-mixture``)
 
 Errors that last (multipath, a bias step, a ramp) are states of the model, so that their correlation is in the bound.
-Each run has a trajectory and flags of its own: the information on the nine navigation errors is averaged over the runs,
-then inverted. It bounds the mean square error over runs, whose initial errors and biases are drawn from the initial
-covariance; a single run may be better.
+Each run has a trajectory, faults and magnitudes of its own. The covariance of the nine navigation errors is that of the
+run, and the bound of a scenario is its mean over the runs. (The information averaged over runs, then inverted, is a
+lower bound, too, for those who do not know what was drawn. It is never above, and far below where runs differ.) It
+bounds the mean square error over runs, whose initial errors and biases are drawn from the initial covariance; a single
+run may be better.
 
-What it is not: a bound beyond the model. Where the model stands for the simulator's errors by something simpler (one
-Gauss-Markov state for a turn-on and an in-run bias, noise for an IMU's scale factor, in
-`simnav.estimators.models.inertial`; all of the motion, in `simnav.estimators.models.ship`), it is the bound of an
-estimator with that model. A disturbance of the IMU counts as known. Outages of random times count as known too.
+What it is not: a bound beyond the model (`simnav.estimators.models.about_truth`). A disturbance of the IMU, the motion
+of a vessel without an IMU and the velocity of the water count as known. So do the times of outages.
 
 Smoothed output, which has seen what comes after, has a bound of its own (``smoothed``): the covariance that a
 Rauch-Tung-Striebel smoother behind the same filter ends with (``oracle-rts`` for ``flags``).
@@ -39,7 +39,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simnav.estimators.adaptations.truth import FisherNoise, NominalNoise, TrueNoise
 from simnav.estimators.solvers.oracle import OracleEstimator
@@ -51,7 +50,7 @@ from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import COMPONENTS, Array
 
-__all__ = ["KINDS", "Bound", "Kind", "bound", "information"]
+__all__ = ["KINDS", "Bound", "Kind", "bound", "bound_of_run"]
 
 Kind = Literal["clean", "flags", "mix"]
 KINDS: tuple[Kind, ...] = ("clean", "flags", "mix")
@@ -123,8 +122,8 @@ class Bound:
 _KNOWLEDGE: dict[str, type[TrueNoise]] = {"clean": NominalNoise, "flags": TrueNoise, "mix": FisherNoise}
 
 
-def information(recording: Recording, kind: Kind = "flags", smoothed: bool = False) -> tuple[Array, NDArray[np.bool_]]:
-    """Information of one run on its navigation errors.
+def bound_of_run(recording: Recording, kind: Kind = "flags", smoothed: bool = False) -> Array:
+    """The bound of one run.
 
     Parameters
     ----------
@@ -137,10 +136,8 @@ def information(recording: Recording, kind: Kind = "flags", smoothed: bool = Fal
 
     Returns
     -------
-    information : (T, m, m) array
-        On the m components that the model estimates.
-    estimated : (9,) bool array
-        Which they are.
+    (T, 9, 9) array
+        Covariances; NaN for what the model does not estimate.
 
     Raises
     ------
@@ -152,10 +149,10 @@ def information(recording: Recording, kind: Kind = "flags", smoothed: bool = Fal
     trial = run_trial(estimator, recording)
     if trial.status != "ok" or trial.covariance is None:
         raise SpecError(f"{recording.scenario}, seed {recording.seed}: there is no bound: {trial.reason}")
-    estimated: NDArray[np.bool_] = np.all(trial.estimated, axis=0)
-    every = trial.covariance if smoother is None else smoother.smoothed_covariance
-    covariance = every[:, estimated][:, :, estimated]
-    return _inverse(covariance), estimated
+    covariance = (trial.covariance if smoother is None else smoother.smoothed_covariance).copy()
+    missing = ~np.all(trial.estimated, axis=0)
+    covariance[:, missing, :] = covariance[:, :, missing] = np.nan
+    return covariance
 
 
 def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags", smoothed: bool = False) -> Bound:
@@ -194,23 +191,12 @@ def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags", smooth
         raise SpecError(f"there is no bound of kind {kind!r}; there are: {', '.join(KINDS)}")
     if scenario.recorded:
         raise SpecError(f"{scenario.id} is a recorded run; its noise is not known, and so there is no bound")
-    total, runs = np.zeros(0), 0
+    total, runs, time = np.zeros(0), 0, np.zeros(0)
     for seed in seeds:
         recording = ideal(scenario, seed)
-        j, estimated = information(recording, kind, smoothed)
-        total = j if runs == 0 else total + j
-        runs += 1
+        covariance = bound_of_run(recording, kind, smoothed)
+        total = covariance if runs == 0 else total + covariance
+        runs, time = runs + 1, recording.data.truth.time
     if runs == 0:
         raise ValueError("a bound needs at least one seed")
-    covariance = np.full((len(total), 9, 9), np.nan)
-    covariance[:, np.outer(estimated, estimated)] = _inverse(total / runs).reshape(len(total), -1)
-    return Bound(scenario.id, kind, runs, recording.data.truth.time.copy(), covariance, smoothed)
-
-
-def _inverse(matrices: Array) -> Array:
-    """Inverses of symmetric positive definite matrices, computed in units of their own sigmas."""
-    sigma = np.sqrt(np.diagonal(matrices, axis1=1, axis2=2))
-    scale = sigma[:, :, None] * sigma[:, None, :]
-    inverse = np.linalg.inv(matrices / scale) / scale
-    symmetric: Array = 0.5 * (inverse + inverse.swapaxes(1, 2))
-    return symmetric
+    return Bound(scenario.id, kind, runs, time.copy(), total / runs, smoothed)

@@ -217,6 +217,7 @@ def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
         _register_env(
             id=task_id,
             entry_point=f"{_LEARNING}.guidance:GuidanceEnv",
+            vector_entry_point=f"{_LEARNING}.guidance_vector:GuidanceVectorEnv",
             kwargs={"scenario": scenario},
         )
 

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from simnav.compiled import Array
-from simnav.geometry.earth import displace, relative_position
-from simnav.geometry.rotation import wrap_angle
+from simnav.compiled import Array, kernel
+from simnav.geometry.earth import displace_scalar, relative_position
+from simnav.geometry.rotation import wrap_angle, wrap_scalar
 from simnav.plugins import PluginError, Registry
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ __all__ = [
     "NavigationPoint",
     "Observation",
     "Role",
+    "add_error_scalar",
     "geodetic_components",
     "kinds_with",
     "speed_components",
@@ -93,6 +94,35 @@ class NavigationPoint(NamedTuple):
     velocity: Array
     dcm: Array
     angular_rate: Array
+
+
+@kernel()
+def add_error_scalar(positions, cyclic, value, error):  # type: ignore[no-untyped-def]
+    """Add an error to one measurement, in place; as `Kind.add_error`.
+
+    Parameters
+    ----------
+    positions, cyclic : int
+        As of `Kind.layout`.
+    value, error : (d,) array
+        SI units and radians.
+    """
+    if positions == 3:
+        value[0], value[1], value[2] = displace_scalar(value[0], value[1], value[2], error[0], error[1], error[2])
+    elif positions == 2:
+        # The radii are those at the sea surface: at 100 m depth the error of the error is 2e-5 of it.
+        value[0], value[1], _ = displace_scalar(value[0], value[1], 0.0, error[0], error[1], 0.0)
+    for i in range(positions, value.size):
+        value[i] += error[i]
+        if cyclic >> i & 1:
+            value[i] = wrap_scalar(value[i])
+
+
+@kernel("void(i8, i8, f8[:, ::1], f8[:, ::1])")
+def _add_errors(positions, cyclic, values, errors):  # type: ignore[no-untyped-def]
+    """`add_error_scalar` for n measurements."""
+    for i in range(values.shape[0]):
+        add_error_scalar(positions, cyclic, values[i], errors[i])
 
 
 #: An observation model: the (d,) reading that a datasheet's instrument should give at a state, in SI units, and its
@@ -230,6 +260,17 @@ class Kind:
         """How many of the first components are a geodetic position."""
         return 0 if not self.geodetic else 3 if self.values[2:] == ("height",) else 2
 
+    @cached_property
+    def layout(self) -> tuple[int, int]:
+        """What `add_error_scalar` is told: how many components are a position, and a bit for each that is cyclic."""
+        n = self._positions
+        return n, sum(1 << i for i, c in enumerate(self.components) if c.cyclic and i >= n)
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """Of each component: a value is plausible between this and its negative, both excluded."""
+        return self._limits
+
     def plausible(self, value: Array) -> bool:
         """Whether a (d,) value can be a measurement at all: finite, and within the limits of the components."""
         x: list[float] = value.tolist()
@@ -251,13 +292,10 @@ class Kind:
         (..., d) array
             Angles that are cyclic in [-pi, pi).
         """
-        n = self._positions
-        if n == len(self.components) == 3:
-            return displace(value, error)
-        total: Array = value + error
-        if n:
-            total[..., :n] = displace(_three(value, n), _three(error, n))[..., :n]
-        return self._wrapped(total)
+        total, error = (np.array(a, dtype=np.float64) for a in np.broadcast_arrays(value, error))
+        d = len(self.components)
+        _add_errors(*self.layout, total.reshape(-1, d), error.reshape(-1, d))
+        return total
 
     def difference(self, value: Array, reference: Array) -> Array:
         """The error that turns ``reference`` into ``value``: the inverse of `add_error`.

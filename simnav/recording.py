@@ -28,6 +28,7 @@ from simnav.types import (
     Measurement,
     Measurements,
     NavigationStates,
+    TapStates,
     TriadDatasheet,
 )
 
@@ -137,7 +138,7 @@ class Block:
     aids : dict of str to AidStream
         Measurements of each aiding instrument, by its name.
     truth : NavigationStates
-        At the ends of the steps within the stretch.
+        At the ends of the steps within the stretch. Of a simulated run they are `TapStates`, with the current.
     """
 
     start: float
@@ -158,8 +159,8 @@ class Block:
             labels = ImuLabels(
                 *(np.concatenate([getattr(p.imu_labels, n) for p in parts]) for n in ("faults", "fault_error"))
             )
-        names = ("time", "position", "velocity", "attitude")
-        truth = NavigationStates(*(np.concatenate([getattr(p.truth, n) for p in parts]) for n in names))
+        kind = TapStates if all(isinstance(p.truth, TapStates) for p in parts) else NavigationStates
+        truth = kind(*(np.concatenate([getattr(p.truth, n) for p in parts]) for n in _STATES_OF[kind]))
         aids = {n: AidStream.concatenate([p.aids[n] for p in parts]) for n in first.aids}
         return Block(first.start, parts[-1].end, imu, labels, aids, truth)
 
@@ -302,6 +303,10 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
 _AID_ARRAYS = ("time", "value", "faults", "fault_error", "sigma", "dropped")
 _IMU_ARRAYS = ("time", "interval", "angular_rate", "specific_force")
 _STATE_ARRAYS = ("time", "position", "velocity", "attitude")
+_STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
+    NavigationStates: _STATE_ARRAYS,
+    TapStates: (*_STATE_ARRAYS, "angular_rate", "water_velocity"),
+}
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -347,7 +352,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
     def add(prefix: str, holder: object, names: Sequence[str]) -> None:
         arrays.update({f"{prefix}.{n}": getattr(holder, n) for n in names})
 
-    add("truth", data.truth, _STATE_ARRAYS)
+    add("truth", data.truth, _STATES_OF[TapStates if isinstance(data.truth, TapStates) else NavigationStates])
     add("initial_truth", recording.initial_truth, _STATE_ARRAYS)
     add("start", recording.start, ("position", "velocity", "attitude", "covariance"))
     if data.imu is not None:
@@ -378,13 +383,14 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     def get(prefix: str, names: Sequence[str]) -> list[Any]:
         return [arrays[f"{prefix}.{n}"] for n in names]
 
+    kind = TapStates if "truth.water_velocity" in arrays else NavigationStates
     data = Block(
         meta["begin"],
         meta["end"],
         ImuSamples(*get("imu", _IMU_ARRAYS)) if "imu.time" in arrays else None,
         ImuLabels(*get("imu_labels", ("faults", "fault_error"))) if "imu_labels.faults" in arrays else None,
         {n: AidStream(n, kind, *get(f"aid.{n}", _AID_ARRAYS)) for n, kind in meta["streams"].items()},
-        NavigationStates(*get("truth", _STATE_ARRAYS)),
+        kind(*get("truth", _STATES_OF[kind])),
     )
     return Recording(
         meta["scenario"],

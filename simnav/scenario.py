@@ -19,6 +19,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, SupportsIndex
 
@@ -317,9 +318,17 @@ class Scenario(Spec):
         return self.model_copy(update={"instruments": actual})
 
     def actual_sheet(self) -> Instruments | None:
-        """The datasheets that would be true; None where those of `instruments_sheet` are."""
+        """The datasheets that would be true; None where those of `instruments_sheet` are.
+
+        Among their details are the figures that no datasheet tells (`AidSpec.untold`), where they are not zero.
+        """
         actual = self.actual()
-        return None if actual is self else actual.instruments_sheet()
+        untold = {name: {u: getattr(s, u) for u in s.untold if getattr(s, u)} for name, s in actual.aids.items()}
+        if actual is self and not any(untold.values()):
+            return None
+        sheet = actual.instruments_sheet()
+        aids = [replace(s, details={**s.details, **untold[s.name]}) for s in sheet.values()]
+        return Instruments(aids, sheet.imu, sheet.step)
 
     def content_hash(self) -> str:
         """Hexadecimal digest of everything that decides the numbers of a run, defaults included.

@@ -104,6 +104,8 @@ class Simulator:
         Length of the run, length of one step, and time that was reached [s].
     note : str
         Empty; a log says here which recording it is.
+    imu, aids, layers : Imu or None, dict of str to Instrument, tuple of FaultLayer
+        The instruments and the faults.
 
     Raises
     ------
@@ -127,13 +129,13 @@ class Simulator:
             self.initial_truth, scenario.initial_error.covariance(), root, scenario.initial_error.factors()
         )
         actual = scenario.actual()
-        self._imu = None if actual.imu is None else actual.imu.build(root)
-        self._aids = {
+        self.imu = None if actual.imu is None else actual.imu.build(root)
+        self.aids = {
             name: spec.build(name, root, water_depth=scenario.water_depth) for name, spec in actual.aids.items()
         }
         kinds = {name: spec.kind for name, spec in scenario.aids.items()}
         self.faults = labels(scenario.faults, scenario.duration, kinds)
-        self._layers = build_layers(scenario.faults, root)
+        self.layers = build_layers(scenario.faults, root)
         self._label_imu = any("imu" in f.instruments for f in scenario.faults)
 
     def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
@@ -164,17 +166,17 @@ class Simulator:
         block = self._shared(taps) if self._world is None else self._world.advance(until, taps)
         self.time = until
         imu, imu_labels = None, None
-        if self._imu is not None:
+        if self.imu is not None:
             # The ideal samples are not needed again, unless other runs share them.
-            imu = self._imu.sense(block.imu, overwrite=self._truth is None)
+            imu = self.imu.sense(block.imu, overwrite=self._truth is None)
             if self._label_imu:
                 imu_labels = ImuLabels(np.zeros(len(imu), dtype=np.uint32), np.zeros((len(imu), 6)))
-            for layer in self._layers:
+            for layer in self.layers:
                 imu, imu_labels = layer.apply_imu(imu, imu_labels)
         aids = {}
-        for name, instrument in self._aids.items():
+        for name, instrument in self.aids.items():
             stream = instrument.sense(block.taps[name])
-            for layer in self._layers:
+            for layer in self.layers:
                 stream = layer.apply(stream)
             aids[name] = stream
         return Block(start, until, imu, imu_labels, aids, block.taps[_STEPS])

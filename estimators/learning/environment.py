@@ -19,8 +19,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
+from simnav.environment.charted import ChartedEnv
 from simnav.environment.rendering import Chart
 from simnav.environment.seeds import training_seed
 from simnav.estimators.learning.features import LIMIT, Numbers
@@ -99,7 +99,7 @@ def run_seed(seed: int | None, rng: np.random.Generator, voyages: int | None) ->
     return int(rng.integers(2**63 - 1)) if seed is None else int(seed)
 
 
-class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
+class FilterTaskEnv(ChartedEnv[Numbers, Numbers]):
     """One of the tasks of `simnav.estimators.learning.tasks`, over one voyage at a time.
 
     Parameters
@@ -114,8 +114,6 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
     Actions out of bounds are clipped to them; those of another shape, or not finite, are refused.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
-
     def __init__(
         self,
         scenario: Scenario | str | Path,
@@ -128,14 +126,11 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
         reveal_truth: bool = False,
         render_mode: str | None = None,
     ):
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode is 'human', 'rgb_array' or None, not {render_mode!r}")
+        super().__init__(render_mode)
         self.options = TaskOptions(scenario, task, reward, instruments, steps, voyages, reveal_truth)
         self.observation_space, self.action_space = self.options.observation_space, self.options.action_space
-        self.render_mode = render_mode
         self._voyage: Voyage | None = None
         self._filters: Filters | None = None
-        self._chart: Chart | None = None
         self._first, self._last = np.zeros(1, np.int64), np.zeros(1, np.int64)
 
     def reset(
@@ -164,12 +159,7 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
         n = voyage.filter.model.size
         self._filters = Filters(o.task, o.layout, o.reward, 1, n)
         self._filters.begin(0, voyage.filter.start_covariance, o.layout.periods(voyage.recording.instruments))
-        if self.render_mode is not None:
-            if self._chart is None:
-                self._chart = Chart(scenario.id, scenario.duration, human=self.render_mode == "human")
-            self._chart.clear()
-            if self.render_mode == "human":
-                self._chart.show()
+        self._begin_chart(scenario.id, scenario.duration)
         voyage.advance()
         recording = voyage.recording
         info = {"seed": run, "start": recording.start, "instruments": recording.instruments}
@@ -210,20 +200,8 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
         self._voyage = None
         return np.zeros(o.layout.size, np.float32), float(value[0]), False, True, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The chart so far: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window is up to date."""
-        if self._chart is None:
-            if self.render_mode is None:
-                gymnasium.logger.warn("render() shows nothing: make the environment with render_mode='rgb_array'")
-                return None
-            raise gymnasium.error.ResetNeeded("there is nothing to render yet: call reset() first")
-        return self._chart.frame() if self.render_mode == "rgb_array" else None
-
-    def close(self) -> None:
-        """Close the window and forget the voyage."""
-        if self._chart is not None:
-            self._chart.close()
-        self._chart = self._voyage = None
+    def _forget(self) -> None:
+        self._voyage = None
 
     def _observe(self, voyage: Voyage, filters: Filters) -> Numbers:
         self._last[0] = voyage.filter.count
@@ -247,5 +225,4 @@ class FilterTaskEnv(gymnasium.Env[Numbers, Numbers]):
         chart.add(
             voyage.estimate.time, voyage.truth[0], displace(position, shift), covariance=filters.covariance[0, :2, :2]
         )
-        if self.render_mode == "human":
-            chart.show()
+        self._show()

@@ -32,7 +32,7 @@ m)^2 - (v / 0.5 m/s)^2)`` for the distance d to the end of the track and the spe
 
 from __future__ import annotations
 
-from math import atan2, cos, exp, hypot, log1p, log10, pi, radians, remainder, sin, tau
+from math import atan2, inf
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -41,29 +41,24 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from simnav.environment.charted import ChartedEnv
 from simnav.environment.rendering import Chart
 from simnav.estimator import Estimator, make
 from simnav.estimators.learning.environment import run_seed
-from simnav.estimators.learning.features import LIMIT, SPEED, TURN_RATE, Numbers
+from simnav.estimators.learning.features import LIMIT, Numbers
 from simnav.estimators.learning.filters import checked_actions
-from simnav.estimators.models.suitable import Suitable
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.geometry.earth import relative_position
-from simnav.recording import packets
+from simnav.estimators.learning.guidance_kernels import ASIDE, LARGEST_TURN, SIZE, judge, look, steer
+from simnav.estimators.learning.navigators import Navigators
+from simnav.estimators.learning.routes import Routes
 from simnav.scenario import Scenario, load
 from simnav.simulator import Simulator
-from simnav.types import KINDS, Array, Estimate
-from simnav.world import Vessel, World
-from simnav.world.track import PlannedTrack
+from simnav.steps import SteppedRuns
+from simnav.types import KINDS, Array
+from simnav.world import Vessel, motion
 
-__all__ = ["GuidanceEnv", "GuidanceScores", "LineOfSight"]
+__all__ = ["GuidanceEnv", "GuidanceOptions", "GuidanceScores", "GuidedVoyages", "LineOfSight"]
 
-#: Unit of the distance from the track [m], and largest change of heading [rad].
-ASIDE, LARGEST_TURN = 20.0, radians(60.0)
-#: Weights of the reward.
-FUEL, AGROUND, BERTH = 0.2, 100.0, 100.0
 ROUTES = ("track", "channel", "dock")
-SIZE = 16
 
 
 class GuidanceScores(NamedTuple):
@@ -87,34 +82,8 @@ class GuidanceScores(NamedTuple):
     aground: bool
 
 
-class Route:
-    """The planned track as a line of points, from a geodetic position to a place on it."""
-
-    def __init__(self, track: PlannedTrack, duration: float):
-        track.reach(duration)
-        keep = np.concatenate([[True], np.hypot(*np.diff(track.points[:, :2], axis=0).T) > 0.05])
-        self.position, self.points = track.position[keep], track.points[keep]
-        steps = relative_position(self.position[1:], self.position[:-1])[:, :2]
-        self.course = np.arctan2(steps[:, 1], steps[:, 0])
-        self.course = np.append(self.course, self.course[-1:]) if len(steps) else np.array([track.points[0, 2]])
-        self.along = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
-
-    def place(self, position: Array, at: int) -> tuple[int, float, float]:
-        """Nearest point within two minutes of one, the distance to starboard [m], and how far along [m]."""
-        low, high = max(at - 20, 0), min(at + 120, len(self.points))
-        offsets = relative_position(position, self.position[low:high])[:, :2]
-        k = int(np.argmin(offsets[:, 0] ** 2 + offsets[:, 1] ** 2))
-        at, (north, east), course = low + k, offsets[k].tolist(), float(self.course[low + k])
-        ahead = north * cos(course) + east * sin(course)
-        return at, east * cos(course) - north * sin(course), float(self.along[at]) + ahead
-
-    def course_ahead(self, at: int, seconds: int) -> float:
-        """Course of the track so many seconds after a point [rad]."""
-        return float(self.course[min(at + seconds, len(self.course) - 1)])
-
-
-class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
-    """Steer by the estimate (see the module).
+class GuidanceOptions:
+    """What the environment of one voyage and the vector form have in common.
 
     Parameters
     ----------
@@ -132,11 +101,6 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         Learn from so many training voyages (`simnav.environment.seeds`); None: the seed of a reset is the run's.
     reveal_truth : bool
         Put the truth and the distance from the track into ``info``.
-    render_mode : {"human", "rgb_array"}, optional
-
-    Notes
-    -----
-    The last ``info`` of an episode holds ``scores`` (`GuidanceScores`).
 
     Raises
     ------
@@ -144,7 +108,150 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         If an argument is not valid, or the scenario is a recorded log, which cannot be steered.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
+    def __init__(
+        self, scenario: Scenario | str | Path, route: str, half_width: float, navigator: Estimator | str | None,
+        steps: int | None, voyages: int | None, reveal_truth: bool,
+    ):  # fmt: skip
+        scenario = load(scenario) if isinstance(scenario, (str, Path)) else scenario
+        if scenario.recorded or scenario.start is None:
+            raise ValueError(f"scenario {scenario.id} is a recorded log: its vessel cannot be steered")
+        if route not in ROUTES:
+            raise ValueError(f"route is one of {', '.join(ROUTES)}, not {route!r}")
+        if not half_width > 0.0:
+            raise ValueError(f"half_width = {half_width!r} m should be positive")
+        for name, value in (("steps", steps), ("voyages", voyages)):
+            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
+                raise ValueError(f"{name} is a positive integer or None, not {value!r}")
+        self.scenario, self.route, self.half_width, self.steps = scenario, route, half_width, steps
+        self.voyages, self.reveal_truth = voyages, reveal_truth
+        if isinstance(navigator, str):
+            navigator = make(navigator)
+        if navigator is not None and navigator.reference:
+            raise ValueError(f"navigator {navigator.name!r} is a reference that is told the truth")
+        self.navigator = navigator
+        self.observation_space = spaces.Box(-LIMIT, LIMIT, (SIZE,), dtype=np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), dtype=np.float32)
+
+
+class GuidedVoyages:
+    """n voyages that are steered side by side: world, instruments, faults, filters and scores in compiled passes.
+
+    Parameters
+    ----------
+    options : GuidanceOptions
+    navigators : list of Estimator, optional
+        One of each voyage's own; by default the plain filter.
+
+    Attributes
+    ----------
+    runs : SteppedRuns
+    navigators : Navigators
+    observation : (n, 16) float32 array
+        What the agents saw last.
+    aside : (n,) array
+        True distance to starboard of the track at the end of the last step [m].
+    """
+
+    def __init__(self, options: GuidanceOptions, n: int, navigators: list[Estimator] | None = None):
+        self.options, self.n, self._own = options, n, navigators
+        self.runs = SteppedRuns(n)
+        self.navigators = Navigators(self.runs)
+        self._routes = Routes(n)
+        self._at, self._true_at, self._ahead = (np.zeros(n, np.int64) for _ in range(3))
+        self._steps, self._dt = np.zeros(n, np.int64), np.zeros(n)
+        self._notes, self._start, self._tally = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 4))
+        self._fix = np.zeros((n, 1), np.bool_)
+        self._planned, self._wrong, self._heading, self._speed = (np.zeros(n) for _ in range(4))
+        self.aside, self._rewards, self._aground = np.zeros(n), np.zeros(n), np.zeros(n, np.bool_)
+        self.observation = np.zeros((n, SIZE), np.float32)
+
+    def begin(self, b: int, seed: int) -> dict[str, Any]:
+        """Begin a voyage with the seed of a run; its info."""
+        o, runs = self.options, self.runs
+        scenario = o.scenario.drawn(seed)
+        vessel = scenario.vessel or Vessel()
+        self._routes.put(b, o.scenario, scenario)
+        self._ahead[b] = round(2.0 * vessel.turn_time_constant)
+        source = Simulator(scenario.model_copy(update={"manoeuvres": (), "world_seed": None}), seed)
+        runs.begin(b, source)
+        own = None if self._own is None else self._own[b]
+        self.navigators.begin(b, source.start, source.instruments, own)
+        fix = np.array([KINDS[kind].role == "fix" for kind in runs.kinds[b]], np.bool_)
+        if len(fix) > self._fix.shape[1]:
+            self._fix = np.pad(self._fix, ((0, 0), (0, len(fix) - self._fix.shape[1])))
+        self._fix[b], self._fix[b, : len(fix)] = False, fix
+        self._at[b] = self._true_at[b] = 0
+        self._dt[b] = source.step
+        epochs = int(source.duration / source.step + 1e-6)
+        self._steps[b] = min(o.steps or epochs, epochs)
+        self._notes[b], self._tally[b] = 0.0, (0.0, 0.0, 0.0, inf)
+        spread = self.navigators.spread[b]
+        self._start[b] = spread[0] + spread[2], spread[3]
+        return {"seed": seed, "start": source.start, "instruments": source.instruments}
+
+    def look(self, active: NDArray[np.bool_]) -> None:
+        """What the agents of some voyages see."""
+        runs, routes, spread = self.runs, self._routes, self.navigators.spread
+        variance = np.stack([spread[:, 0] + spread[:, 2], spread[:, 3]], axis=1)
+        o = self.options
+        look(
+            active, self.time, self._dt, self.navigators.estimate, variance, runs.step, runs.count, runs.who, runs.when,
+            self._fix, routes.of, routes.length, routes.points, routes.geodetic, routes.course, routes.along,
+            o.half_width if o.route == "channel" else ASIDE, self._at, self._notes, self._start, self.observation,
+        )  # fmt: skip
+
+    @property
+    def time(self) -> Array:
+        """(n,) array: time of the last step's end [s]."""
+        time: Array = self._dt * self.runs.step
+        return time
+
+    def step(self, active: NDArray[np.bool_], actions: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Steer some voyages for a step; rewards, who touched the side, and for whom it was the last step."""
+        runs, routes, o = self.runs, self._routes, self.options
+        steer(
+            active, actions, self._at, self._ahead, routes.of, routes.length, routes.points, runs.truth,
+            self.navigators.estimate, self._planned, self._wrong, self._heading, self._speed,
+        )  # fmt: skip
+        motion.command(active, runs.x, self._wrong, self._heading, self._speed)
+        runs.advance(active)
+        self.navigators.update(active)
+        last = runs.step >= self._steps
+        judge(
+            active, self._dt, self._planned, np.ascontiguousarray(runs.x[:, motion.U]), runs.truth, routes.of,
+            routes.length, routes.geodetic, routes.course, routes.along, last, ROUTES.index(o.route), o.half_width,
+            self._true_at, self._tally, self.aside, self._rewards, self._aground,
+        )  # fmt: skip
+        self.look(active)
+        return self._rewards.copy(), self._aground.copy(), active & last & ~self._aground
+
+    def scores(self, b: int) -> GuidanceScores:
+        """What a voyage was worth so far."""
+        _, squares, fuel, clearance = self._tally[b].tolist()
+        n = int(self.runs.step[b])
+        return GuidanceScores((squares / n) ** 0.5, clearance, fuel / n, bool(self._aground[b]))
+
+
+class GuidanceEnv(ChartedEnv[Numbers, Numbers]):
+    """Steer by the estimate (see the module).
+
+    Parameters
+    ----------
+    scenario, route, half_width, navigator, steps, voyages, reveal_truth
+        As of `GuidanceOptions`.
+    render_mode : {"human", "rgb_array"}, optional
+
+    Notes
+    -----
+    Actions out of bounds are clipped to them; those of another shape, or not finite, are refused. The last ``info`` of
+    an episode holds ``scores`` (`GuidanceScores`).
+
+    Raises
+    ------
+    ValueError
+        If an argument is not valid, or the scenario is a recorded log, which cannot be steered.
+    """
+
     task: ClassVar[str] = "Guidance"
 
     def __init__(
@@ -159,60 +266,23 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         reveal_truth: bool = False,
         render_mode: str | None = None,
     ):
-        scenario = load(scenario) if isinstance(scenario, (str, Path)) else scenario
-        if scenario.recorded or scenario.start is None:
-            raise ValueError(f"scenario {scenario.id} is a recorded log: its vessel cannot be steered")
-        if route not in ROUTES:
-            raise ValueError(f"route is one of {', '.join(ROUTES)}, not {route!r}")
-        if not half_width > 0.0:
-            raise ValueError(f"half_width = {half_width!r} m should be positive")
-        for name, value in (("steps", steps), ("voyages", voyages)):
-            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
-                raise ValueError(f"{name} is a positive integer or None, not {value!r}")
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode is 'human', 'rgb_array' or None, not {render_mode!r}")
-        self.scenario, self.route, self.half_width, self.steps = scenario, route, half_width, steps
-        self.voyages, self.reveal_truth, self.render_mode = voyages, reveal_truth, render_mode
-        if isinstance(navigator, str):
-            navigator = make(navigator)
-        self.navigator: Estimator = KalmanEstimator(Suitable()) if navigator is None else navigator
-        if self.navigator.reference:
-            raise ValueError(f"navigator {self.navigator.name!r} is a reference that is told the truth")
-        self._fixes: set[str] = set()
-        self.observation_space = spaces.Box(-LIMIT, LIMIT, (SIZE,), dtype=np.float32)
-        self.action_space = spaces.Box(-1.0, 1.0, (2,), dtype=np.float32)
-        self._chart: Chart | None = None
-        self._source: Simulator | None = None
+        super().__init__(render_mode)
+        self.options = o = GuidanceOptions(scenario, route, half_width, navigator, steps, voyages, reveal_truth)
+        self.scenario = o.scenario
+        self.observation_space, self.action_space = o.observation_space, o.action_space
+        self._voyages = GuidedVoyages(o, 1, None if o.navigator is None else [o.navigator])
+        self._under_way = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Numbers, dict[str, Any]]:
         """Begin a voyage; the observation is of the start. The arguments as of `NavigationEnv.reset`."""
         super().reset(seed=seed)
-        run = run_seed(seed, self.np_random, self.voyages)
-        scenario = self.scenario.drawn(run)
-        assert scenario.start is not None
-        vessel = scenario.vessel or Vessel()
-        planned = World.plan(scenario.start, vessel, scenario.manoeuvres, scenario.current)
-        self._route = Route(planned, scenario.duration)
-        self._ahead = round(2.0 * vessel.turn_time_constant)
-        adrift = scenario.model_copy(update={"manoeuvres": (), "world_seed": None})
-        self._source = source = Simulator(adrift, run)
-        self.navigator.reset(source.start, source.instruments)
-        self._fixes = {sheet.name for sheet in source.instruments.of_role("fix")}
-        start, truth = source.start, source.initial_truth
-        self._truth = np.stack([truth.position[0], truth.velocity[0], truth.attitude[0]])
-        self._estimate = Estimate(0.0, start.position, start.velocity, start.attitude, start.covariance)
-        self._start = np.diag(start.covariance)
-        self._at = self._true_at = self._k = 0
-        self._turn, self._last_fix, self._along = 0.0, 0.0, 0.0
-        self._squares, self._fuel, self._clearance = 0.0, 0.0, np.inf
-        if self.render_mode is not None:
-            if self._chart is None:
-                self._chart = Chart(self.scenario.id, self.scenario.duration, human=self.render_mode == "human")
-            self._chart.clear()
-        info: dict[str, Any] = {"seed": run, "start": start, "instruments": source.instruments}
-        return self._observe(), info
+        info = self._voyages.begin(0, run_seed(seed, self.np_random, self.options.voyages))
+        self._under_way = True
+        self._voyages.look(_ON)
+        self._begin_chart(self.scenario.id, self.scenario.duration)
+        return self._voyages.observation[0].copy(), info
 
     def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
         """Steer for a step; get its reward and what the navigator then believes.
@@ -224,121 +294,37 @@ class GuidanceEnv(gymnasium.Env[Numbers, Numbers]):
         gymnasium.error.ResetNeeded
             If the voyage is over or has not begun.
         """
-        turn, haste = np.clip(checked_actions(action, (2,), "an action of Guidance is"), -1.0, 1.0).tolist()
-        source = self._source
-        if source is None:
+        array = checked_actions(action, (2,), "an action of Guidance is")
+        if not self._under_way:
             raise gymnasium.error.ResetNeeded("no voyage is under way: call reset() first")
-        planned = float(self._route.points[self._at, 3])
-        attitude = self._estimate.attitude
-        if attitude is not None:
-            source.world.believe(remainder(float(attitude[2] - self._truth[2, 2]), tau))
-        heading = self._steered(turn)
-        source.world.command(heading, planned * (1.0 + 0.5 * haste))
-        dt = source.step
-        block = source.advance(min(source.time + dt, source.duration))
-        truth = block.truth
-        self._truth = np.stack([truth.position[-1], truth.velocity[-1], truth.attitude[-1]])
-        (packet,) = packets(block, truth.time)
-        before = self._estimate
-        self._estimate = self.navigator.update(packet)
-        self._noticed(before, packet.aids, dt)
-        value, aground, aside = self._worth(dt, planned, float(source.world.track[3]))
-        self._k += 1
-        last = self._k == (self.steps or self.scenario.epochs) or source.time + 0.5 * dt > source.duration
-        if last and self.route == "dock":
-            value += BERTH * exp(-((self._left() / 10.0) ** 2) - (float(np.hypot(*self._truth[1, :2])) / 0.5) ** 2)
-        info: dict[str, Any] = {"truth": self._truth, "aside": aside} if self.reveal_truth else {}
+        voyages = self._voyages
+        (value,), (aground,), (last,) = voyages.step(_ON, array[None])
+        info: dict[str, Any] = {}
+        if self.options.reveal_truth:
+            info = {"truth": voyages.runs.truth[0].reshape(3, 3).copy(), "aside": float(voyages.aside[0])}
         if self._chart is not None:
-            self._draw(self._chart, block, truth.time[-1])
+            self._draw(self._chart)
         if last or aground:
-            n = self._k
-            info["scores"] = GuidanceScores((self._squares / n) ** 0.5, self._clearance, self._fuel / n, aground)
-            self._source = None
-        return self._observe(), value, aground, last and not aground, info
+            info["scores"] = voyages.scores(0)
+            self._under_way = False
+        return voyages.observation[0].copy(), float(value), bool(aground), bool(last), info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The chart so far: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window is up to date."""
-        if self._chart is None:
-            if self.render_mode is None:
-                gymnasium.logger.warn("render() shows nothing: make the environment with render_mode='rgb_array'")
-                return None
-            raise gymnasium.error.ResetNeeded("there is nothing to render yet: call reset() first")
-        return self._chart.frame() if self.render_mode == "rgb_array" else None
+    def _forget(self) -> None:
+        self._under_way = False
 
-    def close(self) -> None:
-        """Close the window and forget the voyage."""
-        if self._chart is not None:
-            self._chart.close()
-        self._chart = self._source = None
+    def _draw(self, chart: Chart) -> None:
+        voyages = self._voyages
+        runs, navigators = voyages.runs, voyages.navigators
+        for j, who in enumerate(runs.who[0, : runs.count[0]].tolist()):
+            if KINDS[runs.kinds[0][who]].role == "fix":
+                chart.add_fixes(runs.value[0, j : j + 1, :2].copy(), runs.faults[0, j : j + 1] != 0)
+        if np.isfinite(navigators.estimate[0, :2]).all():
+            truth, position = runs.truth[0, :3].copy(), navigators.estimate[0, :3].copy()
+            chart.add(float(voyages.time[0]), truth, position, covariance=navigators.covariance(0))
+        self._show()
 
-    # ---------------------------------------------------------------------------------------------- the voyage
 
-    def _steered(self, turn: float) -> float:
-        """Heading that is steered: the planned one, a few seconds ahead, and what the agent adds."""
-        points = self._route.points
-        return float(points[min(self._at + self._ahead, len(points) - 1), 2]) + LARGEST_TURN * turn
-
-    def _noticed(self, before: Estimate, aids: Any, dt: float) -> None:
-        if before.attitude is not None and self._estimate.attitude is not None:
-            self._turn = remainder(float(self._estimate.attitude[2] - before.attitude[2]), tau) / dt
-        for m in aids:
-            if m.instrument in self._fixes:
-                self._last_fix = m.time
-
-    def _worth(self, dt: float, planned: float, speed: float) -> tuple[float, bool, float]:
-        """Reward, whether she touched the side, and the true distance from the track."""
-        self._true_at, aside, along = self._route.place(self._truth[0], self._true_at)
-        progress = min((along - self._along) / (max(planned, 0.1) * dt), 1.0)
-        self._along = along
-        burnt = (speed / max(planned, 0.1)) ** 3
-        self._squares += aside * aside
-        self._fuel += burnt
-        value = dt * (progress - min(abs(aside) / ASIDE, 10.0) - FUEL * burnt)
-        aground = False
-        if self.route == "channel":
-            self._clearance = min(self._clearance, self.half_width - abs(aside))
-            aground = self._clearance <= 0.0
-        return value - AGROUND * aground, aground, aside
-
-    def _left(self) -> float:
-        """Distance to the end of the track [m]."""
-        offset = relative_position(self._truth[0], self._route.position[-1])
-        return hypot(offset[0], offset[1])
-
-    def _observe(self) -> Numbers:
-        e, route = self._estimate, self._route
-        position = self._truth[0] * np.nan if e.position is None else e.position
-        if np.isfinite(position[:2]).all():
-            self._at, aside, along = route.place(np.nan_to_num(position), self._at)
-        else:
-            aside, along = 0.0, float(route.along[self._at])
-        velocity = np.zeros(3) if e.velocity is None else e.velocity
-        course = route.course_ahead(self._at, 0)
-        over_ground = atan2(float(velocity[1]), float(velocity[0])) - course
-        speed = hypot(velocity[0], velocity[1])
-        variance = np.ones(9) if e.covariance is None else np.diag(e.covariance)
-        ahead = [remainder(route.course_ahead(self._at, k) - course, tau) for k in (10, 30, 60)]
-        numbers = [
-            aside / ASIDE, sin(over_ground), cos(over_ground), *ahead, speed / SPEED,
-            float(route.points[self._at, 3]) / SPEED, self._turn / TURN_RATE,
-            _sigma(variance[0] + variance[1], 1.0), _sigma(variance[8], pi / 180.0),
-            log1p(max(e.time - self._last_fix, 0.0)), log1p(max(float(route.along[-1]) - along, 0.0)) / 5.0,
-            self.half_width / ASIDE if self.route == "channel" else 1.0,
-            _sigma(self._start[0] + self._start[1], 1.0), _sigma(self._start[8], pi / 180.0),
-        ]  # fmt: skip
-        observation: Numbers = np.clip(np.nan_to_num(np.array(numbers)), -LIMIT, LIMIT).astype(np.float32)
-        return observation
-
-    def _draw(self, chart: Chart, block: Any, time: float) -> None:
-        for stream in block.aids.values():
-            if KINDS[stream.kind].role == "fix":
-                chart.add_fixes(stream.value[:, :2], stream.faults != 0)
-        e = self._estimate
-        if e.position is not None:
-            covariance = None if e.covariance is None else e.covariance[:2, :2]
-            chart.add(time, self._truth[0], e.position, covariance=covariance)
-        if self.render_mode == "human":
-            chart.show()
+_ON = np.ones(1, np.bool_)
 
 
 class LineOfSight:
@@ -359,8 +345,3 @@ class LineOfSight:
         """The action."""
         aside = float(observation[0]) * ASIDE
         return np.array([-atan2(aside, self.lookahead) / LARGEST_TURN, 0.0], np.float32)
-
-
-def _sigma(variance: float, unit: float) -> float:
-    """Decimal logarithm of a sigma in a unit."""
-    return 0.5 * log10(max(float(variance), 1e-18)) - log10(unit)

@@ -26,10 +26,12 @@ step: it counts for nothing.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, exp, hypot
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
@@ -245,6 +247,39 @@ class InertialModel(ErrorModel):
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument that has a measurement equation."""
         return instrument.equation in CODES or KINDS[instrument.kind].observation is not None
+
+    def arrays(self, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
+        """The state and the constants, for a kernel that goes through many filters.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Instruments, in the order in which the kernel counts them.
+
+        Returns
+        -------
+        dict of str to array, or None
+            The state under the names of its attributes; ``sensors``, the noise of the IMU (`accumulate_error`); by
+            instrument ``codes`` (its code, components, and the places of its bias and scale factor; no components:
+            it is not used), ``arms``, ``noises`` (flat) and ``limits`` (values of this size are not plausible). None
+            where the model uses an instrument in a way of its own.
+        """
+        if self._fused != set(self.noise):
+            return None
+        codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
+        noises, limits = np.zeros((len(names), 9)), np.zeros((len(names), 3))
+        for i, name in enumerate(names):
+            if name in self.noise:
+                code, arms[i], bias_at, scale_at = self.aid_parameters[name]
+                d = len(self.noise[name])
+                codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
+                limits[i, :d] = KINDS[self.instruments[name].kind].limits
+        return {
+            "position": self.position, "velocity": self.velocity, "dcm": self.dcm, "memory": self._memory,
+            "bias": self.bias, "turn": self._turn, "clock": self._clock, "sensors": self._noise,
+            "calibration": self.calibration, "decay": self._decay, "density": self._density,
+            "codes": codes, "arms": arms, "noises": noises, "limits": limits,
+        }  # fmt: skip
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""

@@ -19,7 +19,7 @@ __all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts"]
 
 @register("oracle")
 class Oracle(Row, solver=piece(OracleEstimator, restore=False), adaptation=TrueNoise):
-    """EKF that knows each measurement's true noise and faults; what any real-time estimator is measured against.
+    """Kalman filter about the truth that knows each measurement's noise and faults; rows are compared with it.
 
     It is not ranked. (Oracle O1.) Source: `simnav.estimators.solvers.oracle`, where its rules are.
     """

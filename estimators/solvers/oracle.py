@@ -1,4 +1,4 @@
-"""The EKF that is told the truth: the noise of each measurement and the faults."""
+"""The Kalman filter that is told the truth: where to linearise, the noise of each measurement, and the faults."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from simnav.estimator import Needs, UnsuitableScenario
 from simnav.estimator.needs import AID
 from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_faults
+from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
@@ -18,7 +19,16 @@ from simnav.estimators.models.true_motion import levelled, true_motion, with_imu
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.recording import Recording
-from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurements
+from simnav.types import (
+    Array,
+    Estimate,
+    ImuSamples,
+    InitialState,
+    Instruments,
+    Measurements,
+    NavigationStates,
+    TapStates,
+)
 
 __all__ = ["OracleEstimator"]
 
@@ -27,12 +37,13 @@ NOT_TOLD = np.array([True, True, True, True, True, True, False, False, True])
 
 
 class OracleEstimator(KalmanEstimator):
-    """The solver of the module: the inertial model, with the true motion where there is no IMU.
+    """The solver of the module: the inertial model about the truth, with the true motion where there is no IMU.
 
     Of the faults it knows the flags and the statistics, not what they added (`simnav.estimators.adaptations.truth`):
     gross errors are left out, errors that last, like multipath, are states (`simnav.estimators.models.fault_states`);
-    but a disturbance of the IMU is taken off its samples. On a run without faults it is ``ekf``. Without an IMU it is
-    told how the vessel moves (`simnav.estimators.models.true_motion`).
+    but a disturbance of the IMU is taken off its samples. It is linearised about the truth
+    (`simnav.estimators.models.about_truth`), and told the velocity of the water. Without an IMU it is told how the
+    vessel moves (`simnav.estimators.models.true_motion`).
 
     Parameters
     ----------
@@ -87,7 +98,15 @@ class OracleEstimator(KalmanEstimator):
         super().reset(start, instruments)
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
-        inner: ErrorModel = InertialModel()
+        recording = self._recording
+        assert recording is not None
+        first, then = recording.initial_truth, recording.data.truth
+        names = ("time", "position", "velocity", "attitude")
+        truth = NavigationStates(*(np.concatenate([getattr(first, n), getattr(then, n)]) for n in names))
+        water = None
+        if isinstance(then, TapStates):
+            water = np.concatenate([then.water_velocity[:1], then.water_velocity])
+        inner: ErrorModel = AboutTruthModel(truth, water)
         states = self.truth.states()
         return FaultStateModel(inner, states) if states else inner
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json, Scenarios, Workers, absolute, campaign_progress
+from simnav.leaderboard.cli.options import Debug, Json, Scenarios, Workers, absolute
 
 __all__ = ["command"]
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{value:.3f} +- {error:.3f}" if math.isfinite(value) else ""
 
 
 def command(
@@ -19,7 +24,9 @@ def command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File of the figures. [the one that comes with simnav]")
     ] = None,
-    results: Annotated[Path, typer.Option(help="Keep the results in this folder.")] = Path("results/reference"),
+    results: Annotated[
+        Path, typer.Option(help="Keep the runs in this folder; started again, it goes on there.")
+    ] = Path("results/reference"),
     workers: Workers = 2,
     json: Json = False,
     debug: Debug = False,
@@ -36,13 +43,24 @@ def command(
         file = reference.FILE if output is None else absolute(output)
         with mistakes(StoreError):
             with out.progress("starting") as bar:
-                found = measure(chosen, runs, absolute(results), workers=workers, progress=campaign_progress(bar))
+                found = measure(
+                    chosen, runs, absolute(results), workers=workers, progress=bar, found=lambda f: save(f, file)
+                )
             save(found, file)
         rows = [
-            [scenario_id, score, r.estimator, r.runs, tables.number(r.value, 4), tables.number(r.spread)]
+            [
+                scenario_id,
+                score,
+                r.estimator,
+                r.runs,
+                tables.number(r.value, 4),
+                tables.number(r.spread),
+                _with_error(r.to_bound, r.to_bound_error),
+                _with_error(r.nees, r.nees_error),
+            ]
             for scenario_id, scores in sorted(found.items())
             for score, r in scores.items()
         ]
-        columns = ["scenario", "score", "estimator", "runs", "figure [m]", "log spread"]
+        columns = ["scenario", "score", "estimator", "runs", "figure [m]", "log spread", "to bound", "NEES"]
         out.document({"file": str(file), "figures": {s: {n: vars(r) for n, r in x.items()} for s, x in found.items()}})
         out.print(tables.table("Reference figures", columns, rows, numeric=columns[3:]), f"stored: {file}")

@@ -74,6 +74,13 @@ class Reference:
         Standard deviation of the logarithm of its error from run to run.
     stored : bool
         Whether it comes with the scenario; otherwise it is of the runs that are ranked.
+    content : str
+        Digest of the content of the scenario that it was measured on (`simnav.scenario.Scenario.content_hash`); empty
+        where it is not stored.
+    to_bound, to_bound_error : float
+        The oracle's error over the Cramer-Rao bound, and its standard error; NaN where not known.
+    nees, nees_error : float
+        The oracle's mean normalised error squared of the horizontal position, likewise.
     """
 
     value: float = 1.0
@@ -81,6 +88,16 @@ class Reference:
     runs: int = 0
     spread: float = math.nan
     stored: bool = False
+    content: str = ""
+    to_bound: float = math.nan
+    to_bound_error: float = math.nan
+    nees: float = math.nan
+    nees_error: float = math.nan
+
+    @property
+    def standard_error(self) -> float:
+        """Of the logarithm of the figure; NaN where it is of one run."""
+        return self.spread / math.sqrt(self.runs) if self.runs > 1 else math.nan
 
     @property
     def bounds(self) -> bool:
@@ -93,7 +110,11 @@ class Reference:
         if not self.estimator:
             return "1 m: there is no reference figure"
         origin = "stored with the scenario" if self.stored else "here"
-        return f"{self.value:.4g} m, the geometric mean of {self.estimator} over {self.runs} runs ({origin})"
+        error = f" +- {100.0 * self.standard_error:.2g} %" if math.isfinite(self.standard_error) else ""
+        what = "" if self.bounds else ", a plain filter: no oracle and no bound is known here"
+        return (
+            f"{self.value:.4g} m{error}, the geometric mean of {self.estimator} over {self.runs} runs ({origin}){what}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

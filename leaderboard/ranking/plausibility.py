@@ -15,10 +15,13 @@ from numpy.typing import ArrayLike
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Reference
 
-__all__ = ["MARGIN", "too_good"]
+__all__ = ["MARGIN", "beats", "too_good"]
 
-#: An oracle is a filter and may be this much worse than the Cramer-Rao bound.
+#: What a row may be better than an oracle: its figure is known to some per cent, and the least mean square error, which
+#: the oracle has, does not need to be the least geometric mean.
 MARGIN = 0.9
+#: Runs of the oracle on the same seeds from which on a row is compared with them, run by run.
+LEAST_PAIRS = 5
 #: Probability that an honest row that is as good as possible is flagged on any scenario of a board.
 _ALPHA = 0.001
 #: Least spread of the log error from run to run: what a very short list of runs might hide.
@@ -59,3 +62,34 @@ def too_good(log_ratios: ArrayLike, reference: Reference, scenarios: int = 1) ->
     spread = max(reference.spread, own, _LEAST_SPREAD)
     statistic = (float(x.mean()) - math.log(MARGIN)) / (spread * math.sqrt(1.0 / len(x) + 1.0 / reference.runs))
     return float(stdtr(reference.runs - 1.0, statistic)) < _ALPHA / max(scenarios, 1)
+
+
+def beats(differences: ArrayLike, scenarios: int = 1) -> bool:
+    """Whether a row is better than an oracle on the same runs by more than chance.
+
+    Parameters
+    ----------
+    differences : (n,) array_like
+        Logarithm of the error of the row less that of the oracle, run by run.
+    scenarios : int
+        How many scenarios the row is judged on.
+
+    Returns
+    -------
+    bool
+        Whether the geometric mean of the ratio is below `MARGIN` at a one-sided level of 0.1 % over all scenarios.
+        Never with fewer than `LEAST_PAIRS` runs. Runs differ in how hard they are, for the row and the oracle alike: so
+        this sees more than `too_good` does where a scenario draws its magnitudes.
+
+    Examples
+    --------
+    >>> beats([-0.6, -0.7, -0.5, -0.65, -0.55]), beats([-0.6, 0.1, -0.2, 0.3, -0.1])
+    (True, False)
+    """
+    from scipy.special import stdtr
+
+    x = np.asarray(differences, dtype=np.float64)
+    if len(x) < LEAST_PAIRS:
+        return False
+    error = max(float(x.std(ddof=1)), _LEAST_SPREAD) / math.sqrt(len(x))
+    return float(stdtr(len(x) - 1.0, (float(x.mean()) - math.log(MARGIN)) / error)) < _ALPHA / max(scenarios, 1)

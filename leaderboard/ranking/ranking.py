@@ -39,7 +39,7 @@ from simnav.leaderboard.ranking.board import (
     TrackRanking,
     TrackRow,
 )
-from simnav.leaderboard.ranking.plausibility import too_good
+from simnav.leaderboard.ranking.plausibility import beats, too_good
 from simnav.leaderboard.ranking.reference import reference_of
 from simnav.leaderboard.ranking.remarks import remarks
 from simnav.leaderboard.ranking.runs import Runs, group
@@ -154,7 +154,7 @@ class _Scenario:
         entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
         if track.name == "post-processing":  # whoever never smooths is not in it
             entries = {n: r for n, r in entries.items() if any(_finite(x, track.score) for x in r.tried)}
-        self.reference = reference_of(name, track.score, entries)
+        self.reference = reference_of(name, track.score, entries, self.recorded)
         ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
         seeds = sorted({x.seed for r in ranked for x in r.tried})
         self.cells = {n: self._cell(r, seeds) for n, r in entries.items()}
@@ -185,7 +185,13 @@ class _Scenario:
     def implausible(self, name: str, scenarios: int = 1) -> bool:
         """Whether a row is better here than what is possible."""
         cell = self.cells[name]
-        return not cell.runs.reference and too_good(cell.logs[~cell.failed], self.reference, scenarios)
+        if cell.runs.reference or not self.reference.bounds:
+            return False
+        oracle = self.cells.get(self.reference.estimator)
+        best = {r.seed: self._log(r) for r in oracle.runs.good} if oracle is not None else {}
+        mine = {r.seed: self._log(r) for r in cell.runs.good}
+        pairs = [log - best[seed] for seed, log in mine.items() if math.isfinite(log - best.get(seed, math.inf))]
+        return beats(pairs, scenarios) or too_good(cell.logs[~cell.failed], self.reference, scenarios)
 
     def ranking(self) -> ScenarioRanking:
         """The ranking on this scenario alone."""

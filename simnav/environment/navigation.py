@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,14 +27,15 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from simnav.geometry.earth import principal_radii
+from simnav.environment.charted import ChartedEnv
+from simnav.environment.stretch import LiveStretch, Stretch, horizontal, pack, rows_of
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
 
 if TYPE_CHECKING:
     from simnav.environment.rendering import Chart
-    from simnav.recording import AidStream, Block
     from simnav.scenario import Scenario
+    from simnav.steps import SteppedRuns
 
 __all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action", "most_samples"]
 
@@ -54,19 +54,7 @@ _ACTION_LIMIT = np.array([[np.pi / 2, np.pi, 1e5], [100.0, 100.0, 100.0], [np.pi
 _FIRST_STRETCH, _LONGEST_STRETCH = 8, 256
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    """S steps of a run as padded arrays, ready to be handed out row by row."""
-
-    intervals: Array  # (S, 2)
-    columns: dict[str, dict[str, NDArray[Any]]]  # instrument -> entry -> (S, K, ...)
-    truth: Array  # (S, 3, 3): rows position, velocity, attitude
-    rows: list[list[float]]  # latitude, longitude, height, metres per radian of latitude and of longitude, heading
-    aids: dict[str, AidStream]
-    cuts: dict[str, NDArray[np.intp]]  # instrument -> (S + 1,) bounds of each step's measurements in its stream
-
-
-class NavigationEnv(gymnasium.Env[Observation, Array]):
+class NavigationEnv(ChartedEnv[Observation, Array]):
     """Navigate one scenario.
 
     Observation (`gymnasium.spaces.Dict`, float64; all entries are zero where ``valid`` is 0, never NaN; K is the most
@@ -119,8 +107,6 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         If an argument is not valid.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
-
     def __init__(
         self,
         scenario: Scenario | str | Path,
@@ -134,8 +120,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
             from simnav.scenario import load
 
             scenario = load(scenario)
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode is 'human', 'rgb_array' or None, not {render_mode!r}")
+        super().__init__(render_mode)
         if closed_loop and scenario.recorded:
             raise ValueError(
                 f"scenario {scenario.id} is a recorded log: its vessel cannot steer by the estimate; "
@@ -144,7 +129,6 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self.scenario = scenario
         self.reveal_truth = reveal_truth
         self.closed_loop = closed_loop
-        self.render_mode = render_mode
         self._weights = _weights(reward)
         # The spaces are fixed: they hold what any run of the scenario can bring.
         possible = scenario.extremes()
@@ -156,11 +140,11 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self.observation_space = _observation_space(self._most, self._widths)
         self.action_space = spaces.Box(-_ACTION_LIMIT, _ACTION_LIMIT, dtype=np.float64)
         self._source: Any = None
-        self._stretch: _Stretch | None = None
+        self._stretch: Stretch | None = None
+        self._runs: SteppedRuns | None = None
         self._row = 0
         self._size = _FIRST_STRETCH
         self._steps = 0  # steps that the source has been advanced by
-        self._chart: Chart | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -185,23 +169,20 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         if seed is None:
             seed = int(self.np_random.integers(2**63 - 1))
         self._source, note = _open(self.scenario, seed)
-        self._stretch, self._steps, self._size = None, 0, 1 if self.closed_loop else _FIRST_STRETCH
+        self._stretch, self._runs, self._steps, self._size = None, None, 0, _FIRST_STRETCH
         start: InitialState = self._source.start
         if self.closed_loop:
             truth = self._source.initial_truth
-            row = _rows(truth.position, truth.attitude)[0]
+            row = rows_of(truth.position, truth.attitude)[0]
             heading = math.remainder(float(start.attitude[2]) - row[5], math.tau)
-            self._source.steer_by(*_horizontal(start.position.tolist(), row), heading)
+            self._source.steer_by(*horizontal(start.position.tolist(), row), heading)
+            from simnav.steps import SteppedRuns
+
+            self._runs = SteppedRuns(1)
+            self._runs.begin(0, self._source)
         if not self._load():
             raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
-        if self.render_mode is not None:
-            if self._chart is None:
-                from simnav.environment.rendering import Chart
-
-                self._chart = Chart(self.scenario.id, self._source.duration, human=self.render_mode == "human")
-            self._chart.clear()
-            if self.render_mode == "human":
-                self._chart.show()
+        self._begin_chart(self.scenario.id, self._source.duration)
         info = {"seed": seed, "start": start, "instruments": self._source.instruments, "note": note}
         return self._observation(), self._reveal(info)
 
@@ -225,7 +206,7 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         if stretch is None:
             raise gymnasium.error.ResetNeeded("no run is under way: call reset() first")
         row = stretch.rows[self._row]
-        north, east = _horizontal(estimate, row)
+        north, east = horizontal(estimate, row)
         reward = -self._error(estimate, north, east, row)
         if self._chart is not None:
             self._draw(self._chart, estimate)
@@ -234,43 +215,45 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
         self._row += 1
         if self._row < len(stretch.rows) or self._load():
             return self._observation(), reward, False, False, self._reveal({})
-        observation = self._empty(float(stretch.intervals[-1, 1]))
-        info = {"truth": stretch.truth[-1].copy()} if self.reveal_truth else {}
+        last = self._row - 1
+        observation = self._empty(float(stretch.intervals[last, 1]))
+        info = {"truth": stretch.truth[last].copy()} if self.reveal_truth else {}
         self._stretch = None
         return observation, reward, False, True, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The chart so far: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window is up to date."""
-        if self._chart is None:
-            if self.render_mode is None:
-                gymnasium.logger.warn("render() shows nothing: make the environment with render_mode='rgb_array'")
-                return None
-            raise gymnasium.error.ResetNeeded("there is nothing to render yet: call reset() first")
-        return self._chart.frame() if self.render_mode == "rgb_array" else None
-
-    def close(self) -> None:
-        """Close the window and forget the run."""
-        if self._chart is not None:
-            self._chart.close()
-        self._chart = self._source = self._stretch = None
+    def _forget(self) -> None:
+        self._source = self._stretch = self._runs = None
 
     # ------------------------------------------------------------------------------------------- the run
 
     def _load(self) -> bool:
         """Advance the source by a stretch of steps; False where the run is over."""
         source = self._source
+        if self._runs is not None:
+            return self._advance(self._runs)
         while True:
             total = int(source.duration / source.step + 1e-6)
             if self._steps >= total:
                 return False
             self._steps = min(total, self._steps + self._size)
-            if not self.closed_loop:
-                self._size = min(2 * self._size, _LONGEST_STRETCH)
+            self._size = min(2 * self._size, _LONGEST_STRETCH)
             block = source.advance(source.duration if self._steps == total else self._steps * source.step)
             if len(block.truth):
                 begin = block.start if self._stretch is None else float(self._stretch.intervals[-1, 1])
-                self._stretch, self._row = _pack(block, begin, self._most), 0
+                self._stretch, self._row = pack(block, begin, self._most), 0
                 return True
+
+    def _advance(self, runs: SteppedRuns) -> bool:
+        """Advance a run in closed loop by a step; False where it is over."""
+        if self._steps >= int(self._source.duration / self._source.step + 1e-6):
+            return False
+        self._steps += 1
+        stretch = self._stretch
+        if not isinstance(stretch, LiveStretch) or len(stretch.rows) == stretch.LENGTH:
+            self._stretch = stretch = LiveStretch(runs, self._most, self._widths)
+        self._row = len(stretch.rows)
+        stretch.advance()
+        return True
 
     def _observation(self) -> Observation:
         stretch, i = self._stretch, self._row
@@ -318,13 +301,10 @@ class NavigationEnv(gymnasium.Env[Observation, Array]):
     def _draw(self, chart: Chart, estimate: list[float]) -> None:
         stretch, i = self._stretch, self._row
         assert stretch is not None
-        for name, stream in stretch.aids.items():
-            if KINDS[stream.kind].role == "fix":
-                cut = slice(*stretch.cuts[name][i : i + 2])
-                chart.add_fixes(stream.value[cut, :2], stream.faults[cut] != 0)
+        for position, faulty in stretch.fixes(i):
+            chart.add_fixes(position, faulty)
         chart.add(float(stretch.intervals[i, 1]), stretch.truth[i, 0], np.array(estimate[:3]))
-        if self.render_mode == "human":
-            chart.show()
+        self._show()
 
 
 def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
@@ -412,67 +392,6 @@ def _weights(reward: str | Mapping[str, float]) -> dict[str, float] | None:
     if not weights:
         raise ValueError(f"reward is one of {', '.join(REWARDS)} or weights of them, not an empty mapping")
     return None if weights == {"horizontal": 1.0} else weights
-
-
-# ------------------------------------------------------------------------------------------------- data
-
-
-def _pack(block: Block, begin: float, most: Mapping[str, int]) -> _Stretch:
-    """Sort the data of a block into its steps, the first of which begins at ``begin``."""
-    truth, n = block.truth, len(block.truth)
-    edges = truth.time + 0.5e-6  # as `simnav.recording.packets`
-    columns: dict[str, dict[str, NDArray[Any]]] = {}
-    cuts: dict[str, NDArray[np.intp]] = {}
-    parts: dict[str, tuple[Array, dict[str, Array]]] = {}
-    if block.imu is not None:
-        imu = block.imu
-        parts["imu"] = (
-            imu.time,
-            {
-                "time": imu.time,
-                "length": imu.interval,
-                "angular_rate": imu.angular_rate,
-                "specific_force": imu.specific_force,
-            },
-        )
-    parts |= {name: (s.time, {"time": s.time, "value": s.value}) for name, s in block.aids.items()}
-    for name, (time, arrays) in parts.items():
-        cuts[name] = cut = np.concatenate(([0], np.searchsorted(time, edges, side="right")))
-        counts, k = np.diff(cut), most[name]
-        if (counts == k).all():  # the usual case needs no copy
-            columns[name] = {key: a[: n * k].reshape(n, k, *a.shape[1:]) for key, a in arrays.items()}
-            columns[name]["valid"] = np.ones((n, k), np.int8)
-            continue
-        if counts.max() > k:
-            raise ValueError(
-                f"{name} delivered {counts.max()} samples in one step at {truth.time[counts.argmax()]:.3f} s, its "
-                f"datasheet's rate allows {k}"
-            )
-        row = np.repeat(np.arange(n), counts)
-        where = row, np.arange(cut[-1]) - cut[row]
-        arrays["valid"] = np.ones(len(time), np.int8)
-        columns[name] = {}
-        for key, a in arrays.items():
-            columns[name][key] = out = np.zeros((n, k, *a.shape[1:]), a.dtype)
-            out[where] = a[: cut[-1]]
-    intervals = np.stack([np.concatenate(([begin], truth.time[:-1])), truth.time], axis=1)
-    states = np.stack([truth.position, truth.velocity, truth.attitude], axis=1)
-    return _Stretch(intervals, columns, states, _rows(truth.position, truth.attitude), block.aids, cuts)
-
-
-def _rows(position: Array, attitude: Array) -> list[list[float]]:
-    """Per state: latitude, longitude, height, metres per radian of latitude and of longitude, and heading."""
-    meridian, prime_vertical = principal_radii(position[:, 0])
-    height = np.nan_to_num(position[:, 2])  # a log may have no reference of it
-    scale = np.stack([meridian + height, (prime_vertical + height) * np.cos(position[:, 0])], axis=1)
-    rows: list[list[float]] = np.concatenate([position, scale, attitude[:, 2:]], axis=1).tolist()
-    return rows
-
-
-def _horizontal(estimate: list[float], row: list[float]) -> tuple[float, float]:
-    """North and east error [m] (as `simnav.geometry.earth.relative_position`, in plain floats: once a step)."""
-    east = math.remainder(estimate[1] - row[1], math.tau)
-    return (estimate[0] - row[0]) * row[3], east * row[4]
 
 
 def _attitude_angle(estimate: Array, truth: Array) -> float:

@@ -8,7 +8,7 @@ The kernels take and return scalars and are used by other kernels; the plain fun
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, sin, sqrt
 
 import numpy as np
 
@@ -24,6 +24,7 @@ __all__ = [
     "SEMI_MINOR_AXIS",
     "SOMIGLIANA",
     "displace",
+    "displace_scalar",
     "earth_rate",
     "gravity",
     "gravity_scalar",
@@ -70,6 +71,17 @@ def gravity_scalar(sin_latitude: float, height: float) -> float:
     s2 = sin_latitude * sin_latitude
     surface = EQUATORIAL_GRAVITY * (1.0 + SOMIGLIANA * s2) / sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
     return surface * (1.0 - (_GRADIENT - _GRADIENT_SIN2 * s2) * height + _CURVATURE * height * height)
+
+
+@kernel()
+def displace_scalar(latitude, longitude, height, north, east, down):  # type: ignore[no-untyped-def]
+    """`displace` for one position: latitude, longitude [rad] and height [m] after an offset [m]."""
+    s = sin(latitude)
+    x = 1.0 - ECCENTRICITY_SQUARED * (s * s)
+    prime_vertical = SEMI_MAJOR_AXIS / sqrt(x)
+    meridian = prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x
+    parallel = (prime_vertical + height) * cos(latitude)
+    return latitude + north / (meridian + height), longitude + east / parallel, height - down
 
 
 def principal_radii(latitude: Array | float) -> tuple[Array, Array]:

@@ -25,6 +25,7 @@ __all__ = [
     "rpy_from_dcm",
     "skew",
     "wrap_angle",
+    "wrap_scalar",
 ]
 
 
@@ -37,6 +38,12 @@ def wrap_angle(angle: Array | float) -> Array:
     array([ 0. , -0.5])
     """
     return np.remainder(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi
+
+
+@kernel()
+def wrap_scalar(angle):  # type: ignore[no-untyped-def]
+    """`wrap_angle` for one angle."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def skew(vector: Array) -> Array:

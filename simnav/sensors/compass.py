@@ -6,11 +6,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.geometry.earth import ROTATION_RATE, principal_radii
 from simnav.kinds import HEADING, Component, Kind
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
+from simnav.sensors.observation import COMPASS, GYROCOMPASS, OWN, CompiledInstrument
 from simnav.spec import NonNegative, quantity
-from simnav.types import Array, TapStates
 
 __all__ = ["Gyrocompass", "MagneticCompass"]
 
@@ -27,6 +26,7 @@ class MagneticCompass(AidSpec):
     """
 
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "deviation")
+    untold: ClassVar[tuple[str, ...]] = ("deviation",)
 
     kind: Literal["magnetic_compass"] = "magnetic_compass"
     sigma: NonNegative = quantity("deg")
@@ -41,19 +41,13 @@ class MagneticCompass(AidSpec):
         return _MagneticCompass(self, name, seed)
 
 
-class _MagneticCompass(Instrument):
+class _MagneticCompass(CompiledInstrument):
+    code = COMPASS
+
     def __init__(self, spec: MagneticCompass, name: str, seed: int):
         super().__init__(spec, name, seed)
         self.deviation = self.drawn("deviation", np.full(2, spec.deviation)) + spec.fixed_deviation
-        self._deviates = bool(self.deviation.any())
-
-    def observe(self, tap: TapStates) -> Array:
-        heading = tap.attitude[:, 2:]
-        if not self._deviates:
-            return heading
-        b, c = self.deviation
-        value: Array = heading + b * np.sin(heading) + c * np.cos(heading)
-        return value
+        self.numbers[OWN : OWN + 2], self.numbers[OWN + 2] = self.deviation, float(self.deviation.any())
 
 
 @register_instrument(Kind("true heading", "heading", HEADING_COMPONENT, HEADING), example={"sigma_deg": 0.5})
@@ -77,16 +71,9 @@ class Gyrocompass(AidSpec):
         return _Gyrocompass(self, name, seed)
 
 
-class _Gyrocompass(Instrument):
+class _Gyrocompass(CompiledInstrument):
+    code = GYROCOMPASS
+
     def __init__(self, spec: Gyrocompass, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self._speed_error = spec.speed_error
-
-    def observe(self, tap: TapStates) -> Array:
-        heading = tap.attitude[:, 2]
-        if self._speed_error:
-            latitude, height = tap.position[:, 0], tap.position[:, 2]
-            meridian, prime_vertical = principal_radii(latitude)
-            north = ROTATION_RATE * np.cos(latitude) + tap.velocity[:, 1] / (prime_vertical + height)
-            heading = heading + np.arctan2(tap.velocity[:, 0] / (meridian + height), north)
-        return heading[:, None]
+        self.numbers[OWN] = float(spec.speed_error)

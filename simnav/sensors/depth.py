@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.kinds import DEPTH, LARGEST_HEIGHT, Component, Kind
+from simnav import kinds
+from simnav.kinds import LARGEST_HEIGHT, Component, Kind
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument
+from simnav.sensors.observation import DEPTH, CompiledInstrument
 from simnav.spec import NonNegative, Vector, quantity
-from simnav.types import Array, TapStates
 
 __all__ = ["Depth"]
 
@@ -17,7 +18,7 @@ __all__ = ["Depth"]
         "depth below the mean sea surface, positive down",
         "depth",
         (Component("depth", "m", limit=LARGEST_HEIGHT),),
-        DEPTH,
+        kinds.DEPTH,
     ),
     example={"rate_hz": 0.5, "sigma_m": 0.2},
 )
@@ -38,9 +39,5 @@ class Depth(AidSpec):
         return _Depth(self, name, seed)
 
 
-class _Depth(Instrument):
-    def observe(self, tap: TapStates) -> Array:
-        depth = -tap.position[:, 2:]
-        if self.levered:
-            depth = depth + self.lever_displacement(tap)[:, 2:]
-        return (1.0 + self.scale) * depth
+class _Depth(CompiledInstrument):
+    code = DEPTH

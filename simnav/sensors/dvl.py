@@ -6,10 +6,10 @@ from math import inf
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from simnav import kinds
 from simnav.geometry.rotation import dcm_from_rotation_vector
-from simnav.kinds import BODY_VELOCITY, Kind, speed_components
+from simnav.kinds import Kind, speed_components
 from simnav.sensors.instrument import (
     ZERO,
     AidSpec,
@@ -17,10 +17,17 @@ from simnav.sensors.instrument import (
     SigmaTriple,
     Triple,
     register_instrument,
-    turn_to_body,
+)
+from simnav.sensors.observation import (
+    BODY_VELOCITY,
+    DEPTH_OF_WATER,
+    HIGHEST,
+    LOWEST,
+    OWN,
+    SPEED_NOISE_SQUARED,
+    CompiledInstrument,
 )
 from simnav.spec import NonNegative, Positive, Vector, quantity
-from simnav.types import Array, TapStates
 
 __all__ = ["Dvl"]
 
@@ -30,7 +37,7 @@ __all__ = ["Dvl"]
         "velocity over the ground of the transducer, in body axes",
         "velocity",
         speed_components("forward", "starboard", "down"),
-        BODY_VELOCITY,
+        kinds.BODY_VELOCITY,
         log_columns=("ground_forward", "ground_starboard", "=0"),
     ),
     example={"phase_s": 0.3, "sigma_m_s": 0.02},
@@ -67,34 +74,15 @@ class Dvl(AidSpec):
         return _Dvl(self, name, seed, water_depth)
 
 
-class _Dvl(Instrument):
+class _Dvl(CompiledInstrument):
+    code = BODY_VELOCITY
+
     def __init__(self, spec: Dvl, name: str, seed: int, water_depth: float | None):
         super().__init__(spec, name, seed)
         turn = self.drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
         self.misalignment = turn
-        self._matrix: Array = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
-        self._speed_noise = spec.speed_noise
-        self._water_depth = water_depth
-        self._altitudes = spec.minimum_altitude, spec.maximum_altitude
-
-    def observe(self, tap: TapStates) -> Array:
-        velocity = turn_to_body(tap.attitude, tap.velocity)
-        if self.levered:
-            velocity += self.lever_velocity(tap)
-        (x, y, z), m = velocity.T, self._matrix
-        # Written out: a matrix product may round differently with the number of rows.
-        return np.outer(x, m[:, 0]) + np.outer(y, m[:, 1]) + np.outer(z, m[:, 2])
-
-    def noise_sigma(self, observed: Array) -> Array:
-        if self._speed_noise == 0.0:
-            return super().noise_sigma(observed)
-        x, y, z = observed[:, 0], observed[:, 1], observed[:, 2]
-        return np.sqrt(self.sigma**2 + self._speed_noise**2 * (x * x + y * y + z * z)[:, None])
-
-    def available(self, tap: TapStates) -> NDArray[np.bool_] | None:
-        if self._water_depth is None:
-            return None
-        altitude = self._water_depth + tap.position[:, 2]
-        if self.levered:
-            altitude -= self.lever_displacement(tap)[:, 2]
-        return (altitude >= self._altitudes[0]) & (altitude <= self._altitudes[1])
+        self.numbers[OWN : OWN + 9] = ((1.0 + self.scale) * dcm_from_rotation_vector(turn).T).ravel()
+        self.numbers[SPEED_NOISE_SQUARED] = spec.speed_noise**2
+        if water_depth is not None:
+            self.numbers[DEPTH_OF_WATER] = water_depth
+            self.numbers[LOWEST], self.numbers[HIGHEST] = spec.minimum_altitude, spec.maximum_altitude

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.geometry import earth
-from simnav.kinds import POSITION, VELOCITY, Kind, geodetic_components, speed_components
+from simnav import kinds
+from simnav.kinds import Kind, geodetic_components, speed_components
 from simnav.sensors.instrument import (
     ZERO,
     AidSpec,
@@ -13,16 +13,15 @@ from simnav.sensors.instrument import (
     SigmaTriple,
     Triple,
     register_instrument,
-    turn_to_ned,
 )
+from simnav.sensors.observation import POSITION, VELOCITY, CompiledInstrument
 from simnav.spec import Vector, quantity
-from simnav.types import Array, TapStates
 
 __all__ = ["GnssPosition", "GnssVelocity"]
 
 
 @register_instrument(
-    Kind("position of the antenna", "fix", geodetic_components(height=True), POSITION, geodetic=True),
+    Kind("position of the antenna", "fix", geodetic_components(height=True), kinds.POSITION, geodetic=True),
     example={"sigma_m": [1.5, 1.5, 3.0], "lever_arm_m": [1.0, 0.0, -3.0]},
 )
 class GnssPosition(AidSpec):
@@ -50,9 +49,8 @@ class GnssPosition(AidSpec):
         return _Position(self, name, seed)
 
 
-class _Position(Instrument):
-    def observe(self, tap: TapStates) -> Array:
-        return earth.displace(tap.position, self.lever_displacement(tap)) if self.levered else tap.position
+class _Position(CompiledInstrument):
+    code = POSITION
 
 
 @register_instrument(
@@ -60,7 +58,7 @@ class _Position(Instrument):
         "velocity of the antenna",
         "velocity",
         speed_components("velocity_north", "velocity_east", "velocity_down"),
-        VELOCITY,
+        kinds.VELOCITY,
         log_columns=("velocity_north", "velocity_east", "=0"),
     ),
     example={"rate_hz": 2.0, "sigma_m_s": [0.1, 0.1, 0.1]},
@@ -80,8 +78,5 @@ class GnssVelocity(AidSpec):
         return _Velocity(self, name, seed)
 
 
-class _Velocity(Instrument):
-    def observe(self, tap: TapStates) -> Array:
-        if not self.levered:
-            return tap.velocity
-        return tap.velocity + turn_to_ned(tap.attitude, self.lever_velocity(tap))
+class _Velocity(CompiledInstrument):
+    code = VELOCITY

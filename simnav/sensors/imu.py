@@ -27,7 +27,7 @@ from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity
 from simnav.streams import stream
 from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
 
-__all__ = ["AccelerometerSpec", "GyroscopeSpec", "Imu", "ImuSpec", "TriadSpec"]
+__all__ = ["AccelerometerSpec", "GyroscopeSpec", "Imu", "ImuSpec", "TriadSpec", "triad_errors"]
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
 #: What is wrong with a triad: fields of these names, and of these with ``fixed_`` before.
@@ -166,7 +166,7 @@ class ImuSpec(Spec):
     "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, ::1], f8[::1],"
     " f8[:, ::1], i8, f8, f8[:, ::1], i8, f8, f8, f8, f8[::1])"
 )
-def _triad_errors(  # type: ignore[no-untyped-def]
+def triad_errors(  # type: ignore[no-untyped-def]
     ideal, variates, out, time, interval, density, matrix, bias,
     instability, first_i, per_second_i, walk, first_w, per_second_w, limit, step, residual,
 ):  # fmt: skip
@@ -227,6 +227,11 @@ class _Triad:
 
         self._variates = np.zeros((_CHUNK, 3))
 
+    def ahead(self, n: int, until: float) -> tuple[Array, Array, int, Array, int]:
+        """What `sense` takes for n samples: variates, and both tables of biases with their first grid points."""
+        variates = self._rng.standard_normal((n, 3)) if self.density > 0.0 else np.zeros((n, 3))
+        return variates, *self.instability.table(until), *self.walk.table(until)
+
     def sense(self, ideal: Array, time: Array, interval: Array, overwrite: bool) -> Array:
         ideal = ready(ideal)
         out = ideal if overwrite else np.empty(ideal.shape)
@@ -237,7 +242,7 @@ class _Triad:
             part = slice(a, a + _CHUNK)
             if self.density > 0.0:
                 self._rng.standard_normal(out=self._variates[: len(time[part])])
-            _triad_errors(
+            triad_errors(
                 ideal[part], self._variates, out[part], time[part], interval[part],
                 self.density, self.matrix, self.bias,
                 instability, first_i, self.instability.per_second, walk, first_w, self.walk.per_second,
@@ -259,8 +264,8 @@ class Imu:
 
     def __init__(self, spec: ImuSpec, seed: int):
         self.spec = spec
-        self._gyroscope = _Triad(spec.gyroscope, "gyroscope", spec.rate, seed)
-        self._accelerometer = _Triad(spec.accelerometer, "accelerometer", spec.rate, seed)
+        self.gyroscope = _Triad(spec.gyroscope, "gyroscope", spec.rate, seed)
+        self.accelerometer = _Triad(spec.accelerometer, "accelerometer", spec.rate, seed)
 
     def sense(self, ideal: ImuSamples, *, overwrite: bool = False) -> ImuSamples:
         """Add the errors to the ideal samples of the next block.
@@ -284,6 +289,6 @@ class Imu:
         return ImuSamples(
             ideal.time,
             ideal.interval,
-            self._gyroscope.sense(ideal.angular_rate, time, interval, overwrite),
-            self._accelerometer.sense(ideal.specific_force, time, interval, overwrite),
+            self.gyroscope.sense(ideal.angular_rate, time, interval, overwrite),
+            self.accelerometer.sense(ideal.specific_force, time, interval, overwrite),
         )

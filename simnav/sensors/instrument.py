@@ -137,11 +137,15 @@ class AidSpec(Spec):
         A table of a scenario file with an instrument of this kind; likewise.
     errors : tuple of str
         Fields that make a measurement wrong (with ``fixed_`` before them, too); zero for an ideal instrument.
+    untold : tuple of str
+        Those of them whose one-sigma figure is in no datasheet. Only the oracles know it, see
+        `simnav.scenario.Scenario.actual_sheet`.
     """
 
     definition: ClassVar[Kind]
     example: ClassVar[Mapping[str, Any]]
     errors: ClassVar[tuple[str, ...]] = ("sigma", "bias", "bias_instability", "scale", "misalignment")
+    untold: ClassVar[tuple[str, ...]] = ()
 
     kind: str
     rate: Positive = quantity("hz", 1.0)
@@ -344,6 +348,11 @@ class Instrument(ABC):
         """Which of the n samples are delivered; None for all."""
         return None
 
+    def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+        """`observe`, `noise_sigma` and `available` in one."""
+        value = self.observe(tap)
+        return value, self.noise_sigma(value), self.available(tap)
+
     def lever_displacement(self, tap: TapStates) -> Array:
         """The (n, 3) north-east-down offset [m] of the instrument from the reference point."""
         return turn_to_ned(tap.attitude, self.lever_arm)
@@ -356,6 +365,27 @@ class Instrument(ABC):
         velocity[:, 1] = w[:, 2] * x - w[:, 0] * z
         velocity[:, 2] = w[:, 0] * y - w[:, 1] * x
         return velocity
+
+    def ahead(self, time: Array) -> tuple[Array, Array]:
+        """What `sense` draws for the next n samples, whose times are enough for that.
+
+        Parameters
+        ----------
+        time : (n,) array
+            Sample times [s].
+
+        Returns
+        -------
+        error : (n, d) array
+            Biases.
+        variates : (n, d) array
+            White noise of sigma 1; zero where there is none.
+        """
+        error = self.bias[None].repeat(len(time), axis=0)
+        if self._instability is not None:
+            error += self._instability.sample(time)
+        shape = error.shape
+        return error, np.zeros(shape) if self._noise is None else self._noise.standard_normal(shape)
 
     def sense(self, tap: TapStates) -> AidStream:
         """Measure the states of the next block.
@@ -370,16 +400,12 @@ class Instrument(ABC):
         AidStream
             Without faults; ``dropped`` holds the times at which the instrument delivers nothing.
         """
-        value = self.observe(tap)
-        sigma = self.noise_sigma(value)
-        error = self.bias[None].repeat(len(value), axis=0)
-        if self._instability is not None:
-            error += self._instability.sample(tap.time)
+        value, sigma, there = self.reading(tap)
+        error, variates = self.ahead(tap.time)
         if self._noise is not None:
-            error += sigma * self._noise.standard_normal(value.shape)
+            error += sigma * variates
         value = self.definition.add_error(value, error)
         time, dropped = tap.time, np.empty(0)
-        there = self.available(tap)
         if there is not None and not there.all():
             time, dropped, value, sigma = time[there], time[~there], value[there], sigma[there]
         n = len(value)

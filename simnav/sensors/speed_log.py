@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.kinds import WATER_SPEED, Kind, speed_components
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument, turn_to_body
+from simnav import kinds
+from simnav.kinds import Kind, speed_components
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument
+from simnav.sensors.observation import WATER_SPEED, CompiledInstrument
 from simnav.spec import NonNegative, Vector, quantity
-from simnav.types import Array, TapStates
 
 __all__ = ["SpeedLog"]
 
 
 @register_instrument(
-    Kind("forward speed through the water", "velocity", speed_components("speed"), WATER_SPEED),
+    Kind("forward speed through the water", "velocity", speed_components("speed"), kinds.WATER_SPEED),
     example={"sigma_m_s": 0.1},
 )
 class SpeedLog(AidSpec):
@@ -33,9 +34,5 @@ class SpeedLog(AidSpec):
         return _SpeedLog(self, name, seed)
 
 
-class _SpeedLog(Instrument):
-    def observe(self, tap: TapStates) -> Array:
-        velocity = turn_to_body(tap.attitude, tap.velocity - tap.water_velocity)
-        if self.levered:
-            velocity += self.lever_velocity(tap)
-        return (1.0 + self.scale) * velocity[:, :1]
+class _SpeedLog(CompiledInstrument):
+    code = WATER_SPEED

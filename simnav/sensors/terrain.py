@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Literal
 
-from simnav.geometry import earth
-from simnav.kinds import HORIZONTAL_POSITION, Kind, geodetic_components
+from simnav import kinds
+from simnav.kinds import Kind, geodetic_components
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument, Pair, SigmaPair, register_instrument
+from simnav.sensors.observation import HORIZONTAL_POSITION, CompiledInstrument
 from simnav.spec import Vector, quantity
-from simnav.types import Array, TapStates
 
 __all__ = ["TerrainFix"]
 
 
 @register_instrument(
-    Kind("horizontal position", "fix", geodetic_components(height=False), HORIZONTAL_POSITION, geodetic=True),
+    Kind("horizontal position", "fix", geodetic_components(height=False), kinds.HORIZONTAL_POSITION, geodetic=True),
     example={"rate_hz": 0.3, "sigma_m": [5.0, 5.0]},
 )
 class TerrainFix(AidSpec):
@@ -35,7 +35,5 @@ class TerrainFix(AidSpec):
         return _TerrainFix(self, name, seed)
 
 
-class _TerrainFix(Instrument):
-    def observe(self, tap: TapStates) -> Array:
-        position = earth.displace(tap.position, self.lever_displacement(tap)) if self.levered else tap.position
-        return position[:, :2]
+class _TerrainFix(CompiledInstrument):
+    code = HORIZONTAL_POSITION

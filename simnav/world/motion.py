@@ -13,10 +13,12 @@ from math import atan2, cos, exp, inf, sin
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.geometry.rotation import wrap_scalar
 from simnav.strapdown import sample_from_motion
-from simnav.world.manoeuvres import ACCELERATE, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
+from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
+from simnav.world.sea import ROWS
 
-__all__ = ["PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "initialise"]
+__all__ = ["PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "command", "initialise"]
 
 # Where things stand in the state vector.
 U, DU, R, DR, PSI, GAMMA, DGAMMA, DEPTH_CALM, NORTH, EAST = range(10)
@@ -41,6 +43,8 @@ DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, AT
 PARAMETERS = 11
 #: Columns of a tap: position 0:3, velocity 3:6, roll, pitch, yaw 6:9, angular rate 9:12, current north, east 12:14.
 TAP_COLUMNS = 14
+#: Rows of the phases of waves, and columns of an eddy.
+PHASES, EDDY_COLUMNS = 3, 6
 
 
 @kernel(fastmath={"reassoc", "contract", "nsz", "arcp"})
@@ -253,34 +257,9 @@ def initialise(x, p, phase, table, eddies):  # type: ignore[no-untyped-def]
     x[ROLL], x[PITCH] = roll, pitch
 
 
-@kernel(
-    "void(f8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-    "f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
-)
-def advance(x, index, p, rows, points, phase, table, eddies, tap_time, taps, rate, force):  # type: ignore[no-untyped-def]
-    """Advance the world by n samples.
-
-    Parameters
-    ----------
-    x : (59,) array
-        State; updated.
-    index : (4,) int array
-        Sample, segment, waypoint, whether the segment has begun; updated.
-    p : (11,) array
-        Constants of the vessel, the water and the step, at the places that this module names.
-    rows, points : arrays
-        The manoeuvre table.
-    phase, table : arrays
-        The wave components (`simnav.world.sea.components`); the phases are updated.
-    eddies : array
-        The part of the current that changes (`simnav.world.current.eddies`).
-    tap_time : (m,) array
-        Ascending times within the block at which the state is wanted [s].
-    taps : (m, 14) array
-        Filled with the states at those times.
-    rate, force : (n, 3) arrays
-        Filled with the ideal mean angular rate and specific force.
-    """
+@kernel()
+def _advance_one(x, index, p, rows, points, phase, table, eddies, tap_time, taps, rate, force):  # type: ignore[no-untyped-def]
+    """Advance one world by as many samples as there is room for in ``rate``; the arguments as of `advance`."""
     dt = p[DT]
     decay_u, decay_r, decay_g = exp(-dt / p[TAU_U]), exp(-dt / p[TAU_R]), exp(-dt / p[TAU_G])
     memory = x[MEMORY : MEMORY + 6]
@@ -333,6 +312,60 @@ def advance(x, index, p, rows, points, phase, table, eddies, tap_time, taps, rat
         x[ROLL], x[PITCH] = roll, pitch
 
 
+@kernel(
+    "void(b1[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1])"
+)
+def advance(  # type: ignore[no-untyped-def]
+    active, x, index, p, sizes, rows, points, phase, table, eddies, tap_time, first, last, taps, samples, rate, force
+):
+    """Advance w worlds, each by its own number of samples.
+
+    One kernel for one world and for many: the sum over waves is the only arithmetic that a compiler may reorder, so
+    that a second copy could differ in the last bit.
+
+    Parameters
+    ----------
+    active : (w,) bool array
+        Which worlds are advanced.
+    x : (w, 59) array
+        State; updated.
+    index : (w, 4) int array
+        Sample, segment, waypoint, whether the segment has begun; updated.
+    p : (w, 11) array
+        Constants of the vessel, the water and the step, at the places that this module names.
+    sizes : (w, 4) int array
+        How many manoeuvres, points, waves and eddies each world has.
+    rows, points : (w, ...) arrays
+        The manoeuvre tables, each flat and with room behind it, like all that follow.
+    phase, table : (w, ...) arrays
+        The wave components (`simnav.world.sea.components`); the phases are updated.
+    eddies : (w, ...) array
+        The part of the current that changes (`simnav.world.current.eddies`).
+    tap_time : (w, ...) array
+        Ascending times at which the state is wanted [s].
+    first, last : (w,) int arrays
+        Those of them, from first up to, not including, last, that are within the block.
+    taps : (w, ..., 14) array
+        Filled with the states at those times.
+    samples : (w,) int array
+        By how many samples each world is advanced.
+    rate, force : (w, ..., 3) arrays
+        Filled with the ideal mean angular rate and specific force.
+    """
+    for w in range(active.size):
+        if not active[w]:
+            continue
+        r, q, c, e = sizes[w, 0], sizes[w, 1], sizes[w, 2], sizes[w, 3]
+        n, m = samples[w], last[w] - first[w]
+        _advance_one(
+            x[w], index[w], p[w], rows[w, : COLUMNS * r].reshape((r, COLUMNS)), points[w, : 2 * q].reshape((q, 2)),
+            phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
+            eddies[w, : EDDY_COLUMNS * e].reshape((e, EDDY_COLUMNS)),
+            tap_time[w, first[w] : last[w]], taps[w, :m], rate[w, :n], force[w, :n],
+        )  # fmt: skip
+
+
 @kernel()
 def _tap(out, a, x, p, v, roll, pitch, sample, c):  # type: ignore[no-untyped-def]
     """State at the fraction a of a sample interval: velocity and angles linear, position accordingly."""
@@ -355,3 +388,27 @@ def _tap(out, a, x, p, v, roll, pitch, sample, c):  # type: ignore[no-untyped-de
     flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
     out[12] = flow * x[WATER_NORTH]
     out[13] = flow * x[WATER_EAST]
+
+
+@kernel("void(b1[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def command(active, x, wrong, heading, speed):  # type: ignore[no-untyped-def]
+    """Steer w worlds without manoeuvres.
+
+    Parameters
+    ----------
+    active : (w,) bool array
+        Which of them.
+    x : (w, 59) array
+        State; updated.
+    wrong : (w,) array
+        By how much the heading that is steered by is off [rad]; NaN: as before.
+    heading, speed : (w,) array
+        What is steered: the heading as it is believed [rad], the speed through the water [m/s].
+    """
+    for w in range(active.size):
+        if active[w]:
+            if wrong[w] == wrong[w]:
+                x[w, ERROR_HEADING] = wrong[w]
+            believed = x[w, PSI] + x[w, ERROR_HEADING]
+            x[w, PSI_REFERENCE] = believed + wrap_scalar(heading[w] - believed)
+            x[w, SPEED_TARGET] = max(speed[w], 0.0)

@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import hypot
+from math import sqrt
 from typing import ClassVar, Protocol
 
 import numpy as np
 
+from simnav.compiled import kernel
 from simnav.types import Array, NavigationStates
 
 __all__ = ["PlannedTrack"]
+
+
+@kernel("Tuple((f8, i8))(f8[:, ::1], i8, i8, f8, f8)")
+def _aside(points, at, window, north, east):  # type: ignore[no-untyped-def]
+    """How far to starboard of the nearest point a position is, and which point that is."""
+    low, high = max(0, at - window), min(points.shape[0] - 1, at + window)
+    least = np.inf
+    for i in range(low, high + 1):
+        d_north, d_east = points[i, 0] - north, points[i, 1] - east
+        square = d_north * d_north + d_east * d_east
+        if square < least:
+            at, least = i, square
+    before, after = max(at - 1, 0), min(at + 1, points.shape[0] - 1)
+    along_north, along_east = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
+    length = sqrt(along_north * along_north + along_east * along_east)
+    if length < 1e-6:  # she lies still
+        return 0.0, at
+    d_north, d_east = north - points[at, 0], east - points[at, 1]
+    return (along_north * d_east - along_east * d_north) / length, at
 
 
 class _Mover(Protocol):
@@ -19,7 +38,7 @@ class _Mover(Protocol):
     @property
     def track(self) -> Array: ...
 
-    def advance(self, until: float, taps: Mapping[str, Array]) -> object: ...
+    def trace(self, seconds: int) -> tuple[Array, Array]: ...
 
     def state(self) -> NavigationStates: ...
 
@@ -53,12 +72,11 @@ class PlannedTrack:
 
     def reach(self, time: float) -> None:
         """Make the track at least so long [s]."""
-        points, positions = [self.points], [self.position]
-        for second in range(len(self.points), int(time) + 2):
-            self._world.advance(float(second), {})
-            points.append(self._world.track[None])
-            positions.append(self._world.state().position.copy())
-        self.points, self.position = np.concatenate(points), np.concatenate(positions)
+        more = int(time) + 2 - len(self.points)
+        if more > 0:
+            track, position = self._world.trace(more)
+            self.points = np.concatenate([self.points, track])
+            self.position = np.concatenate([self.position, position])
 
     def aside(self, north: float, east: float, time: float) -> tuple[float, float]:
         """How far to starboard of the track a position is [m], and the planned speed there [m/s].
@@ -74,15 +92,5 @@ class PlannedTrack:
         """
         if int(time) + self.WINDOW >= len(self.points):
             self.reach(time + 4 * self.WINDOW)
-        points = self.points
-        low, high = max(0, self._at - self.WINDOW), min(len(points) - 1, self._at + self.WINDOW)
-        squares = (points[low : high + 1, 0] - north) ** 2 + (points[low : high + 1, 1] - east) ** 2
-        at = low + int(np.argmin(squares))
-        self._at = at
-        before, after = points[max(at - 1, 0)], points[min(at + 1, len(points) - 1)]
-        along_north, along_east = float(after[0] - before[0]), float(after[1] - before[1])
-        length = hypot(along_north, along_east)
-        if length < 1e-6:  # she lies still
-            return 0.0, float(points[at, 3])
-        d_north, d_east = north - float(points[at, 0]), east - float(points[at, 1])
-        return (along_north * d_east - along_east * d_north) / length, float(points[at, 3])
+        aside, self._at = _aside(self.points, self._at, self.WINDOW, north, east)
+        return aside, float(self.points[self._at, 3])

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, ImuSamples, NavigationStates, TapStates
@@ -17,6 +19,9 @@ from simnav.world.track import PlannedTrack
 from simnav.world.vessel import Start, Vessel
 
 __all__ = ["World", "WorldBlock"]
+
+_ON = np.ones(1, np.bool_)
+_TRACK = np.array([motion.NORTH, motion.EAST, motion.PSI, motion.U])
 
 #: How far ahead the vessel looks to come back to its track: at least [m], and so many seconds of its speed.
 LEAST_LOOKAHEAD, LOOKAHEAD_TIME = 30.0, 20.0
@@ -57,6 +62,11 @@ class World:
         Samples of the ideal IMU per second [Hz].
     seed : int
         Seed of the wave components and of what changes in the current.
+
+    Attributes
+    ----------
+    sizes : (4,) int array
+        How many manoeuvres, points, waves and eddies.
     """
 
     def __init__(
@@ -100,6 +110,7 @@ class World:
         self._rows, self._points = table(manoeuvres)
         self._phase, self._waves = components(sea, seed)
         self._eddies = eddies(current, seed)
+        self.sizes = np.array([len(self._rows), len(self._points), self._phase.shape[1], len(self._eddies)])
         motion.initialise(self._x, self._p, self._phase, self._waves, self._eddies)
 
     @property
@@ -155,20 +166,59 @@ class World:
         """
         if len(self._rows):
             raise ValueError("a world with manoeuvres steers for itself")
-        x = self._x
-        believed = float(x[motion.PSI] + x[motion.ERROR_HEADING])
-        x[motion.PSI_REFERENCE] = believed + float(wrap_angle(heading - believed))
-        x[motion.SPEED_TARGET] = max(speed, 0.0)
+        motion.command(_ON, self._x[None], np.array([np.nan]), np.array([heading]), np.array([speed]))
 
     def believe(self, heading: float) -> None:
         """The heading that commands are steered by is off by this much [rad] from now on."""
         self._x[motion.ERROR_HEADING] = heading
 
+    def _one(self) -> tuple[NDArray[Any], ...]:
+        """The first arguments of `simnav.world.motion.advance` for this world alone."""
+        flat = (a.reshape(1, -1) for a in (self._rows, self._points, self._phase, self._waves, self._eddies))
+        return (_ON, self._x[None], self._index[None], self._p[None], self.sizes[None], *flat)
+
+    def trace(self, seconds: int) -> tuple[Array, Array]:
+        """Advance second by second, without a look at what instruments would say.
+
+        Parameters
+        ----------
+        seconds : int
+
+        Returns
+        -------
+        track : (seconds, 4) array
+            `track` at the end of each.
+        position : (seconds, 3) array
+            Latitude, longitude [rad], height [m].
+        """
+        n = round(self.rate)
+        room = np.empty((1, n, 3))
+        none, states, samples = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS)), np.array([n])
+        arguments: Any = (*self._one(), np.empty((1, 0)), none, none, states, samples, room, room.copy())
+        track, position = np.empty((seconds, 4)), np.empty((seconds, 3))
+        for i in range(seconds):
+            motion.advance(*arguments)
+            track[i] = self._x[_TRACK]
+            position[i] = self._x[motion.LATITUDE : motion.HEIGHT + 1]
+        return track, position
+
+    def hand_over(self) -> dict[str, NDArray[Any]]:
+        """Its arrays, under the names of the arguments of `simnav.world.motion.advance`; this world is used up."""
+        return {
+            "x": self._x, "index": self._index, "p": self._p, "sizes": self.sizes, "rows": self._rows.ravel(),
+            "points": self._points.ravel(), "phase": self._phase.ravel(), "table": self._waves.ravel(),
+            "eddies": self._eddies.ravel(),
+        }  # fmt: skip
+
+    def live_in(self, x: Array, index: NDArray[Any]) -> None:
+        """Read and write the state in these arrays from now on, which whoever took over advances."""
+        self._x, self._index = x, index
+
     @property
     def track(self) -> Array:
         """(4,) array: north and east of the start [m], heading [rad], speed through the water [m/s]."""
-        x = self._x
-        return np.array([x[motion.NORTH], x[motion.EAST], x[motion.PSI], x[motion.U]])
+        track: Array = self._x[_TRACK]
+        return track
 
     def advance(self, until: float, taps: Mapping[str, Array]) -> WorldBlock:
         """Advance to a time.
@@ -188,16 +238,15 @@ class World:
         n = round(until * self.rate) - first
         if n < 0:
             raise ValueError(f"the world is at {self.time} s and does not go back to {until} s")
-        rate, force = np.empty((n, 3)), np.empty((n, 3))
+        rate, force = np.empty((1, n, 3)), np.empty((1, n, 3))
         times = np.concatenate([np.empty(0), *taps.values()])
         order = np.argsort(times, kind="stable")
-        sorted_states = np.empty((len(times), motion.TAP_COLUMNS))
-        motion.advance(
-            self._x, self._index, self._p, self._rows, self._points, self._phase, self._waves, self._eddies,
-            times[order], sorted_states, rate, force,
-        )  # fmt: skip
-        states = np.empty_like(sorted_states)
-        states[order] = sorted_states
+        sorted_states = np.empty((1, len(times), motion.TAP_COLUMNS))
+        within = times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
+        arguments: Any = (*self._one(), *within, np.array([n]), rate, force)
+        motion.advance(*arguments)
+        states = np.empty_like(sorted_states[0])
+        states[order] = sorted_states[0]
         out, i = {}, 0
         for name, t in taps.items():
             s = states[i : i + len(t)]
@@ -207,4 +256,4 @@ class World:
             out[name] = TapStates(t, s[:, 0:3], s[:, 3:6], s[:, 6:9], s[:, 9:12], water)
         # Divided, not multiplied by the interval: 2.29 s is then the float that a person writes.
         time = np.arange(first + 1, first + n + 1) / self.rate
-        return WorldBlock(ImuSamples(time, np.full(n, 1.0 / self.rate), rate, force), out)
+        return WorldBlock(ImuSamples(time, np.full(n, 1.0 / self.rate), rate[0], force[0]), out)

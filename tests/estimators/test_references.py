@@ -38,7 +38,10 @@ def run(row: str, recording):
 def test_oracles_are_marked_and_are_the_ekf_where_nothing_is_wrong(row):
     assert find(row).reference
     recording = simulate(shortened("open-sea", 60.0), 1)
-    np.testing.assert_allclose(run(row, recording).position, run("ekf", recording).position, rtol=0, atol=1e-13)
+    ours, ekf = run(row, recording), run("ekf", recording)
+    # Centimetres, for the oracles are linearised elsewhere: 1 cm is 1.6e-9 rad.
+    np.testing.assert_allclose(ours.position[:, :2], ekf.position[:, :2], rtol=0, atol=2e-9)
+    np.testing.assert_allclose(ours.covariance[:, :6, :6], ekf.covariance[:, :6, :6], rtol=0.02, atol=1e-5)
 
 
 def test_the_clairvoyant_works_on_the_run_without_faults():
@@ -50,7 +53,7 @@ def test_the_clairvoyant_works_on_the_run_without_faults():
     wrong, right = simulate(shortened("open-sea", 80.0, *faults), 5), simulate(shortened("open-sea", 80.0), 5)
     assert np.abs(wrong.data.aids["gnss"].value - right.data.aids["gnss"].value).max() > 1e-6
     # Displacements one after the other, or their sum: tens of metres over the radius of the Earth, squared.
-    ours, theirs = run("oracle-clairvoyant", wrong), run("ekf", right)
+    ours, theirs = run("oracle-clairvoyant", wrong), run("oracle", right)
     np.testing.assert_allclose(errors(ours, wrong)[:, :6], errors(theirs, right)[:, :6], rtol=0, atol=5e-4)
     np.testing.assert_allclose(ours.covariance, theirs.covariance, rtol=1e-6, atol=1e-12)
 

@@ -115,14 +115,6 @@ def test_what_dead_reckoning_needs(recording_of, kinds: tuple[str, ...], message
         make("dead-reckoning").reset(recording.start, Instruments(sheets))
 
 
-def test_the_oracle_is_the_ekf_where_nothing_is_wrong(recording_of, run_over):
-    recording = recording_of(4, 60.0)
-    oracle = make("oracle")
-    oracle.reveal(recording)
-    ours, best = run_over(make("ekf"), recording)[0], run_over(oracle, recording)[0]
-    np.testing.assert_allclose(ours, best, atol=1e-12)
-
-
 def test_the_oracle_knows_noise_and_flags(recording_of, run_over):
     """Gross errors are left out, noise is weighed as it is, a disturbed IMU is restored; the EKF is worse by far."""
     recording = recording_of(4, 100.0)

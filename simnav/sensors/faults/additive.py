@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simnav.recording import AidStream
-from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, Size, register_fault, size_range
+from simnav.sensors.faults.fault import (
+    ADDS,
+    STEPS_NOISE,
+    Effect,
+    FaultLayer,
+    FaultSpec,
+    Size,
+    register_fault,
+    size_range,
+)
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import Positive, quantity
 from simnav.types import KINDS, Array
@@ -53,6 +62,17 @@ class AdditiveLayer(FaultLayer):
         (m, d) array
             Components as in ``KINDS[stream.kind].errors``, SI units; a row of zeros does not touch its measurement.
         """
+
+    def ahead(self, name: str, kind: str, time: Array) -> tuple[NDArray[np.int64], Array]:
+        """See `FaultLayer.ahead`; for those whose `error` asks for no more of a stream than what it is called."""
+        interval, error = super().ahead(name, kind, time)
+        rows = np.flatnonzero(interval >= 0)
+        if len(rows):
+            n = len(time)
+            stream = AidStream(name, kind, time, error, np.zeros(n, np.uint32), error, error, np.empty(0))
+            error = error.copy()
+            error[rows] = self.error(stream, time[rows], time[rows] - self.activity.starts[interval[rows]])
+        return interval, error
 
     def apply(self, stream: AidStream) -> AidStream:
         if not self.touches(stream):
@@ -118,6 +138,7 @@ class NoiseStep(FaultSpec):
 
 
 class _NoiseStep(AdditiveLayer):
+    operation = STEPS_NOISE
     spec: NoiseStep
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
@@ -176,6 +197,7 @@ class GrossError(FaultSpec):
 
 
 class _GrossError(AdditiveLayer):
+    operation = ADDS
     spec: GrossError
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
@@ -221,6 +243,7 @@ class Multipath(FaultSpec):
 
 
 class _Multipath(AdditiveLayer):
+    operation = ADDS
     spec: Multipath
 
     def __init__(self, spec: Multipath, index: int, seed: int, key: str):
@@ -252,6 +275,7 @@ class Ramp(FaultSpec):
 
 
 class _Ramp(AdditiveLayer):
+    operation = ADDS
     spec: Ramp
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
@@ -275,6 +299,7 @@ class BiasStep(FaultSpec):
 
 
 class _BiasStep(AdditiveLayer):
+    operation = ADDS
     spec: BiasStep
 
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:

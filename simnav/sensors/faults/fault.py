@@ -28,8 +28,14 @@ from simnav.streams import stream as random_stream
 from simnav.types import KINDS, Array, ImuSamples
 
 __all__ = [
+    "ADDS",
+    "DISTURBS_IMU",
+    "DROPS",
     "FAULTS",
+    "HOLDS",
+    "STEPS_NOISE",
     "TOLERANCE",
+    "ZEROES",
     "Activity",
     "Effect",
     "FaultLayer",
@@ -408,6 +414,11 @@ class Activity:
         return (rows, number[rows]) if len(rows) else None
 
 
+#: What a layer does to a measurement, as far as it is known from the times alone (`FaultLayer.ahead`): it adds an
+#: error; adds noise up to a new sigma; takes it away; repeats an earlier one; says zero; disturbs the IMU.
+ADDS, STEPS_NOISE, DROPS, HOLDS, ZEROES, DISTURBS_IMU = range(6)
+
+
 class FaultLayer:
     """A fault in one run, laid over the streams of its instruments block by block.
 
@@ -430,6 +441,9 @@ class FaultLayer:
         When it acts.
     """
 
+    #: One of `ADDS`, ..., for runs that go step by step (`simnav.steps`); None: `apply` alone knows what it does.
+    operation: ClassVar[int | None] = None
+
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
         self.spec, self._index, self._seed, self._key = spec, index, seed, key
         self._generators: dict[tuple[str, ...], np.random.Generator] = {}
@@ -443,12 +457,48 @@ class FaultLayer:
 
     def touches(self, stream: AidStream) -> bool:
         """Whether the fault is one of this instrument's."""
-        return stream.name in self.spec.instruments or stream.kind in self.spec.instruments
+        return self.touches_kind(stream.name, stream.kind)
+
+    def touches_kind(self, name: str, kind: str) -> bool:
+        """Whether the fault is one of the instrument of this name and kind."""
+        return name in self.spec.instruments or kind in self.spec.instruments
 
     def bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
         """The label of measurements in intervals of the given numbers."""
         number = interval if self.spec.intervals else np.zeros_like(interval)
         return np.left_shift(np.uint32(1), (self._index + number).astype(np.uint32))
+
+    @property
+    def index(self) -> int:
+        """First bit of the fault in the labels of measurements."""
+        return self._index
+
+    def ahead(self, name: str, kind: str, time: Array) -> tuple[NDArray[np.int64], Array]:
+        """What `apply` finds and draws for the next n samples of an instrument, delivered or not.
+
+        Parameters
+        ----------
+        name, kind : str
+            Of one of its instruments.
+        time : (n,) array
+            Sample times [s].
+
+        Returns
+        -------
+        interval : (n,) int array
+            Number of the interval that each sample lies in; -1 for none.
+        error : (n, d) array
+            What is drawn for it; zero where there is nothing to draw.
+        """
+        interval, error = np.full(len(time), -1, np.int64), np.zeros((len(time), len(KINDS[kind].components)))
+        found = self.activity.locate(time)
+        if found is not None:
+            interval[found[0]] = found[1]
+        return interval, error
+
+    def ahead_imu(self, time: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Likewise of the IMU: the n samples that are disturbed, and the (n, 6) errors of rate and force."""
+        raise NotImplementedError(f"{type(self).__name__} does not disturb an IMU")
 
     def apply(self, stream: AidStream) -> AidStream:
         """Lay the fault over the next block of a stream.

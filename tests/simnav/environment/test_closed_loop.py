@@ -47,3 +47,29 @@ def test_a_wrong_heading_does_too():
 def test_a_log_is_refused():
     with pytest.raises(ValueError, match="is a recorded log: its vessel cannot steer by the estimate"):
         NavigationEnv("car-kitti", closed_loop=True)
+
+
+def test_a_step_by_itself_gives_the_numbers_of_a_block(monkeypatch):
+    """Steered by an estimate that is off, over a change of stretch and to the end of the run."""
+    scenario = load("gnss-multipath").model_copy(update={"duration": 70.0})
+    envs = [NavigationEnv(scenario, closed_loop=True, reveal_truth=True, reward="position") for _ in range(2)]
+    _, info = envs[0].reset(seed=5)
+    with monkeypatch.context() as patched:
+        patched.setattr("simnav.steps.CompiledInstrument", int)  # as if the instruments were those of others
+        envs[1].reset(seed=5)
+    assert [env._runs._compiled.item() for env in envs] == [True, False]
+    over = False
+    while not over:
+        action = info["truth"].copy()
+        action[0] = displace(action[0], np.array([20.0, -30.0, 0.0]))
+        (one, reward, _, over, info), (two, *rest) = (env.step(action) for env in envs)
+        assert (reward, over) == (rest[0], rest[2])
+        np.testing.assert_array_equal(info["truth"], rest[3]["truth"])
+        assert one.keys() == two.keys()
+        for name, entries in one.items():
+            if name == "interval":
+                np.testing.assert_array_equal(entries, two[name])
+                continue
+            for key, array in entries.items():
+                np.testing.assert_array_equal(array, two[name][key], f"{name} {key}")
+    assert one["interval"].tolist() == [70.0, 70.0]

@@ -18,6 +18,7 @@ import simnav
 from simnav.catalogue import headers
 from simnav.environment import EstimatorAgent, NavigationEnv, unpack
 from simnav.environment import navigation as environment
+from simnav.environment.stretch import pack
 from simnav.estimator import Estimator, make, names
 from simnav.geometry.earth import displace
 from simnav.log import LogError
@@ -141,7 +142,7 @@ def test_an_observation_holds_the_packet_of_its_step_whatever_the_timing(imu, fi
         [Datasheet("b", "gnss_position", 30.0, np.ones(3)), Datasheet("a", "gyrocompass", 30.0, np.ones(1))],
         imu=ImuDatasheet(30.0, TriadDatasheet(), TriadDatasheet()),
     )
-    stretch = environment._pack(block, 0.0, {"imu": 30, "a": 30, "b": 30})
+    stretch = pack(block, 0.0, {"imu": 30, "a": 30, "b": 30})
     for i, packet in enumerate(packets(block, ends)):
         observation = {"interval": stretch.intervals[i]}
         observation |= {name: {k: v[i] for k, v in columns.items()} for name, columns in stretch.columns.items()}
@@ -156,7 +157,7 @@ def test_too_many_samples_in_a_step_are_an_error_and_not_lost():
     stream = AidStream("log", "speed_log", t, t[:, None], np.zeros(3, np.uint32), t[:, None], t[:, None], np.empty(0))
     states = NavigationStates(np.array([1.0]), *np.zeros((3, 1, 3)))
     with pytest.raises(ValueError, match="log delivered 3 samples in one step"):
-        environment._pack(Block(0.0, 1.0, None, None, {"log": stream}, states), 0.0, {"log": 2})
+        pack(Block(0.0, 1.0, None, None, {"log": stream}, states), 0.0, {"log": 2})
 
 
 def test_stepping_gives_the_recording_bit_for_bit(scenario):

@@ -1,0 +1,218 @@
+"""Guidance in compiled passes over many voyages: steering, scores and what is observed.
+
+What is decided, observed and scored is described in `simnav.estimators.learning.guidance`. The environment of one
+voyage and the vector form call the same kernels, so that they agree bit for bit.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, exp, hypot, inf, log1p, log10, pi, radians, sin
+
+from simnav.compiled import kernel
+from simnav.estimators.learning.features import LIMIT, SPEED, TURN_RATE
+from simnav.geometry.rotation import wrap_scalar
+
+__all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "judge", "look", "steer"]
+
+#: Unit of the distance from the track [m], and largest change of heading [rad].
+ASIDE, LARGEST_TURN = 20.0, radians(60.0)
+#: Weights of the reward.
+FUEL, AGROUND, BERTH = 0.2, 100.0, 100.0
+#: Numbers of an observation.
+SIZE = 16
+#: Points of the track that are looked at before and after the last one.
+BEHIND, AHEAD = 20, 120
+
+
+@kernel(
+    "void(b1[::1], f8[:, ::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], "
+    "f8[::1], f8[::1], f8[::1], f8[::1])"
+)
+def steer(  # type: ignore[no-untyped-def]
+    active, actions, at, ahead, route, length, points, truth, estimate, planned, wrong, heading, speed
+):
+    """What the agents' actions mean for the vessels.
+
+    Parameters
+    ----------
+    active : (b,) bool array
+        Which voyages.
+    actions : (b, 2) array
+        Clipped to [-1, 1].
+    at, ahead, route : (b,) int arrays
+        Point of the track where each vessel believes to be, how far ahead the heading is taken, and which track it is.
+    length : (r,) int array
+        Points of each track.
+    points : (r, p, 4) array
+        North, east, heading, speed (`simnav.world.track.PlannedTrack`).
+    truth, estimate : (b, 9) arrays
+        Position, velocity, roll, pitch and yaw; NaN for what is not estimated.
+    planned, wrong, heading, speed : (b,) arrays
+        Overwritten: the planned speed, and the arguments of `simnav.world.motion.command`.
+    """
+    for b in range(active.size):
+        if not active[b]:
+            continue
+        r = route[b]
+        turn, haste = min(max(actions[b, 0], -1.0), 1.0), min(max(actions[b, 1], -1.0), 1.0)
+        planned[b] = points[r, at[b], 3]
+        wrong[b] = wrap_scalar(estimate[b, 8] - truth[b, 8])
+        heading[b] = points[r, min(at[b] + ahead[b], length[r] - 1), 2] + LARGEST_TURN * turn
+        speed[b] = planned[b] * (1.0 + 0.5 * haste)
+
+
+@kernel()
+def _place(latitude, longitude, at, length, geodetic, course, along):  # type: ignore[no-untyped-def]
+    """Nearest point within two minutes of one, the distance to starboard [m], and how far along [m]."""
+    low, high = max(at - BEHIND, 0), min(at + AHEAD, length)
+    least, north, east = inf, 0.0, 0.0
+    for i in range(low, high):
+        dn = (latitude - geodetic[i, 0]) * geodetic[i, 2]
+        de = wrap_scalar(longitude - geodetic[i, 1]) * geodetic[i, 3]
+        square = dn * dn + de * de
+        if square < least:
+            at, least, north, east = i, square, dn, de
+    c, s = cos(course[at]), sin(course[at])
+    return at, east * c - north * s, along[at] + (north * c + east * s)
+
+
+@kernel(
+    "void(b1[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], "
+    "b1[::1], i8, f8, i8[::1], f8[:, ::1], f8[::1], f8[::1], b1[::1])"
+)
+def judge(  # type: ignore[no-untyped-def]
+    active, step, planned, speed, truth, route, length, geodetic, course, along,
+    last, code, half_width, at, tally, aside, rewards, aground,
+):  # fmt: skip
+    """What a step was worth.
+
+    Parameters
+    ----------
+    active, route, length, planned, truth
+        As of `steer`.
+    step, speed : (b,) arrays
+        Length of a step [s], and true speed through the water [m/s].
+    geodetic : (r, p, 4) array
+        Of the points of each track: latitude, longitude [rad], and metres per radian of both.
+    course, along : (r, p) arrays
+        Course of the track there [rad], and the distance from its start [m].
+    last : (b,) bool array
+        Whether this is the last step.
+    code : int
+        0 track, 1 channel, 2 dock.
+    half_width : float
+        Of the channel [m].
+    at : (b,) int array
+        Point of the track where each vessel truly is; updated.
+    tally : (b, 4) array
+        Distance along the track, sum of the squared distances from it, fuel, least clearance; updated.
+    aside, rewards, aground : (b,) arrays
+        Overwritten: distance to starboard of the track [m], reward, whether the vessel touched the side.
+    """
+    for b in range(active.size):
+        rewards[b], aground[b] = 0.0, False
+        if not active[b]:
+            continue
+        r, t = route[b], tally[b]
+        at[b], off, far = _place(truth[b, 0], truth[b, 1], at[b], length[r], geodetic[r], course[r], along[r])
+        usual = max(planned[b], 0.1)
+        progress = min((far - t[0]) / (usual * step[b]), 1.0)
+        burnt = speed[b] / usual
+        burnt = burnt * burnt * burnt
+        t[0] = far
+        t[1] += off * off
+        t[2] += burnt
+        aside[b] = off
+        value = step[b] * (progress - min(abs(off) / ASIDE, 10.0) - FUEL * burnt)
+        if code == 1:
+            t[3] = min(t[3], half_width - abs(off))
+            if t[3] <= 0.0:
+                aground[b] = True
+                value -= AGROUND
+        elif code == 2 and last[b]:
+            end = geodetic[r, length[r] - 1]
+            left = hypot((truth[b, 0] - end[0]) * end[2], wrap_scalar(truth[b, 1] - end[1]) * end[3]) / 10.0
+            fast = hypot(truth[b, 3], truth[b, 4]) / 0.5
+            value += BERTH * exp(-left * left - fast * fast)
+        rewards[b] = value
+
+
+@kernel()
+def _sigma(variance, unit):  # type: ignore[no-untyped-def]
+    """Decimal logarithm of a sigma in a unit."""
+    return 0.5 * log10(max(variance, 1e-18)) - log10(unit)
+
+
+@kernel()
+def _number(value):  # type: ignore[no-untyped-def]
+    return min(max(value, -LIMIT), LIMIT) if value == value else 0.0
+
+
+@kernel(
+    "void(b1[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[:, ::1], f8[:, ::1], b1[:, ::1], "
+    "i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, "
+    "i8[::1], f8[:, ::1], f8[:, ::1], f4[:, ::1])"
+)
+def look(  # type: ignore[no-untyped-def]
+    active, now, step, estimate, variance, begun, count, who, when, fix, route, length, points, geodetic, course, along,
+    half_width, at, notes, start, observation,
+):  # fmt: skip
+    """What the agents see.
+
+    Parameters
+    ----------
+    active, route, length, points, geodetic, course, along
+        As of `judge`.
+    now, step : (b,) arrays
+        Time of the estimate, and length of a step [s].
+    estimate : (b, 9) array
+        As of `steer`.
+    variance : (b, 2) array
+        Of the horizontal position [m^2] and of the heading [rad^2], as estimated.
+    begun : (b,) int array
+        0 at the start of a voyage, when there is no step to look back at.
+    count, who, when
+        As of `simnav.steps.SteppedRuns`.
+    fix : (b, i) bool array
+        Which instruments give a position.
+    half_width : float
+        Of the channel [m]; `ASIDE` without one.
+    at : (b,) int array
+        Point of the track where each vessel believes to be; updated.
+    notes : (b, 3) array
+        Heading of the last estimate, turn rate, time of the last fix; updated.
+    start : (b, 2) array
+        As ``variance``, of the start.
+    observation : (b, 16) float32 array
+        Overwritten for the voyages that are active.
+    """
+    for b in range(active.size):
+        if not active[b]:
+            continue
+        r, e, row = route[b], estimate[b], observation[b]
+        if begun[b] > 0:
+            turned = wrap_scalar(e[8] - notes[b, 0])
+            if turned == turned:
+                notes[b, 1] = turned / step[b]
+            for j in range(count[b]):
+                if fix[b, who[b, j]]:
+                    notes[b, 2] = when[b, j]
+        notes[b, 0] = e[8]
+        off, far = 0.0, along[r, at[b]]
+        if abs(e[0]) < inf and abs(e[1]) < inf:
+            at[b], off, far = _place(e[0], e[1], at[b], length[r], geodetic[r], course[r], along[r])
+        k, end = at[b], length[r] - 1
+        north, east = e[3] if e[3] == e[3] else 0.0, e[4] if e[4] == e[4] else 0.0
+        over_ground = atan2(east, north) - course[r, k]
+        row[0] = _number(off / ASIDE)
+        row[1], row[2] = sin(over_ground), cos(over_ground)
+        row[3] = wrap_scalar(course[r, min(k + 10, end)] - course[r, k])
+        row[4] = wrap_scalar(course[r, min(k + 30, end)] - course[r, k])
+        row[5] = wrap_scalar(course[r, min(k + 60, end)] - course[r, k])
+        row[6], row[7] = _number(hypot(north, east) / SPEED), _number(points[r, k, 3] / SPEED)
+        row[8] = _number(notes[b, 1] / TURN_RATE)
+        row[9], row[10] = _number(_sigma(variance[b, 0], 1.0)), _number(_sigma(variance[b, 1], pi / 180.0))
+        row[11] = _number(log1p(max(now[b] - notes[b, 2], 0.0)))
+        row[12] = _number(log1p(max(along[r, end] - far, 0.0)) / 5.0)
+        row[13] = _number(half_width / ASIDE)
+        row[14], row[15] = _number(_sigma(start[b, 0], 1.0)), _number(_sigma(start[b, 1], pi / 180.0))

@@ -1,0 +1,226 @@
+"""Navigators of many voyages: the plain inertial filter in one compiled pass, any other estimator one by one.
+
+The pass makes the steps of `simnav.estimators.solvers.kalman.KalmanEstimator` around an `InertialModel`, with the same
+kernels, and gives the same numbers, bit for bit.
+"""
+
+from __future__ import annotations
+
+from math import atan2, hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.compiled import kernel
+from simnav.estimator import Estimator
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_update import assimilate_inertial
+from simnav.estimators.models.propagation import (
+    BLOCK,
+    BLOCK_COLUMNS,
+    accumulate_error,
+    advance_inertial,
+    propagate_covariance,
+)
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.solvers.admission import LATE
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.steps import SteppedRuns
+from simnav.types import Array, Estimate, InitialState, Instruments
+
+__all__ = ["Navigators", "navigate"]
+
+_INSTRUMENTS = ("codes", "arms", "noises", "limits", "used")
+_STATE = (
+    "position", "velocity", "dcm", "memory", "bias", "turn", "clock", "sensors", "calibration", "decay", "density",
+    "covariance",
+)  # fmt: skip
+
+
+class Navigators:
+    """The navigators of n voyages.
+
+    Parameters
+    ----------
+    runs : SteppedRuns
+        What their instruments deliver.
+
+    Attributes
+    ----------
+    estimate : (n, 9) array
+        Position, velocity, roll, pitch and yaw; NaN for what is not estimated.
+    spread : (n, 4) array
+        Variance of the position north, its covariance, variance east [m^2], and variance of the heading [rad^2].
+    """
+
+    def __init__(self, runs: SteppedRuns):
+        self.runs, self.n = runs, runs.n
+        self.estimate, self.spread = np.full((self.n, 9), np.nan), np.ones((self.n, 4))
+        self._others: list[Estimator | None] = [None] * self.n
+        self._banked = np.zeros(self.n, np.bool_)
+        self._size, self._now = np.full(self.n, 15, np.int64), np.zeros(self.n)
+        self._until = np.zeros(self.n)
+        self._arrays: dict[str, NDArray[Any]] = {}
+
+    def begin(self, b: int, start: InitialState, instruments: Instruments, navigator: Estimator | None) -> None:
+        """Begin a voyage, with a navigator, or the plain filter.
+
+        Raises
+        ------
+        UnsuitableScenario
+            If it lacks an instrument.
+        """
+        plain = navigator is None
+        navigator = KalmanEstimator(Suitable()) if navigator is None else navigator
+        navigator.reset(start, instruments)
+        model = navigator.model if plain and isinstance(navigator, KalmanEstimator) else None
+        arrays = None
+        if type(model) is InertialModel and isinstance(navigator, KalmanEstimator):
+            arrays = model.arrays(self.runs.names[b])
+        self._banked[b] = arrays is not None
+        self._others[b] = navigator if arrays is None else None
+        if arrays is not None and isinstance(navigator, KalmanEstimator):
+            n = navigator.model.size
+            self._size[b], self._now[b] = n, start.time
+            arrays["covariance"] = navigator.covariance.ravel()
+            arrays["used"] = np.full(len(self.runs.names[b]), -np.inf)
+            for name, array in arrays.items():
+                self._put(name, b, array)
+        self._note(b, Estimate(start.time, start.position, start.velocity, start.attitude, start.covariance))
+
+    def update(self, active: NDArray[np.bool_]) -> None:
+        """Take what the instruments of some voyages delivered in their last step."""
+        runs = self.runs
+        for b in np.flatnonzero(active & ~self._banked).tolist():
+            navigator = self._others[b]
+            assert navigator is not None
+            self._note(b, navigator.update(runs.packet(b)))
+        banked = active & self._banked
+        if not banked.any():
+            return
+        for b in np.flatnonzero(banked).tolist():
+            self._until[b] = runs.interval_of(b)[1]
+        a = self._arrays
+        arguments: Any = (
+            banked, self._until, runs.count, runs.who, runs.when, runs.value, runs.samples, runs.imu_time,
+            runs.imu_interval, runs.rate, runs.force, self._size, *(a[name] for name in _INSTRUMENTS), self._now,
+            *(a[name] for name in _STATE), self.estimate, self.spread,
+        )  # fmt: skip
+        navigate(*arguments)
+
+    def _put(self, name: str, b: int, array: NDArray[Any]) -> None:
+        """Store an array of voyage b; where there is no room for it, all get more."""
+        old = self._arrays.get(name)
+        if old is None or any(m > c for m, c in zip(array.shape, old.shape[1:], strict=True)):
+            shape = array.shape if old is None else tuple(map(max, array.shape, old.shape[1:]))
+            new = np.zeros((self.n, *shape), array.dtype)
+            if old is not None:
+                new[tuple(slice(0, m) for m in old.shape)] = old
+            old = self._arrays[name] = new
+        place: Any = (b, *(slice(0, m) for m in array.shape))
+        old[place] = array
+
+    def _note(self, b: int, e: Estimate) -> None:
+        for k, part in enumerate((e.position, e.velocity, e.attitude)):
+            self.estimate[b, 3 * k : 3 * k + 3] = np.nan if part is None else part
+        self.spread[b] = 1.0, 0.0, 1.0, 1.0
+        if e.covariance is not None:
+            p = e.covariance
+            self.spread[b] = p[0, 0], p[0, 1], p[1, 1], p[8, 8]
+
+    def covariance(self, b: int) -> Array:
+        """(2, 2) array: of the position, north and east [m^2]."""
+        p, q, r, _ = self.spread[b].tolist()
+        return np.array([[p, q], [q, r]])
+
+
+@kernel(
+    "void(b1[::1], f8[::1], i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], i8[::1], f8[:, ::1], f8[:, ::1], "
+    "f8[:, :, ::1], f8[:, :, ::1], i8[::1], i8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], "
+    "f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+)
+def navigate(  # type: ignore[no-untyped-def]
+    active, until, count, who, when, value, samples, imu_time, imu_interval, rate, force, size, codes, arms, noises,
+    limits, used, now, position, velocity, dcm, memory, bias, turn, clock, sensors, calibration, decay, density,
+    covariance, estimate, spread,
+):  # fmt: skip
+    """One step of many inertial filters: each propagated to its measurements, and corrected by them.
+
+    Parameters
+    ----------
+    active : (b,) bool array
+        Which filters.
+    until : (b,) array
+        End of each step [s].
+    count, who, when, value, samples, imu_time, imu_interval, rate, force
+        As of `simnav.steps.SteppedRuns`.
+    size : (b,) int array
+        States of each.
+    codes, arms, noises, limits : (b, i, ...) arrays
+        The instruments, as of `simnav.estimators.models.inertial.InertialModel.arrays`.
+    used : (b, i) array
+        Time of the last measurement that was used of each [s].
+    now : (b,) array
+        Time of the state [s]; updated, like what follows.
+    position, velocity, dcm, memory, bias, turn, clock, sensors, calibration, decay, density
+        As of `InertialModel.arrays`.
+    covariance : (b, n n) array
+        Flat, with room behind it.
+    estimate, spread : (b, 9), (b, 4) arrays
+        Overwritten (`Navigators`).
+    """
+    longest = 0.0
+    for b in range(active.size):
+        if active[b]:
+            longest = max(longest, until[b] - now[b])
+    blocks = np.empty((int(longest / BLOCK) + 4, BLOCK_COLUMNS))
+    transition, process = np.empty((15, 15)), np.empty((15, 15))
+    for b in range(active.size):
+        if not active[b]:
+            continue
+        n, first, since = size[b], 0, now[b]
+        P = covariance[b, : n * n].reshape((n, n))
+        correction = np.empty(n)
+        for j in range(count[b] + 1):
+            i, code, d = -1, 0, 0
+            stop = until[b]
+            if j < count[b]:
+                i = who[b, j]
+                code, d, t = codes[b, i, 0], codes[b, i, 1], when[b, j]
+                if d == 0:  # it is none of those that the filter uses
+                    continue
+                plausible = since - LATE <= t <= until[b] + LATE and t > used[b, i]
+                for k in range(d):
+                    plausible = plausible and -limits[b, i, k] < value[b, j, k] < limits[b, i, k]
+                if not plausible:
+                    continue
+                used[b, i] = t
+                stop = min(t, until[b])
+            elapsed = stop - now[b]
+            if elapsed > 0.0:
+                s = samples[b]
+                first, blocks_used = advance_inertial(
+                    position[b], velocity[b], dcm[b], memory[b], bias[b], turn[b], clock[b], imu_time[b, :s],
+                    imu_interval[b, :s], rate[b, :s], force[b, :s], first, stop, sensors[b], blocks,
+                )  # fmt: skip
+                accumulate_error(blocks, blocks_used, sensors[b], transition, process)
+                now[b] = stop
+                more = n - 15
+                propagate_covariance(
+                    P, transition, process, calibration[b, :more], decay[b, :more], density[b, :more], elapsed
+                )
+            if i >= 0:
+                assimilate_inertial(
+                    code, arms[b, i], codes[b, i, 2], codes[b, i, 3], value[b, j, :d], position[b], velocity[b], dcm[b],
+                    clock[b, 12:15], bias[b], calibration[b, : n - 15], P, noises[b, i, : d * d].reshape((d, d)),
+                    correction,
+                )  # fmt: skip
+        for k in range(3):
+            estimate[b, k], estimate[b, 3 + k] = position[b, k], velocity[b, k]
+        c = dcm[b]
+        estimate[b, 6] = atan2(c[2, 1], c[2, 2])
+        estimate[b, 7] = atan2(-c[2, 0], hypot(c[2, 1], c[2, 2]))
+        estimate[b, 8] = atan2(c[1, 0], c[0, 0])
+        spread[b, 0], spread[b, 1], spread[b, 2], spread[b, 3] = P[0, 0], P[0, 1], P[1, 1], P[8, 8]

@@ -1,0 +1,78 @@
+"""The planned tracks of many voyages, as lines of points."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.geometry.earth import principal_radii, relative_position
+from simnav.scenario import Scenario
+from simnav.types import Array
+from simnav.world import Vessel, World
+
+__all__ = ["Routes"]
+
+
+class Routes:
+    """The tracks that the manoeuvres of n voyages plan; one for all where nothing is drawn.
+
+    Parameters
+    ----------
+    n : int
+
+    Attributes
+    ----------
+    of : (n,) int array
+        Which track is each voyage's.
+    length : (r,) int array
+        Points of each track.
+    points : (r, p, 4) array
+        North and east of the start [m], heading [rad], speed through the water [m/s].
+    geodetic : (r, p, 4) array
+        Latitude, longitude [rad], and metres per radian of both.
+    course, along : (r, p) array
+        Course of the track [rad], and the distance from its start [m].
+    """
+
+    def __init__(self, n: int):
+        self._n = n
+        self.of, self.length = np.zeros(n, np.int64), np.zeros(0, np.int64)
+        self.points, self.geodetic = np.zeros((0, 0, 4)), np.zeros((0, 0, 4))
+        self.course, self.along = np.zeros((0, 0)), np.zeros((0, 0))
+        self._kept = ""
+
+    def put(self, b: int, template: Scenario, drawn: Scenario) -> None:
+        """Plan the track of a voyage, from its scenario before and after what is drawn."""
+        shared = not template.distributions
+        self.of[b] = 0 if shared else b
+        if shared and self._kept == (key := template.content_hash()):
+            return
+        self._kept = key if shared else ""
+        assert drawn.start is not None
+        track = World.plan(drawn.start, drawn.vessel or Vessel(), drawn.manoeuvres, drawn.current)
+        track.reach(drawn.duration)
+        keep = np.concatenate([[True], np.hypot(*np.diff(track.points[:, :2], axis=0).T) > 0.05])
+        position, points = track.position[keep], track.points[keep]
+        steps = relative_position(position[1:], position[:-1])[:, :2]
+        course = np.arctan2(steps[:, 1], steps[:, 0])
+        course = np.append(course, course[-1:]) if len(steps) else np.array([track.points[0, 2]])
+        meridian, prime_vertical = principal_radii(position[:, 0])
+        north, east = meridian + position[:, 2], (prime_vertical + position[:, 2]) * np.cos(position[:, 0])
+        r, k = int(self.of[b]), len(points)
+        rows = 1 if shared else self._n
+        if rows > len(self.length) or k > self.points.shape[1]:
+            p = max(k, self.points.shape[1])
+            self.length = np.pad(self.length, (0, rows - len(self.length)))
+            self.points, self.geodetic = (_room(a, rows, p) for a in (self.points, self.geodetic))
+            self.course, self.along = (_room(a, rows, p) for a in (self.course, self.along))
+        self.length[r], self.points[r, :k], self.course[r, :k] = k, points, course
+        self.geodetic[r, :k] = np.stack([position[:, 0], position[:, 1], north, east], axis=1)
+        self.along[r, :k] = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+
+
+def _room(array: Array, rows: int, points: int) -> Array:
+    """The array with room for so many tracks of so many points."""
+    shape = (rows, points, *array.shape[2:])
+    new: NDArray[np.float64] = np.zeros(shape)
+    new[: array.shape[0], : array.shape[1]] = array
+    return new

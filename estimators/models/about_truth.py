@@ -1,0 +1,322 @@
+"""An inertial error model that is linearised about the truth, with a state for each error that the simulator draws.
+
+It is the model of the oracles. The bound that they are to attain is that of the problem linearised about the truth, so
+an oracle must not lose anything by linearising elsewhere: with a heading that is wrong by a radian an extended Kalman
+filter does, and may diverge.
+
+The state is a **nominal** trajectory, and the error vector y (estimate minus nominal). The nominal one starts each
+step of the run at the truth, and follows the IMU's samples, as measured, to the end of the step. Within a step it
+leaves the truth by millimetres. With Phi, H and the innovation r at the nominal trajectory::
+
+    y(t + dt) = Phi y(t),    y += nominal minus truth  (where a step begins),    innovation = r - H y
+
+So the estimate, nominal plus y, is that of a linear Kalman filter, however large y is. What the samples' errors add is
+in the difference between the nominal trajectory and the truth at the end of a step. Where the truth is not known (NaN
+in a recorded log) the estimate itself is the next nominal state, as in an extended Kalman filter.
+
+Other than `simnav.estimators.models.inertial`, which stands for some errors by simpler ones, it has a state for
+
+- the turn-on bias beside the in-run bias, of the IMU and of each aid
+- scale factors and misalignments of the IMU: they act as a bias in proportion to the rate or force, as measured
+- the scale factor of each velocity and depth, the misalignment of a DVL, the deviation of a magnetic compass
+
+The water's velocity is taken as known where it is given. A speed log then measures the velocity over the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from math import atan2, hypot, remainder, tau
+from typing import NamedTuple
+
+import numpy as np
+
+from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.models.inertial import CURRENT, CURRENT_TIME, InertialModel
+from simnav.estimators.models.propagation import correct_inertial
+from simnav.geometry.earth import principal_radii
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.kinds import BODY_VELOCITY, DEPTH, WATER_SPEED
+from simnav.types import (
+    Array,
+    Datasheet,
+    Estimate,
+    ImuSamples,
+    InitialState,
+    Instruments,
+    Measurement,
+    NavigationStates,
+    TriadDatasheet,
+)
+
+__all__ = ["AboutTruthModel"]
+
+_NAV, _INERTIAL = 9, 15
+#: In-run biases of the IMU that change faster than this are white noise [s], as in `InertialModel`.
+_SHORTEST = 1.0
+#: Times closer than this are one and the same [s].
+_SAME = 1e-6
+#: Three less the trace of a rotation matrix that is a vector product to third order: an angle of 3 mrad.
+_SMALL = 1e-5
+
+
+class _ImuError(NamedTuple):
+    """A state that acts as a bias of one axis of the IMU (0 to 5), times what axis ``times`` measures (-1: times 1)."""
+
+    axis: int
+    times: int
+
+
+class _AidErrors(NamedTuple):
+    """Places of an aid's states in y; -1 or empty where it has none. ``bias`` holds (component, place)."""
+
+    bias: list[tuple[int, int]]
+    scale: int
+    misalignment: int
+    deviation: int
+
+
+class AboutTruthModel(ErrorModel):
+    """The model of the module.
+
+    Parameters
+    ----------
+    truth : NavigationStates
+        The n true states at the start of the run and at the ends of all steps.
+    water : (n, 3) array, optional
+        Velocity of the water at these times, north-east-down [m/s]. None: not known; the current along the keel is a
+        state of each speed log.
+    """
+
+    def __init__(self, truth: NavigationStates, water: Array | None = None):
+        self.truth, self.water = truth, water
+        self._known = np.all(np.isfinite(np.hstack([truth.position, truth.velocity, truth.attitude])), axis=1)
+        self._dcm = dcm_from_rpy(truth.attitude)
+        meridian, prime = principal_radii(truth.position[:, 0])
+        height = truth.position[:, 2]
+        #: Metres a radian to the north and to the east, and a metre of height down.
+        self._metres = np.stack(
+            [meridian + height, (prime + height) * np.cos(truth.position[:, 0]), -np.ones(len(truth))], axis=1
+        )
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; UnsuitableScenario without an IMU."""
+        self._states: list[tuple[float, float, float]] = []  # initial variance, decay, noise density
+        self._imu_errors: list[_ImuError] = []
+        self._aids: dict[str, _AidErrors] = {}
+        imu = instruments.imu
+        if imu is not None:
+            triads = [self._triad(t, first) for t, first in ((imu.gyroscope, 0), (imu.accelerometer, 3))]
+            imu = replace(imu, gyroscope=triads[0], accelerometer=triads[1])
+        sheets = [self._aid(sheet) for sheet in instruments.values()]
+        self.nominal = InertialModel()
+        own = self.nominal.begin(start, Instruments(sheets, imu, instruments.step))
+        self.sheets, self.time = instruments, start.time
+        n = self.size = _INERTIAL + len(self._states)
+        variance, rate, density = np.array(self._states).reshape(-1, 3).T
+        covariance = np.zeros((n, n))
+        covariance[:_INERTIAL, :_INERTIAL] = own[:_INERTIAL, :_INERTIAL]
+        covariance[range(_INERTIAL, n), range(_INERTIAL, n)] = variance
+        self._rate, self._density = rate, density
+        self._unused = np.zeros_like(own)
+        self._axes = np.array([_NAV + e.axis for e in self._imu_errors], dtype=np.intp)
+        self._times = np.array([e.times for e in self._imu_errors], dtype=np.intp)
+        self.transition = np.eye(n)
+        self.y = np.zeros(n)
+        self._integral: tuple[Array, Array] | None = None
+        self._anchor()
+        return covariance
+
+    def _state(self, variance: float, decay: float = 0.0, noise: float = 0.0) -> int:
+        self._states.append((variance, decay, noise))
+        return _INERTIAL + len(self._states) - 1
+
+    def _several(self, sigmas: Iterable[float]) -> int:
+        """Constant states; the place of the first."""
+        first = _INERTIAL + len(self._states)
+        for sigma in sigmas:
+            self._state(float(sigma) ** 2)
+        return first
+
+    def _triad(self, triad: TriadDatasheet, first: int) -> TriadDatasheet:
+        """Make the states of a triad; return its datasheet with what is left for the inertial model."""
+        moving = triad.bias_instability > 0.0 and np.isfinite(triad.correlation_time)
+        if moving and triad.correlation_time >= _SHORTEST and (triad.bias or triad.rate_random_walk):
+            for axis in range(first, first + 3):
+                self._imu(_ImuError(axis, -1), triad.bias**2, triad.rate_random_walk**2)
+            triad = replace(triad, bias=0.0, rate_random_walk=0.0)
+        for axis in range(first, first + 3):
+            for other in range(first, first + 3):
+                sigma = triad.scale if other == axis else triad.misalignment
+                if sigma > 0.0:
+                    self._imu(_ImuError(axis, other), sigma**2)
+        return replace(triad, scale=0.0, misalignment=0.0)
+
+    def _imu(self, error: _ImuError, variance: float, noise: float = 0.0) -> None:
+        assert len(self._imu_errors) == len(self._states)  # they come first
+        self._state(variance, 0.0, noise)
+        self._imu_errors.append(error)
+
+    def _aid(self, sheet: Datasheet) -> Datasheet:
+        """Make the states of an aid; return its datasheet with what is left for the inertial model."""
+        bias = [(i, self._state(b * b)) for i, b in enumerate(sheet.bias.tolist()) if b]
+        time = sheet.correlation_time
+        fast = time < 0.5 / sheet.rate
+        if not fast:
+            for i, s in enumerate(sheet.bias_instability.tolist()):
+                if s and np.isfinite(time):
+                    bias.append((i, self._state(s * s, 1.0 / time, 2.0 * s * s / time)))
+                elif s:
+                    bias.append((i, self._state(0.0, 0.0, s * s)))
+        if sheet.equation == WATER_SPEED and self.water is None:
+            bias.append((0, self._state(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME)))
+        scale = misalignment = deviation = -1
+        if sheet.equation in (BODY_VELOCITY, WATER_SPEED, DEPTH) and sheet.scale:
+            scale = self._state(sheet.scale**2)
+        if sheet.equation == BODY_VELOCITY and np.any(sheet.misalignment):
+            misalignment = self._several(sheet.misalignment)
+        amplitude = float(sheet.details.get("deviation", 0.0))
+        if amplitude:
+            deviation = self._several([amplitude, amplitude])
+        self._aids[sheet.name] = _AidErrors(bias, scale, misalignment, deviation)
+        none = np.zeros_like(sheet.bias)
+        white = sheet.bias_instability if fast else none
+        return replace(sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3))
+
+    def _anchor(self) -> None:
+        """Where a step begins: go on from the truth; where it is not known, from the estimate."""
+        k = min(int(np.searchsorted(self.truth.time, self.time - _SAME)), len(self.truth) - 1)
+        nominal, y = self.nominal, self.y
+        if abs(self.truth.time[k] - self.time) > _SAME:
+            return
+        if not self._known[k]:
+            position, velocity, dcm = self._navigation()
+            y[:_NAV] = 0.0
+        else:
+            position, velocity, dcm = self.truth.position[k], self.truth.velocity[k], self._dcm[k]
+            off = nominal.position - position
+            off[1] = remainder(off[1], tau)
+            y[:3] += off * self._metres[k]
+            y[3:6] += nominal.velocity - velocity
+            turn = nominal.dcm @ dcm.T
+            if turn[0, 0] + turn[1, 1] + turn[2, 2] < 3.0 - _SMALL:
+                y[6:9] += rotation_vector_from_dcm(turn)
+            else:
+                y[6:9] += 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        nominal.position[:], nominal.velocity[:], nominal.dcm[:] = position, velocity, dcm
+
+    def _navigation(self) -> tuple[Array, Array, Array]:
+        """Position, velocity and attitude matrix of the estimate."""
+        nominal = self.nominal
+        position, velocity, dcm = nominal.position.copy(), nominal.velocity.copy(), nominal.dcm.copy()
+        correct_inertial(position, velocity, dcm, np.empty(6), np.empty(0), np.ascontiguousarray(self.y[:_INERTIAL]))
+        return position, velocity, dcm
+
+    def observes(self, instrument: Datasheet) -> bool:
+        """As the inertial model."""
+        return self.nominal.observes(instrument)
+
+    def load(self, imu: ImuSamples | None) -> None:
+        """Take the IMU samples of the step that follows."""
+        self._anchor()
+        self.nominal.load(imu)
+        self._integral = None
+        if imu is not None and len(imu) and any(e.times >= 0 for e in self._imu_errors):
+            increments = np.hstack([imu.angular_rate, imu.specific_force]) * imu.interval[:, None]
+            total = np.vstack([np.zeros(6), np.cumsum(increments, axis=0)])
+            self._integral = np.concatenate([[imu.time[0] - imu.interval[0]], imu.time]), total
+
+    def _measured(self, first: float, last: float) -> Array:
+        """(6,) mean of the IMU's samples over a stretch of the step."""
+        if self._integral is None:
+            return np.zeros(6)
+        time, total = self._integral
+        k = np.clip(np.searchsorted(time, (first, last)), 1, len(time) - 1)
+        share = np.clip((np.array([first, last]) - time[k - 1]) / (time[k] - time[k - 1]), 0.0, 1.0)
+        begin, end = total[k - 1] + share[:, None] * (total[k] - total[k - 1])
+        mean: Array = (end - begin) / (last - first)
+        return mean
+
+    def propagate(self, covariance: Array, until: float) -> None:
+        """Advance the state and its covariance."""
+        elapsed = until - self.time
+        if elapsed <= 0.0:
+            return
+        self._unused[:] = 0.0
+        self.nominal.propagate(self._unused, until)
+        phi, m = self.transition, _INERTIAL
+        phi[:m, :m] = self.nominal.transition
+        index = np.arange(m, self.size)
+        decay = np.exp(-self._rate * elapsed)
+        phi[index, index] = decay
+        if self._imu_errors:
+            measured = self._measured(self.time, until)
+            factor = np.append(measured, 1.0)[self._times]  # -1, for a bias, is the last
+            phi[:_NAV, m : m + len(factor)] = factor * phi[:_NAV, self._axes]
+        noise = self._density * elapsed
+        moving = self._rate > 0.0
+        noise[moving] = self._density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * self._rate[moving])
+        covariance[:] = phi @ covariance @ phi.T
+        covariance[:m, :m] += self.nominal.process_noise
+        covariance[index, index] += noise
+        covariance[:] = 0.5 * (covariance + covariance.T)
+        self.y = phi @ self.y
+        self.time = until
+
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an error, or several in columns, through the last propagation, in place."""
+        error[:] = self.transition @ error
+
+    def measure(self, measurement: Measurement) -> Linearised | None:
+        """Linearise one measurement at the nominal state."""
+        own = self.nominal.measure(measurement)
+        if own is None:
+            return None
+        d, m = len(own.innovation), _INERTIAL
+        innovation, jacobian = own.innovation.copy(), np.zeros((d, self.size))
+        jacobian[:, :m] = own.jacobian[:, :m]
+        for k, error in enumerate(self._imu_errors):
+            if error.times < 0:
+                jacobian[:, m + k] = own.jacobian[:, _NAV + error.axis]
+        sheet, errors = self.sheets[measurement.instrument], self._aids[measurement.instrument]
+        for component, at in errors.bias:
+            jacobian[component, at] = 1.0
+        if sheet.equation in (BODY_VELOCITY, WATER_SPEED, DEPTH):
+            u = measurement.value - innovation  # what it should read
+            if sheet.equation == WATER_SPEED and self.water is not None:
+                forward = self.nominal.dcm[:, 0]
+                water = np.array([np.interp(measurement.time, self.truth.time, w) for w in self.water.T])
+                along = forward @ water
+                u, innovation = u - along, innovation + along
+                jacobian[0, 6:9] -= np.cross(forward, water)
+            if errors.scale >= 0:
+                jacobian[:, errors.scale] = u
+            if errors.misalignment >= 0:
+                at = errors.misalignment
+                jacobian[:, at : at + 3] = [[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]]
+        if errors.deviation >= 0:
+            heading = np.arctan2(self.nominal.dcm[1, 0], self.nominal.dcm[0, 0])
+            jacobian[0, errors.deviation : errors.deviation + 2] = np.sin(heading), np.cos(heading)
+        return Linearised(innovation - jacobian @ self.y, jacobian, own.noise)
+
+    def correct(self, dx: Array) -> None:
+        """Add a correction to the state."""
+        self.y += dx
+
+    def snapshot(self) -> list[Array]:
+        """Copies of what `correct` changes, and of the nominal state that it is an error of."""
+        nominal = self.nominal
+        return [self.y.copy(), nominal.position.copy(), nominal.velocity.copy(), nominal.dcm.copy()]
+
+    def restore(self, snapshot: list[Array]) -> None:
+        """Take corrections back."""
+        self.y[:] = snapshot[0]
+        self.nominal.position[:], self.nominal.velocity[:], self.nominal.dcm[:] = snapshot[1:]
+
+    def estimate(self, covariance: Array) -> Estimate:
+        """The state as an estimate, all nine components."""
+        position, velocity, c = self._navigation()
+        c20, c21, c22 = float(c[2, 0]), float(c[2, 1]), float(c[2, 2])
+        attitude = np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(c[1, 0]), float(c[0, 0]))])
+        return Estimate(self.time, position, velocity, attitude, covariance[:_NAV, :_NAV].copy())

@@ -1,0 +1,220 @@
+"""What an episode hands out: steps of a run as padded arrays, from a block or made step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.compiled import kernel
+from simnav.geometry.earth import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS
+from simnav.types import KINDS, Array
+
+if TYPE_CHECKING:
+    from simnav.recording import AidStream, Block
+    from simnav.steps import SteppedRuns
+
+__all__ = ["LiveStretch", "Stretch", "horizontal", "pack", "rows_of"]
+
+_ON = np.ones(1, np.bool_)
+
+
+@dataclass(eq=False)
+class Stretch:
+    """S steps of a run as padded arrays, ready to be handed out row by row.
+
+    Attributes
+    ----------
+    intervals : (S, 2) array
+        Begin and end of each step [s].
+    columns : dict of str to dict of str to (S, K, ...) array
+        The entries of each instrument.
+    truth : (S, 3, 3) array
+        Rows position, velocity, attitude.
+    rows : list of list of float
+        Of each step that was made: latitude, longitude, height, metres per radian of latitude and of longitude,
+        heading.
+    aids : dict of str to AidStream
+        The streams that the steps were cut from.
+    cuts : dict of str to (S + 1,) int array
+        Bounds of each step's measurements in them.
+    """
+
+    intervals: Array
+    columns: dict[str, dict[str, NDArray[Any]]]
+    truth: Array
+    rows: list[list[float]]
+    aids: dict[str, AidStream]
+    cuts: dict[str, NDArray[np.intp]]
+
+    def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
+        """The positions that were delivered in a step, and which of them a fault has touched."""
+        for name, stream in self.aids.items():
+            if KINDS[stream.kind].role == "fix":
+                cut = slice(*self.cuts[name][i : i + 2])
+                yield stream.value[cut, :2], stream.faults[cut] != 0
+
+
+@kernel("i8(i8, i8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], i8, f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])")
+def _place(count, who, when, value, place, most, row, time, valid, values):  # type: ignore[no-untyped-def]
+    """Put the measurements of one step into a row of padded arrays; -1, or the instrument that has too many.
+
+    Parameters
+    ----------
+    count, who, when, value
+        As of `simnav.steps.SteppedRuns`, of one run.
+    place, most : (i,) int arrays
+        Of each of its instruments: its number in the padded arrays, and room for so many a step.
+    row : int
+    time, valid, values : (S, A, K), (S, A, K), (S, A, K, 3) arrays
+    """
+    for j in range(count):
+        i = who[j]
+        a = place[i]
+        k = 0
+        while k < most[i] and valid[row, a, k]:
+            k += 1
+        if k == most[i]:
+            return i
+        time[row, a, k], valid[row, a, k] = when[j], 1
+        for c in range(3):
+            values[row, a, k, c] = value[j, c]
+    return -1
+
+
+class LiveStretch(Stretch):
+    """A stretch that is filled as the run goes on, for a vessel that is steered."""
+
+    #: Most steps.
+    LENGTH = 64
+
+    def __init__(self, runs: SteppedRuns, most: Mapping[str, int], widths: Mapping[str, int]):
+        s, imu = self.LENGTH, int(most.get("imu", 0))
+        names = [name for name in most if name != "imu"]
+        room = max((most[name] for name in names), default=0)
+        time, values = np.zeros((s, len(names), room)), np.zeros((s, len(names), room, 3))
+        valid = np.zeros((s, len(names), room), np.int8)
+        columns: dict[str, dict[str, NDArray[Any]]] = {}
+        if imu:
+            columns["imu"] = {
+                "time": np.zeros((s, imu)), "valid": np.zeros((s, imu), np.int8), "length": np.zeros((s, imu)),
+                "angular_rate": np.zeros((s, imu, 3)), "specific_force": np.zeros((s, imu, 3)),
+            }  # fmt: skip
+        for a, name in enumerate(names):
+            k, d = most[name], widths[name]
+            columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
+        super().__init__(np.zeros((s, 2)), columns, np.zeros((s, 3, 3)), [], {}, {})
+        own = runs.names[0]
+        self._runs = runs
+        self._arrays = (time, valid, values)
+        self._place = np.array([names.index(name) for name in own], np.int64)
+        self._most = np.array([most[name] for name in own], np.int64)
+
+    def advance(self) -> None:
+        """Make the next step.
+
+        Raises
+        ------
+        ValueError
+            If an instrument delivers more than its datasheet says.
+        """
+        runs, i = self._runs, len(self.rows)
+        runs.advance(_ON)
+        self.intervals[i] = runs.interval_of(0)
+        self.truth[i] = runs.truth[0].reshape(3, 3)
+        self.rows.extend(rows_of(self.truth[i : i + 1, 0], self.truth[i : i + 1, 2]))
+        if "imu" in self.columns:
+            n, imu = int(runs.samples[0]), self.columns["imu"]
+            imu["time"][i, :n], imu["length"][i, :n] = runs.imu_time[0, :n], runs.imu_interval[0, :n]
+            imu["angular_rate"][i, :n], imu["specific_force"][i, :n] = runs.rate[0, :n], runs.force[0, :n]
+            imu["valid"][i, :n] = 1
+        many = _place(
+            runs.count[0], runs.who[0], runs.when[0], runs.value[0], self._place, self._most, i, *self._arrays
+        )
+        if many >= 0:
+            raise ValueError(
+                f"{runs.names[0][many]} delivered more than {self._most[many]} samples in one step at "
+                f"{self.intervals[i, 1]:.3f} s, which is what its datasheet's rate allows"
+            )
+
+    def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
+        """See `Stretch.fixes`; of the last step that was made."""
+        runs = self._runs
+        for j, who in enumerate(runs.who[0, : runs.count[0]].tolist()):
+            if KINDS[runs.kinds[0][who]].role == "fix":
+                yield runs.value[0, j : j + 1, :2].copy(), runs.faults[0, j : j + 1] != 0
+
+
+def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
+    """Sort the data of a block into its steps, the first of which begins at ``begin``."""
+    truth, n = block.truth, len(block.truth)
+    edges = truth.time + 0.5e-6  # as `simnav.recording.packets`
+    columns: dict[str, dict[str, NDArray[Any]]] = {}
+    cuts: dict[str, NDArray[np.intp]] = {}
+    parts: dict[str, tuple[Array, dict[str, Array]]] = {}
+    if block.imu is not None:
+        imu = block.imu
+        parts["imu"] = (
+            imu.time,
+            {
+                "time": imu.time,
+                "length": imu.interval,
+                "angular_rate": imu.angular_rate,
+                "specific_force": imu.specific_force,
+            },
+        )
+    parts |= {name: (s.time, {"time": s.time, "value": s.value}) for name, s in block.aids.items()}
+    for name, (time, arrays) in parts.items():
+        cuts[name] = cut = np.concatenate(([0], np.searchsorted(time, edges, side="right")))
+        counts, k = np.diff(cut), most[name]
+        if (counts == k).all():  # the usual case needs no copy
+            columns[name] = {key: a[: n * k].reshape(n, k, *a.shape[1:]) for key, a in arrays.items()}
+            columns[name]["valid"] = np.ones((n, k), np.int8)
+            continue
+        if counts.max() > k:
+            raise ValueError(
+                f"{name} delivered {counts.max()} samples in one step at {truth.time[counts.argmax()]:.3f} s, its "
+                f"datasheet's rate allows {k}"
+            )
+        row = np.repeat(np.arange(n), counts)
+        where = row, np.arange(cut[-1]) - cut[row]
+        arrays["valid"] = np.ones(len(time), np.int8)
+        columns[name] = {}
+        for key, a in arrays.items():
+            columns[name][key] = out = np.zeros((n, k, *a.shape[1:]), a.dtype)
+            out[where] = a[: cut[-1]]
+    intervals = np.stack([np.concatenate(([begin], truth.time[:-1])), truth.time], axis=1)
+    states = np.stack([truth.position, truth.velocity, truth.attitude], axis=1)
+    return Stretch(intervals, columns, states, rows_of(truth.position, truth.attitude), block.aids, cuts)
+
+
+@kernel("void(f8[:, :], f8[:, :], f8[:, ::1])")
+def _rows(position, attitude, out):  # type: ignore[no-untyped-def]
+    for i in range(out.shape[0]):
+        s, height = np.sin(position[i, 0]), position[i, 2]
+        if height != height:  # a log may have no reference of it
+            height = 0.0
+        x = 1.0 - ECCENTRICITY_SQUARED * (s * s)
+        prime_vertical = SEMI_MAJOR_AXIS / np.sqrt(x)
+        meridian = prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x
+        out[i, 0], out[i, 1], out[i, 2] = position[i, 0], position[i, 1], position[i, 2]
+        out[i, 3], out[i, 4] = meridian + height, (prime_vertical + height) * np.cos(position[i, 0])
+        out[i, 5] = attitude[i, 2]
+
+
+def rows_of(position: Array, attitude: Array) -> list[list[float]]:
+    """Per state: latitude, longitude, height, metres per radian of latitude and of longitude, and heading."""
+    out = np.empty((len(position), 6))
+    _rows(position, attitude, out)
+    rows: list[list[float]] = out.tolist()
+    return rows
+
+
+def horizontal(estimate: list[float], row: list[float]) -> tuple[float, float]:
+    """North and east error [m] (as `simnav.geometry.earth.relative_position`, in plain floats: once a step)."""
+    east = math.remainder(estimate[1] - row[1], math.tau)
+    return (estimate[0] - row[0]) * row[3], east * row[4]

@@ -1,0 +1,202 @@
+"""One step of the instruments and faults of many runs: the kernels of `simnav.steps`."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.kinds import add_error_scalar
+from simnav.sensors.faults.fault import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
+from simnav.sensors.imu import triad_errors
+from simnav.sensors.observation import noise_scalar, observe_one
+
+__all__ = ["HELD", "UNTOUCHED", "sense", "sense_imu"]
+
+#: Of a layer that repeats values: the last one and whether there is one; interval and value that is repeated.
+LAST, HAS_LAST, NUMBER, VALUE = 0, 3, 4, 5
+HELD = 8
+#: Interval of a measurement that is none of a layer's.
+UNTOUCHED = -2
+
+
+@kernel(
+    "void(b1[::1], i8[::1], i8[::1], f8[:, :, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, :, ::1], "
+    "f8[:, :, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1], b1[:, :, ::1], f8[:, :, :, ::1], f8[:, ::1], "
+    "f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])"
+)
+def sense_imu(  # type: ignore[no-untyped-def]
+    active, at, samples, matrix, bias, triads, residual, variates, instability, walk, tables, disturbed, disturbance,
+    clock, imu_time, imu_interval, rate, force,
+):  # fmt: skip
+    """Errors and disturbances of the IMUs of many runs, over one step each.
+
+    Parameters
+    ----------
+    active : (b,) bool array
+        Which runs.
+    at, samples : (b,) int arrays
+        Number of the step in the stretch that was drawn ahead, and samples a step.
+    matrix, bias, triads, residual : (b, 2, ...) arrays
+        Gyroscopes and accelerometers, as `simnav.sensors.imu.triad_errors` takes them; ``triads``: density of the white
+        noise, range, quantization, and points a second of both tables.
+    variates : (b, 2, s, 3) array
+        Of the samples of the stretch.
+    instability, walk : (b, 2, k, 3) arrays
+        Tables of the biases.
+    tables : (b, 2, 4) int array
+        Length and first grid point of both tables.
+    disturbed, disturbance : (b, d, s), (b, d, s, 6) arrays
+        What d disturbances do to the samples of the stretch.
+    clock : (b, 2) array
+        Number of the sample before the stretch, and samples a second.
+    imu_time, imu_interval, rate, force : (b, ...) arrays
+        Times and intervals are overwritten; the ideal samples become what the IMU delivers.
+    """
+    for b in range(active.size):
+        if not active[b]:
+            continue
+        n = samples[b]
+        begin = at[b] * n
+        for i in range(n):
+            imu_time[b, i] = (clock[b, 0] + begin + i + 1) / clock[b, 1]
+            imu_interval[b, i] = 1.0 / clock[b, 1]
+        for t in range(2):
+            out = rate[b, :n] if t == 0 else force[b, :n]
+            q, table = triads[b, t], tables[b, t]
+            triad_errors(
+                out, variates[b, t, begin : begin + n], out, imu_time[b, :n], imu_interval[b, :n], q[0], matrix[b, t],
+                bias[b, t], instability[b, t, : table[0]], table[1], q[3], walk[b, t, : table[2]], table[3], q[4],
+                q[1], q[2], residual[b, t],
+            )  # fmt: skip
+        for d in range(disturbed.shape[1]):
+            for i in range(n):
+                if disturbed[b, d, begin + i]:
+                    for j in range(3):
+                        rate[b, i, j] += disturbance[b, d, begin + i, j]
+                        force[b, i, j] += disturbance[b, d, begin + i, 3 + j]
+
+
+@kernel(
+    "void(b1[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], "
+    "i8[:, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1], f8[:, :, ::1], i8[::1], i8[:, :, ::1], f8[:, :, :, ::1], "
+    "f8[:, :, :, ::1], i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], u4[:, ::1], f8[:, ::1])"
+)
+def sense(  # type: ignore[no-untyped-def]
+    active, first, last, tap_time, taps, owner, error, white, interval, fault, layout, numbers,
+    layers, operations, sizes, held, count, who, when, value, faults, truth,
+):  # fmt: skip
+    """What the aiding instruments of many runs deliver in one step each, faults included.
+
+    Parameters
+    ----------
+    active : (b,) bool array
+        Which runs.
+    first, last : (b,) int arrays
+        Of each run, the samples of the step, within the stretch that was drawn ahead.
+    tap_time : (b, s) array
+        Times of the samples of the stretch [s].
+    taps : (b, m, 14) array
+        True states at the samples of the step.
+    owner : (b, s) int array
+        Number of the instrument of each sample; -1: the end of a step.
+    error, white : (b, s, 3) arrays
+        Biases and unit variates of each sample.
+    interval : (b, s, k) int array
+        Of each layer of faults: number of the interval that a sample lies in; -1: none, -2: it is none of the layer's.
+    fault : (b, s, k, 3) array
+        What each layer has drawn for it.
+    layout : (b, i, 4) int array
+        Of each instrument: what it observes, components, and those of `simnav.kinds.Kind.layout`.
+    numbers : (b, i, 24) array
+        As of `simnav.sensors.observation.observe_one`.
+    layers : (b,) int array
+        How many layers of faults.
+    operations : (b, k, 3) int array
+        What each does (`simnav.sensors.faults.fault.ADDS`, ...), its first bit, and whether each interval has its own.
+    sizes : (b, i, k, 4) array
+        Of layers that step the noise: the new sigma of an instrument, or the factor on its sigma where that is not 0.
+    held : (b, i, k, 8) array
+        State of layers that repeat values.
+    count, who, when, value, faults : (b, ...) arrays
+        What is delivered: as of `simnav.steps.SteppedRuns`; overwritten.
+    truth : (b, 9) array
+        Likewise.
+    """
+    state = np.zeros(15)
+    reading, wrong, sigma = np.empty(3), np.empty(3), np.empty(3)
+    for b in range(active.size):
+        if not active[b]:
+            continue
+        delivered = 0
+        for t in range(first[b], last[b]):
+            tap = taps[b, t - first[b]]
+            i = owner[b, t]
+            if i < 0:
+                for j in range(9):
+                    truth[b, j] = tap[j]
+                continue
+            for j in range(14):
+                state[j] = tap[j]
+            d, positions, cyclic = layout[b, i, 1], layout[b, i, 2], layout[b, i, 3]
+            there = observe_one(layout[b, i, 0], numbers[b, i], state, reading)
+            for j in range(d):
+                sigma[j] = noise_scalar(numbers[b, i], reading, j)
+                wrong[j] = error[b, t, j] + sigma[j] * white[b, t, j]
+            if not there:
+                continue
+            add_error_scalar(positions, cyclic, reading[:d], wrong[:d])
+            label = 0
+            for k in range(layers[b]):
+                number, what = interval[b, t, k], operations[b, k, 0]
+                if number == UNTOUCHED:
+                    continue
+                touched = number >= 0
+                if what == HOLDS:
+                    touched = _hold(held[b, i, k], number, reading, d)
+                elif what == DROPS:
+                    if touched:
+                        there = False
+                        break
+                elif what == ZEROES:
+                    if touched:
+                        for j in range(d):
+                            reading[j] = 0.0
+                elif touched:
+                    touched = False
+                    for j in range(d):
+                        wrong[j] = fault[b, t, k, j]
+                        touched = touched or wrong[j] != 0.0
+                    if touched and what == STEPS_NOISE:
+                        for j in range(d):
+                            new = sizes[b, i, k, 3] * sigma[j]
+                            if sizes[b, i, k, 3] == 0.0:
+                                new = max(sigma[j], sizes[b, i, k, j])
+                            wrong[j] *= sqrt(new * new - sigma[j] * sigma[j])
+                            sigma[j] = new
+                    if touched and what in (ADDS, STEPS_NOISE):
+                        add_error_scalar(positions, cyclic, reading[:d], wrong[:d])
+                if touched:
+                    label |= 1 << (operations[b, k, 1] + (number if operations[b, k, 2] else 0))
+            if there:
+                who[b, delivered], when[b, delivered], faults[b, delivered] = i, tap_time[b, t], label
+                for j in range(3):
+                    value[b, delivered, j] = reading[j] if j < d else 0.0
+                delivered += 1
+        count[b] = delivered
+
+
+@kernel()
+def _hold(held, number, reading, d):  # type: ignore[no-untyped-def]
+    """Repeat, within an interval, what was delivered before it (or else first within); whether it does."""
+    if number >= 0 and held[NUMBER] != number + 1.0:
+        held[NUMBER] = number + 1.0
+        for j in range(d):
+            held[VALUE + j] = held[LAST + j] if held[HAS_LAST] > 0.0 else reading[j]
+    for j in range(d):
+        held[LAST + j] = reading[j]
+        if number >= 0:
+            reading[j] = held[VALUE + j]
+    held[HAS_LAST] = 1.0
+    return number >= 0

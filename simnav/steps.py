@@ -1,0 +1,324 @@
+"""Runs that go step by step, many of them at once: world, instruments and faults in compiled passes over shared arrays.
+
+What instruments and faults draw depends on the times alone. It is drawn a stretch of steps ahead, with the classes of
+the block form (`simnav.simulator.Simulator.advance`), from the same streams, in the same order. What depends on where
+the vessel goes is left to two kernels, `simnav.world.motion.advance` and `sense`, which go through all runs. The
+numbers are those of the block form, bit for bit, and a step costs no more than its arithmetic.
+
+An instrument or a fault of others, of which no more is known than how it makes a block, is asked for a block of one
+step.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.recording import packets
+from simnav.sensors.faults.fault import DISTURBS_IMU, STEPS_NOISE, FaultLayer
+from simnav.sensors.observation import CompiledInstrument
+from simnav.sensors.stepwise import HELD, UNTOUCHED, sense, sense_imu
+from simnav.simulator import TIME_TOLERANCE, Simulator
+from simnav.types import ImuSamples, Measurement, Measurements
+from simnav.world import motion
+
+__all__ = ["SteppedRuns"]
+
+#: Steps that are drawn ahead: so many at first, then twice as many each time.
+FIRST_STRETCH, LONGEST_STRETCH = 4, 64
+
+
+class SteppedRuns:
+    """n runs, each advanced by one step at a time.
+
+    Parameters
+    ----------
+    n : int
+
+    Attributes
+    ----------
+    simulators : list of Simulator
+        Of each run; its world may be steered.
+    x : (n, 59) array
+        States of the worlds (`simnav.world.motion`).
+    step : (n,) int array
+        Steps so far.
+    truth : (n, 9) array
+        Position, velocity, roll, pitch and yaw at the end of the last step.
+    count : (n,) int array
+        Measurements of the last step; of the k-th of run b: ``who[b, k]``, number of its instrument among
+        ``names[b]``; ``when[b, k]`` [s]; ``value[b, k]``; ``faults[b, k]``, its label.
+    samples : (n,) int array
+        IMU samples of the last step: ``imu_time[b]``, ``imu_interval[b]``, ``rate[b]``, ``force[b]``.
+    """
+
+    def __init__(self, n: int):
+        self.n = n
+        self.simulators: list[Simulator | None] = [None] * n
+        self.names: list[list[str]] = [[] for _ in range(n)]
+        self.kinds: list[list[str]] = [[] for _ in range(n)]
+        self.step, self.truth = np.zeros(n, np.int64), np.zeros((n, 9))
+        self.samples, self.count = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        self._compiled, self._stretch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
+        self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # within the stretch, and its steps
+        self._imu = np.zeros(n, np.bool_)
+        self._taps = np.zeros((n, 1, motion.TAP_COLUMNS))
+        self._layers = np.zeros(n, np.int64)
+        self._room(8)
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> NDArray[Any]:
+            """The shared arrays are attributes, made by `_grown`."""
+
+    # ------------------------------------------------------------------------------------------- runs
+
+    def begin(self, b: int, simulator: Simulator) -> None:
+        """Put a run that has not been advanced into a place."""
+        self.simulators[b] = simulator
+        self.step[b] = self._at[b] = self._end[b] = self.count[b] = self.samples[b] = 0
+        self._stretch[b] = FIRST_STRETCH
+        aids = simulator.aids
+        self.names[b], self.kinds[b] = list(aids), [a.kind for a in aids.values()]
+        layers = [layer for layer in simulator.layers if layer.operation != DISTURBS_IMU]
+        self._imu[b] = simulator.imu is not None
+        known = all(isinstance(a, CompiledInstrument) for a in aids.values()) and all(
+            layer.operation is not None for layer in simulator.layers
+        )
+        self._compiled[b] = known
+        state = simulator.initial_truth
+        self.truth[b] = np.concatenate([state.position[0], state.velocity[0], state.attitude[0]])
+        for name, array in simulator.world.hand_over().items():
+            self._put(name, b, array)
+        if known:
+            self._put_instruments(b, simulator, layers)
+        simulator.world.live_in(self.x[b], self.index[b])
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        for b, simulator in enumerate(self.simulators):  # a copy has lost what it shares with the worlds
+            if simulator is not None:
+                simulator.world.live_in(self.x[b], self.index[b])
+
+    def _put(self, name: str, b: int, value: Any) -> None:
+        """Store an array of run b; where there is no room for it, all runs get more."""
+        value = np.asarray(value)
+        array = self._grown(name, value.shape, value.dtype)
+        place: Any = (b, *(slice(0, m) for m in value.shape))
+        array[place] = value
+
+    def _grown(self, name: str, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+        """An array with room for so many numbers of each run, and what was in it."""
+        arrays = self.__dict__
+        old: NDArray[Any] | None = arrays.get(name)
+        if old is None:
+            old = arrays[name] = np.zeros((self.n, *shape), dtype)
+        if any(m > c for m, c in zip(shape, old.shape[1:], strict=True)):
+            most = tuple(max(m, c) for m, c in zip(shape, old.shape[1:], strict=True))
+            new = np.zeros((self.n, *most), old.dtype)
+            new[tuple(slice(0, m) for m in old.shape)] = old
+            old = arrays[name] = new
+        return old
+
+    def _put_instruments(self, b: int, simulator: Simulator, layers: list[FaultLayer]) -> None:
+        aids = list(simulator.aids.values())
+        i, k = len(aids), len(layers)
+        numbers, layout, sizes = np.zeros((i, 24)), np.zeros((i, 4), np.int64), np.zeros((i, k, 4))
+        for a, aid in enumerate(aids):
+            assert isinstance(aid, CompiledInstrument)
+            numbers[a] = aid.numbers
+            layout[a] = aid.code, len(aid.sigma), *aid.definition.layout
+            for j, layer in enumerate(layers):
+                if layer.operation == STEPS_NOISE and layer.touches_kind(aid.name, aid.kind):
+                    factor: float | None = layer.spec.factor  # type: ignore[attr-defined]
+                    sizes[a, j, 3] = 0.0 if factor is None else factor
+                    if factor is None:
+                        sizes[a, j, : layout[a, 1]] = layer.spec.size("sigma", aid.kind)
+        operation = [(layer.operation, layer.index, bool(layer.spec.intervals)) for layer in layers]
+        self._layers[b] = k
+        self._put("operations", b, np.array(operation, np.int64).reshape(k, 3))
+        for name, value in (("numbers", numbers), ("layout", layout), ("sizes_of_noise", sizes)):
+            self._put(name, b, value)
+        self._put("held", b, np.zeros((i, k, HELD)))
+        self.held[b] = 0.0
+        imu = simulator.imu
+        if imu is not None:
+            triads = [imu.gyroscope, imu.accelerometer]
+            self._put("matrix", b, np.stack([t.matrix for t in triads]))
+            self._put("bias", b, np.stack([t.bias for t in triads]))
+            self._put("residual", b, np.stack([t.residual for t in triads]))
+            self._put("triads", b, np.array([
+                [t.density, t.range, t.step, t.instability.per_second, t.walk.per_second, 0.0, 0.0, 0.0] for t in triads
+            ]))  # fmt: skip
+
+    # ------------------------------------------------------------------------------------------- steps
+
+    def advance(self, active: NDArray[np.bool_]) -> None:
+        """Advance some runs by one step each."""
+        compiled = active & self._compiled
+        for b in np.flatnonzero(active & ~self._compiled).tolist():
+            self._block(b)
+        if not compiled.any():
+            return
+        for b in np.flatnonzero(compiled & (self._at >= self._end)).tolist():
+            self._draw(b)
+        every = np.arange(self.n)
+        first, last = self.edge[every, self._at], self.edge[every, self._at + 1]
+        most = int((last - first).max())
+        if most > self._taps.shape[1]:
+            self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
+        self.samples[compiled] = self.samples_a_step[compiled]
+        motion.advance(
+            compiled, self.x, self.index, self.p, self.sizes, self.rows, self.points, self.phase, self.table,
+            self.eddies, self.tap_time, first, last, self._taps, self.samples, self.rate, self.force,
+        )  # fmt: skip
+        inertial = compiled & self._imu
+        if inertial.any():
+            sense_imu(
+                inertial, self._at, self.samples, self.matrix, self.bias, self.triads, self.residual, self.variates,
+                self.instability, self.walk, self.tables, self.disturbed, self.disturbance, self.clock,
+                self.imu_time, self.imu_interval, self.rate, self.force,
+            )  # fmt: skip
+        sense(
+            compiled, first, last, self.tap_time, self._taps, self.owner, self.error, self.white, self.interval,
+            self.fault, self.layout, self.numbers, self._layers, self.operations, self.sizes_of_noise, self.held,
+            self.count, self.who, self.when, self.value, self.faults, self.truth,
+        )  # fmt: skip
+        self._at[compiled] += 1
+        self.step[compiled] += 1
+
+    def interval_of(self, b: int) -> tuple[float, float]:
+        """Begin and end of the last step of a run [s]."""
+        simulator, k = self.simulators[b], int(self.step[b])
+        assert simulator is not None
+        rate = 1.0 / simulator.step  # as `simnav.simulator.sample_times`
+        return simulator.step + (k - 2) / rate if k > 1 else 0.0, simulator.step + (k - 1) / rate
+
+    def packet(self, b: int) -> Measurements:
+        """What the instruments of a run delivered in the last step; the arrays are its own."""
+        simulator, n = self.simulators[b], int(self.samples[b])
+        assert simulator is not None
+        imu = None
+        if self._imu[b]:
+            arrays = (self.imu_time, self.imu_interval, self.rate, self.force)
+            imu = ImuSamples(*(a[b, :n].copy() for a in arrays))
+        widths = [len(a.definition.components) for a in simulator.aids.values()]
+        aids = [
+            Measurement(
+                self.when[b, j].item(), self.names[b][i], self.kinds[b][i], self.value[b, j, : widths[i]].copy()
+            )
+            for j, i in enumerate(self.who[b, : self.count[b]].tolist())
+        ]
+        return Measurements(*self.interval_of(b), imu, aids)
+
+    def _draw(self, b: int) -> None:
+        """Draw what instruments and faults of a run draw for the next stretch of steps."""
+        simulator = self.simulators[b]
+        assert simulator is not None
+        steps, begun = int(self._stretch[b]), int(self.step[b])
+        self._stretch[b] = min(2 * steps, LONGEST_STRETCH)
+        self._at[b], self._end[b] = 0, steps
+        ends = np.arange(begun + 1, begun + steps + 1) * simulator.step
+        start = begun * simulator.step
+        times, owners, at = [], [], []
+        for i, spec in enumerate([*simulator.scenario.aids.values(), None]):
+            rate, phase = (1.0 / simulator.step, simulator.step) if spec is None else (spec.rate, spec.phase)
+            # As `simnav.simulator.sample_times` of each step.
+            first = max(0, int(np.floor((start - phase + TIME_TOLERANCE) * rate)) + 1)
+            last = np.maximum(np.floor((ends - phase + TIME_TOLERANCE) * rate), first - 1)
+            number = np.arange(first, int(last[-1]) + 1)
+            times.append(phase + number / rate)
+            at.append(np.searchsorted(last, number))
+            owners.append(np.full(len(number), -1 if spec is None else i))
+        time, owner, step = np.concatenate(times), np.concatenate(owners), np.concatenate(at)
+        order = np.lexsort((time, step))  # stable: ties keep the scenario's order of instruments
+        edge = np.searchsorted(step[order], np.arange(steps + 1))
+        self._room(int(np.diff(edge).max()))
+        self._put("edge", b, edge)
+        self._put("tap_time", b, time[order])
+        self._put("owner", b, owner[order])
+        n, layers = len(time), [layer for layer in simulator.layers if layer.operation != DISTURBS_IMU]
+        error, white = np.zeros((n, 3)), np.zeros((n, 3))
+        interval, fault = np.full((n, len(layers)), UNTOUCHED, np.int64), np.zeros((n, len(layers), 3))
+        begin = 0
+        for own, aid in zip(times, simulator.aids.values(), strict=False):
+            part = slice(begin, begin + len(own))
+            begin += len(own)
+            d = len(aid.sigma)
+            error[part, :d], white[part, :d] = aid.ahead(own)
+            for j, layer in enumerate(layers):
+                if layer.touches_kind(aid.name, aid.kind):
+                    interval[part, j], fault[part, j, :d] = layer.ahead(aid.name, aid.kind, own)
+        for name, value in (("error", error), ("white", white), ("interval", interval), ("fault", fault)):
+            self._put(name, b, value[order])
+        self._draw_imu(b, simulator, steps, begun)
+
+    def _draw_imu(self, b: int, simulator: Simulator, steps: int, begun: int) -> None:
+        rate = simulator.world.rate
+        samples = round(rate * simulator.step)
+        self._put("samples_a_step", b, samples)
+        first, n = begun * samples, steps * samples
+        for name in ("imu_time", "imu_interval"):
+            self._put(name, b, np.zeros(samples))
+        for name in ("rate", "force"):
+            self._put(name, b, np.zeros((samples, 3)))
+        imu = simulator.imu
+        if imu is None:
+            return
+        time = np.arange(first + 1, first + n + 1) / rate
+        triads: list[Any] = [t.ahead(n, float(time[-1])) for t in (imu.gyroscope, imu.accelerometer)]
+        self._put("clock", b, np.array([first, rate]))
+        self._put("variates", b, np.stack([t[0] for t in triads]))
+        for k, name in ((1, "instability"), (3, "walk")):
+            longest = max(len(t[k]) for t in triads)
+            table = np.zeros((2, longest, 3))
+            for t in range(2):
+                table[t, : len(triads[t][k])] = triads[t][k]
+            self._put(name, b, table)
+        self._put("tables", b, np.array([[len(t[1]), t[2], len(t[3]), t[4]] for t in triads]))
+        found = [layer.ahead_imu(time) for layer in simulator.layers if layer.operation == DISTURBS_IMU]
+        active = np.stack([f[0] for f in found]) if found else np.zeros((0, n), np.bool_)
+        errors = np.stack([f[1] for f in found]) if found else np.zeros((0, n, 6))
+        self._put("disturbed", b, active)
+        self._put("disturbance", b, errors)
+        self.disturbed[b, len(found) :] = False
+
+    def _room(self, most: int) -> None:
+        """Make room for so many measurements of a step."""
+        self._grown("who", (most,), np.int64)
+        self._grown("when", (most,), np.float64)
+        self._grown("value", (most, 3), np.float64)
+        self._grown("faults", (most,), np.uint32)
+
+    def _block(self, b: int) -> None:
+        """A step of a run of which only blocks are known."""
+        simulator = self.simulators[b]
+        assert simulator is not None
+        k = int(self.step[b]) + 1
+        block = simulator.advance(min(k * simulator.step, simulator.duration))
+        self.step[b] = k
+        truth = block.truth
+        self.truth[b] = np.concatenate([truth.position[-1], truth.velocity[-1], truth.attitude[-1]])
+        (packet,) = packets(block, truth.time)
+        self.samples[b] = 0
+        if packet.imu is not None:
+            imu = packet.imu
+            self.samples[b] = len(imu)
+            for name, array in (
+                ("imu_time", imu.time), ("imu_interval", imu.interval), ("rate", imu.angular_rate),
+                ("force", imu.specific_force),
+            ):  # fmt: skip
+                self._put(name, b, array)
+        self.count[b] = n = len(packet.aids)
+        self._room(n)
+        value, faults = np.zeros((n, 3)), np.zeros(n, np.uint32)
+        for j, m in enumerate(packet.aids):
+            value[j, : len(m.value)] = m.value
+            stream = block.aids[m.instrument]
+            faults[j] = stream.faults[int(np.searchsorted(stream.time, m.time))]
+        self._put("who", b, np.array([self.names[b].index(m.instrument) for m in packet.aids], np.int64))
+        self._put("when", b, np.array([m.time for m in packet.aids]))
+        self._put("value", b, value)
+        self._put("faults", b, faults)
