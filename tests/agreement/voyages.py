@@ -220,7 +220,9 @@ def _table(arguments: argparse.Namespace) -> None:
         if not some:
             continue
         print(f"\ninitial heading known to {low:g} to {high:g} deg, {len(some)} voyages")
-        print(f"{'estimator':30s} median    p90     max  (voyage)  NEES > {LARGEST_NEES:g}  silent  not ok  ms an epoch")
+        print(
+            f"{'estimator':30s} median    p90     max  (voyage)  NEES > {LARGEST_NEES:g}  silent  not ok  ms an epoch"
+        )
         for name in some[0]["errors"]:
             ratios, numbers, high_nees, silent, failed, cost = [], [], 0, 0, 0, []
             for r in some:
