@@ -192,6 +192,10 @@ class Row(Estimator):
         for flag in ("slow", "reference"):
             if flag not in vars(cls):
                 setattr(cls, flag, getattr(solver.make, flag, False))
+        if "real_time_as" not in vars(cls):  # a smoother alone changes nothing in real time
+            parent = cls.__mro__[1]
+            only = set(given) == {"smoother"} and "smoother" not in getattr(parent, "recipe", {})
+            cls.real_time_as = getattr(parent, "name", "") if only else ""
         _equip(cls)
 
     @property

@@ -13,12 +13,12 @@ Computing in Applied Probability 1, 1999.
 from __future__ import annotations
 
 import argparse
+from importlib.metadata import version
 
 import numpy as np
 
-from simnav.environment.seeds import FIRST_TRAINING_SEED
 from simnav.estimators.learning.features import observation_names
-from simnav.estimators.learning.policy import Policy
+from simnav.estimators.learning.policy import Policy, record_of_training
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
 FAMILY = "training-gnss-faults"
@@ -59,8 +59,8 @@ def train(*, generations=25, population=64, repeats=3, voyages=64, length=None, 
     shape = envs.single_action_space.shape[0], len(SEEN) + 1
     rng = np.random.default_rng(seed)
     mean, deviation, curve = np.zeros(shape), np.full(shape, 0.3), []
-    told = {"scenario": FAMILY, "voyages": voyages, "first_seed": FIRST_TRAINING_SEED, "seed": seed}
-    told |= {"algorithm": "cross-entropy method, linear policy", "steps": 0}
+    how = {"algorithm": "cross-entropy method, linear policy", "versions": {"simnav": version("simnav")}, "steps": 0}
+    told = record_of_training(envs.options.scenario, voyages, seed=seed, **how)
     for generation in range(generations):
         weights = mean + deviation * rng.standard_normal((population, *shape))
         weights[0] = mean

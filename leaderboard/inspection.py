@@ -34,6 +34,7 @@ def rescore(
     scores: str | Iterable[str] = (),
     *,
     scenarios: Scenarios = None,
+    key: str | os.PathLike[str] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> Rescored:
     """Compute scores again from the trials that a campaign kept; no estimator runs.
@@ -46,6 +47,8 @@ def rescore(
         Keys of `simnav.scoring.SCORES`; default: all, those of plug-ins too.
     scenarios : scenarios, optional
         That are not in the catalogue.
+    key : path, optional
+        File of the key, where the seeds are sealed.
     progress : callable, optional
         Called with how many of how many runs are done, and ``note=`` the last.
 
@@ -54,12 +57,16 @@ def rescore(
     Rescored
     """
     from simnav.leaderboard.campaign.rescoring import rescore_results
+    from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.results.store import StoreError
 
     names = scores.split(",") if isinstance(scores, str) else scores
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
-        return rescore_results(absolute(results), [n.strip() for n in names if n.strip()], given, progress)
+        return rescore_results(
+            absolute(results), [n.strip() for n in names if n.strip()], given, progress,
+            seal=None if key is None else read_seal(key),
+        )  # fmt: skip
 
 
 def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str]) -> list[Result]:

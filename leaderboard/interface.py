@@ -334,6 +334,7 @@ def campaign(
     shard: tuple[int, int] = (1, 1),
     confinement: str = "auto",
     sealed: str | os.PathLike[str] | None = None,
+    oracle: bool = True,
     minutes: float | None = None,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
@@ -368,6 +369,8 @@ def campaign(
         that works here.
     sealed : path, optional
         File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
+    oracle : bool
+        Run the oracles on simulated scenarios, too: what is best there, not ranked.
     minutes : float, optional
         Time after which no further run is started. The same call continues.
 
@@ -377,6 +380,7 @@ def campaign(
         Of all that is in the folder.
     """
     from simnav.leaderboard.campaign.campaign import RUNS, combined
+    from simnav.leaderboard.campaign.oracles import beside_oracles
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.profiles import load
     from simnav.leaderboard.ranking.ranking import rank
@@ -391,11 +395,12 @@ def campaign(
     for wanted, those, count in parts:
         chosen, everyone = scenarios_of(wanted, optional=profile is not None), requests(those, parameters)
         tracks |= {s.id: s.track for s in chosen}
-        summaries.append(_run(chosen, everyone, range(seed, seed + count), folder, workers, time_limit, memory_limit,
-                              progress, retry=retry, keep_trials=keep_trials,
-                              covariance_interval=covariance_interval, confinement=confinement, seal=seal,
-                              backend=backend, scheduler=scheduler, shard=shard,
-                              minutes=_left(minutes, began)))  # fmt: skip
+        for some, beside in beside_oracles(chosen, everyone) if oracle else [(chosen, everyone)]:
+            summaries.append(_run(some, beside, range(seed, seed + count), folder, workers, time_limit, memory_limit,
+                                  progress, retry=retry, keep_trials=keep_trials,
+                                  covariance_interval=covariance_interval, confinement=confinement, seal=seal,
+                                  backend=backend, scheduler=scheduler, shard=shard,
+                                  minutes=_left(minutes, began)))  # fmt: skip
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks=tracks), combined(summaries))
 

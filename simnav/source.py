@@ -11,7 +11,7 @@ from simnav.types import InitialState, Instruments, NavigationStates
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["Source", "open_source", "record"]
+__all__ = ["Source", "free_memory", "open_source", "record"]
 
 
 class Source(Protocol):
@@ -125,7 +125,7 @@ def check_cost(scenario: Scenario) -> None:
     costs = {"step_s": _EPOCH * scenario.epochs}
     for name, spec in scenario.instruments.items():
         costs[f"instruments.{name}.rate_hz = {spec.rate:g}"] = _SAMPLE * spec.rate * scenario.duration
-    needed, free = sum(costs.values()), _free_memory()
+    needed, free = sum(costs.values()), free_memory()
     if needed > free:
         key = max(costs, key=lambda k: costs[k])
         raise SpecError(
@@ -138,7 +138,7 @@ def check_cost(scenario: Scenario) -> None:
 _EPOCH, _SAMPLE = 300.0, 150.0
 
 
-def _free_memory() -> float:
+def free_memory() -> float:
     """Memory that a process can have now [bytes]; 64 GiB where it is not known."""
     with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/meminfo") as file:
         for line in file:

@@ -268,16 +268,16 @@ class SteppedRuns:
         if imu is None:
             return
         time = np.arange(first + 1, first + n + 1) / rate
-        triads: list[Any] = [t.ahead(n, float(time[-1])) for t in (imu.gyroscope, imu.accelerometer)]
+        variates = self._grown("variates", (2, n, 3), np.float64)
+        both = (imu.gyroscope, imu.accelerometer)
+        triads: list[Any] = [t.ahead(variates[b, i, :n], float(time[-1])) for i, t in enumerate(both)]
         self._put("clock", b, np.array([first, rate]))
-        self._put("variates", b, np.stack([t[0] for t in triads]))
-        for k, name in ((1, "instability"), (3, "walk")):
-            longest = max(len(t[k]) for t in triads)
-            table = np.zeros((2, longest, 3))
-            for t in range(2):
-                table[t, : len(triads[t][k])] = triads[t][k]
+        for k, name in ((0, "instability"), (2, "walk")):
+            table = np.zeros((2, max(len(t[k]) for t in triads), 3))
+            for i in range(2):
+                table[i, : len(triads[i][k])] = triads[i][k]
             self._put(name, b, table)
-        self._put("tables", b, np.array([[len(t[1]), t[2], len(t[3]), t[4]] for t in triads]))
+        self._put("tables", b, np.array([[len(t[0]), t[1], len(t[2]), t[3]] for t in triads]))
         found = [layer.ahead_imu(time) for layer in simulator.layers if layer.operation == DISTURBS_IMU]
         active = np.stack([f[0] for f in found]) if found else np.zeros((0, n), np.bool_)
         errors = np.stack([f[1] for f in found]) if found else np.zeros((0, n, 6))

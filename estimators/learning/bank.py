@@ -14,12 +14,10 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
 
-__all__ = ["MEMORY_COLUMNS", "REWARDS", "observe", "reward", "set_scales", "take"]
+__all__ = ["MEMORY_COLUMNS", "observe", "set_scales", "take"]
 
 #: Of each instrument: four fading means, time of the last measurement, logarithm of the scale over the largest.
 MEMORY_COLUMNS = 6
-#: Codes of the rewards (`reward`).
-REWARDS = {"error": 0, "likelihood": 1, "labels": 2, "improvement": 3}
 
 
 @kernel("void(f8[:, ::1], f8, f8[:, ::1], f8[:, :, ::1], f8[::1])")
@@ -288,74 +286,3 @@ def take(  # type: ignore[no-untyped-def]
                             d[r] += correct[r]
                 for r in range(n):
                     d[r] -= correction[e, r]
-
-
-@kernel(
-    "void(i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[::1], i8[::1], b1[::1], i8[::1], b1[::1], "
-    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
-)
-def reward(  # type: ignore[no-untyped-def]
-    code, error, oracle, action, first, last, instrument, size, faulty, place, active, scale, covariance, delta, rewards
-):
-    """What each filter's step was worth; 0 where the truth is not known.
-
-    Parameters
-    ----------
-    code : int
-        Of `REWARDS`; what they are is in `simnav.estimators.learning.tasks`.
-    error : (b, 9) array
-        Of the plain filter at the end of the step: estimate minus truth.
-    oracle : (b, 2) array
-        The oracle's horizontal error and its horizontal sigma [m].
-    action : (b, 7) array
-        Corrections: north, east, down [m], the same of the velocity [m/s], heading [rad].
-    first, last, instrument, size, place, active, scale, covariance, delta
-        As of `take`.
-    faulty : (e,) bool array
-        Which measurements a fault has touched.
-    rewards : (b,) array
-        Overwritten.
-    """
-    counts = np.empty(scale.shape[1], np.int64)
-    for b in range(first.size):
-        rewards[b] = 0.0
-        if not active[b]:
-            continue
-        north, east = error[b, 0] + delta[b, 0], error[b, 1] + delta[b, 1]
-        value = 0.0
-        if code == 0:
-            square = oracle[b, 1] * oracle[b, 1]
-            value = -0.5 * log((north * north + east * east + square) / (oracle[b, 0] * oracle[b, 0] + square))
-        elif code == 1:
-            p, q, r = covariance[b, 0, 0], covariance[b, 0, 1], covariance[b, 1, 1]
-            determinant = p * r - q * q
-            square = (r * north * north - 2.0 * q * north * east + p * east * east) / determinant
-            value = -0.5 * (square + log(determinant))
-        elif code == 2:
-            counts[:] = 0
-            for e in range(first[b], last[b]):
-                at = place[instrument[e]] if size[e] > 0 else -1
-                if at < 0:
-                    continue
-                out = scale[b, at, min(counts[at], scale.shape[2] - 1)] <= 0.0
-                counts[at] += 1
-                if faulty[e]:
-                    value += 1.0 if out else -1.0
-                elif out:
-                    value -= 1.0
-        else:
-            before, after = 0.0, 0.0
-            for i in range(3):
-                x, y = error[b, i], error[b, 3 + i]
-                if x == x:
-                    before += x * x
-                    after += (x + action[b, i]) ** 2
-                if y == y:
-                    before += 100.0 * y * y
-                    after += 100.0 * (y + action[b, 3 + i]) ** 2
-            x = error[b, 8]
-            if x == x:
-                before += 2500.0 * x * x
-                after += 2500.0 * (x + action[b, 6]) ** 2
-            value = sqrt(before) - sqrt(after)
-        rewards[b] = value if value == value else 0.0

@@ -148,6 +148,7 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
         what = f"the actions of {self.num_envs} agents in {self.task_name} are"
         array = checked_actions(array, (self.num_envs, *self._action_shape), what)
         rewards, terminated, truncated, infos = self._decide(array, active)
+        infos = _of(infos, active)
         ended = active & (terminated | truncated)
         self._over |= ended
         if mode == AutoresetMode.NEXT_STEP and over.any():
@@ -156,8 +157,9 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
             final = np.full(self.num_envs, None, dtype=object)
             for i in np.flatnonzero(ended).tolist():
                 final[i] = self._observations()[i].copy()
-            last = {"final_obs": final, "_final_obs": ended.copy(), "final_info": infos, "_final_info": ended.copy()}
-            infos = {**infos, **last, **self._begin(ended, None)}
+            last: dict[str, Any] = {"final_obs": final, "_final_obs": ended.copy()}
+            last |= {"final_info": _of(infos, ended), "_final_info": ended.copy()}
+            infos = {**_of(infos, ~ended), **last, **self._begin(ended, None)}
         elif mode == AutoresetMode.DISABLED:
             truncated = truncated | (over & ~terminated)
         return self._observations().copy(), rewards, terminated, truncated, infos
@@ -172,3 +174,12 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
         self._begun = True
         self._look(mask)
         return infos
+
+
+def _of(infos: dict[str, Any], mask: Flags) -> dict[str, Any]:
+    """The infos of some voyages; what none of them has is left out."""
+    part: dict[str, Any] = {}
+    for key, value in infos.items():
+        if not key.startswith("_") and (there := infos[f"_{key}"] & mask).any():
+            part |= {key: value, f"_{key}": there}
+    return part

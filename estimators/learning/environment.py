@@ -25,6 +25,7 @@ from simnav.environment.rendering import Chart
 from simnav.environment.seeds import training_seed
 from simnav.estimators.learning.features import LIMIT, Numbers
 from simnav.estimators.learning.filters import Filters, checked_actions, layout_of_scenario
+from simnav.estimators.learning.rewards import NEED_ORACLE
 from simnav.estimators.learning.tasks import TASKS, Task
 from simnav.estimators.learning.voyage import Voyage
 from simnav.geometry.earth import displace
@@ -89,7 +90,7 @@ class TaskOptions:
     @property
     def oracle(self) -> bool:
         """Whether the oracle has to come along."""
-        return self.reward == "error" or self.reveal_truth
+        return self.reward in NEED_ORACLE or self.reveal_truth
 
 
 def run_seed(seed: int | None, rng: np.random.Generator, voyages: int | None) -> int:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.environment.navigation import most_samples
-from simnav.estimators.learning.bank import MEMORY_COLUMNS, REWARDS, observe, reward, take
+from simnav.estimators.learning.bank import MEMORY_COLUMNS, observe, take
 from simnav.estimators.learning.features import observation_size
 from simnav.estimators.learning.reference import Linear, ReferenceFilter
+from simnav.estimators.learning.rewards import REWARDS, reward
 from simnav.estimators.learning.tasks import Decision, Task
 from simnav.scenario import Scenario
 from simnav.types import Array, InitialState, Instruments
@@ -179,7 +180,7 @@ class Filters:
         self, linear: Linear, first: NDArray[np.int64], last: NDArray[np.int64], active: NDArray[np.bool_],
         error: Array, oracle: Array, faulty: NDArray[np.bool_],
     ) -> Array:  # fmt: skip
-        """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.bank.reward`."""
+        """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.rewards.reward`."""
         decision = self.decision
         reward(
             self._code, error, oracle, decision.correction, first, last, linear.instrument, linear.size, faulty,

@@ -15,16 +15,39 @@ from typing import Any
 
 import numpy as np
 
-from simnav.environment.seeds import require_disjoint
+from simnav.environment.seeds import FIRST_TRAINING_SEED, require_disjoint, training_seed
 from simnav.estimators.learning.features import Numbers, observation_size
 from simnav.estimators.learning.filters import Layout
 from simnav.estimators.learning.tasks import CORRECTIONS, TASKS
+from simnav.scenario import Scenario, load
 from simnav.types import Array
 
-__all__ = ["FORMAT", "Policy", "PolicyError"]
+__all__ = ["FORMAT", "Policy", "PolicyError", "record_of_training"]
 
 #: Of the files; raised when they change.
-FORMAT = 1
+FORMAT = 2
+
+
+def record_of_training(scenario: Scenario | str, voyages: int, **more: Any) -> dict[str, Any]:
+    """What a policy tells of its training on the training voyages 0, 1, ... of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario or str
+    voyages : int
+        How many.
+    **more
+        What else people should know, in plain values: ``algorithm``, ``steps``, ``seed``, ``versions``.
+
+    Returns
+    -------
+    dict
+        Also ``first_seed`` of the voyages, and ``streams``: first and last of the numbers that their random streams
+        start from (`simnav.scenario.Scenario.root`).
+    """
+    found = load(scenario) if isinstance(scenario, str) else scenario
+    streams = [found.root(training_seed(0)), found.root(training_seed(voyages - 1))]
+    return {"scenario": found.id, "voyages": voyages, "first_seed": FIRST_TRAINING_SEED, "streams": streams, **more}
 
 
 class PolicyError(ValueError):
@@ -47,7 +70,7 @@ class Policy:
     instruments : str
         As of `simnav.estimators.learning.environment.TaskOptions`.
     trained_on : mapping
-        What it learned from: ``scenario``, ``voyages``, ``steps``, ``algorithm``; read by people.
+        What it learned from, as of `record_of_training`.
     mean, deviation : (o,) array, optional
         The observation is taken less the mean, over the deviation; by default as it is.
     version : int, optional
@@ -85,6 +108,7 @@ class Policy:
         self.layers = [(np.array(w, dtype=np.float64), np.array(b, dtype=np.float64)) for w, b in layers]
         self.task, self.kinds, self.most, self.instruments = task, list(kinds), int(most), instruments
         self.trained_on, self.source = dict(trained_on), source
+        self.learned_from = _learned_from(self.trained_on, source)
         if not self.layers:
             raise PolicyError(f"{source}: it has no layers")
         size = self.layers[0][0].shape[1] if self.layers[0][0].ndim == 2 else -1
@@ -135,9 +159,9 @@ class Policy:
             )
 
     def require_unseen(self, seeds: Sequence[int]) -> None:
-        """Refuse to be scored on what it learned from: ValueError."""
-        first, count = self.trained_on.get("first_seed", 0), self.trained_on.get("voyages", 0)
-        require_disjoint(range(int(first), int(first) + int(count)), seeds)
+        """Refuse to be scored on the seeds of the voyages that it learned from: ValueError."""
+        first, count = self.trained_on["first_seed"], self.trained_on["voyages"]
+        require_disjoint(range(first, first + count), seeds)
 
     def save(self, path: str | Path) -> None:
         """Write the file."""
@@ -179,3 +203,15 @@ class Policy:
             raise
         except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
             raise PolicyError(f"{path}: not a policy of simnav, or damaged ({error})") from None
+
+
+def _learned_from(told: Mapping[str, Any], source: str) -> list[tuple[int, int]]:
+    """First and last number of the runs that were learned from; PolicyError where that is not told."""
+    streams = told.get("streams")
+    numbers = [told.get("first_seed"), told.get("voyages"), *(streams if isinstance(streams, list) else [])]
+    if len(numbers) != 4 or not all(type(n) is int and n >= 0 for n in numbers) or numbers[2] > numbers[3]:
+        raise PolicyError(
+            f"{source}: trained_on should tell first_seed, voyages and streams (first and last) of the voyages that it "
+            f"learned from, as record_of_training gives them; it is {dict(told)!r}"
+        )
+    return [(numbers[2], numbers[3])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,11 @@ class PolicyEstimator(Estimator):
     def needs(self) -> Needs:
         """What the plain filter needs, and an instrument of each kind that the policy is asked about."""
         return (*Suitable().needs, *self.policy.kinds)
+
+    @property
+    def learned_from(self) -> Sequence[tuple[int, int]]:
+        """The training voyages, as its file tells them."""
+        return self.policy.learned_from
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where an instrument is lacking.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from simnav.estimators.learning.environment import TaskOptions
 from simnav.estimators.learning.reference import Linear
 from simnav.estimators.learning.voyage import Prepared, prepare
-from simnav.types import Array, InitialState
+from simnav.types import Array, InitialState, Instruments
 
 __all__ = ["Pool"]
 
@@ -37,6 +37,8 @@ class Pool:
     faulty : (e,) bool array
     start : list of InitialState
         What a navigator is told at the start of each.
+    instruments : list of Instruments
+        The datasheets of each.
     n : int
         States of the filter.
     """
@@ -79,10 +81,11 @@ class Pool:
         self.faulty = np.zeros(c * self._room, np.bool_)
         self.edges, self.length = np.zeros((c, s + 1), np.int64), np.zeros(c, np.int64)
         self.end, self.context = np.zeros((c, s)), np.zeros((c, s, voyage.context.shape[1]))
-        self.error, self.oracle = np.zeros((c, s, 9)), np.zeros((c, s, 2))
+        self.error, self.oracle = np.zeros((c, s, 9)), np.zeros((c, s, 3))
         self.covariance = np.zeros((c, self.n, self.n))
         self.period = np.ones((c, len(o.layout.names)))
         self.start: list[InitialState | None] = [None] * c
+        self.instruments: list[Instruments | None] = [None] * c
 
     def _put(self, at: int, voyage: Prepared) -> None:
         events, steps = len(voyage.faulty), len(voyage.end)
@@ -106,7 +109,7 @@ class Pool:
         self.covariance[at] = 0.0
         self.covariance[at, :small, :small] = voyage.start_covariance
         self.period[at] = self.options.layout.periods(voyage.instruments)
-        self.start[at] = voyage.start
+        self.start[at], self.instruments[at] = voyage.start, voyage.instruments
 
     def rows(self, array: Array, slots: NDArray[np.int64], steps: NDArray[np.int64]) -> Array:
         """Of each of b filters: the numbers of its voyage at its step."""

@@ -9,6 +9,7 @@ from simnav.geometry.earth import principal_radii, relative_position
 from simnav.scenario import Scenario
 from simnav.types import Array
 from simnav.world import Vessel, World
+from simnav.world.track import PlannedTrack
 
 __all__ = ["Routes"]
 
@@ -39,18 +40,14 @@ class Routes:
         self.of, self.length = np.zeros(n, np.int64), np.zeros(0, np.int64)
         self.points, self.geodetic = np.zeros((0, 0, 4)), np.zeros((0, 0, 4))
         self.course, self.along = np.zeros((0, 0)), np.zeros((0, 0))
-        self._kept = ""
 
     def put(self, b: int, template: Scenario, drawn: Scenario) -> None:
         """Plan the track of a voyage, from its scenario before and after what is drawn."""
         shared = not template.distributions
         self.of[b] = 0 if shared else b
-        if shared and self._kept == (key := template.content_hash()):
+        if shared and len(self.length):
             return
-        self._kept = key if shared else ""
-        assert drawn.start is not None
-        track = World.plan(drawn.start, drawn.vessel or Vessel(), drawn.manoeuvres, drawn.current)
-        track.reach(drawn.duration)
+        track = _planned(drawn)
         keep = np.concatenate([[True], np.hypot(*np.diff(track.points[:, :2], axis=0).T) > 0.05])
         position, points = track.position[keep], track.points[keep]
         steps = relative_position(position[1:], position[:-1])[:, :2]
@@ -68,6 +65,22 @@ class Routes:
         self.length[r], self.points[r, :k], self.course[r, :k] = k, points, course
         self.geodetic[r, :k] = np.stack([position[:, 0], position[:, 1], north, east], axis=1)
         self.along[r, :k] = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+
+
+_tracks: dict[str, PlannedTrack] = {}
+
+
+def _planned(scenario: Scenario) -> PlannedTrack:
+    """The track that the manoeuvres plan; the last ones are kept, since that of half a day takes half a second."""
+    assert scenario.start is not None
+    told = scenario.start, scenario.vessel or Vessel(), scenario.manoeuvres, scenario.current
+    key = repr((told, scenario.duration))
+    if key not in _tracks:
+        if len(_tracks) > 4:
+            _tracks.pop(next(iter(_tracks)))
+        _tracks[key] = track = World.plan(*told)
+        track.reach(scenario.duration)
+    return _tracks[key]
 
 
 def _room(array: Array, rows: int, points: int) -> Array:

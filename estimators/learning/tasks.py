@@ -5,9 +5,10 @@ task             action                                      reward
 ================ =========================================== ==========================================================
 ``Tuning``       k + 1 numbers in [-1, 1]: logarithms of the ``"error"``: ``-ln((e^2 + s^2) / (o^2 + s^2)) / 2``, e and
                  factors on each instrument's sigma and on   o the horizontal errors of the filter and the oracle, s
-                 the process noise's, over ln 30. 0: as the  the oracle's sigma; ``"likelihood"``: the logarithm of the
-                 datasheet says                              density that the filter gave to the true position [1/m^2],
-                                                             but for the constant
+                 the process noise's, over ln 30. 0: as the  the oracle's sigma; ``"gain"``: relative to the plain
+                 datasheet says                              filter, where errors are large; ``"likelihood"``: the
+                                                             logarithm of the density that the filter gave to the true
+                                                             position [1/m^2], but for the constant
 ``Detection``    k K bits: the j-th measurement of a step by ``"labels"``: +1 for each fault that is found, -1 for each
                  the i-th instrument is faulty               that is not, -1 for each false alarm
 ``Correction``   7 numbers in [-1, 1]: what is added to the  ``"improvement"``: how much the error becomes less [m];
@@ -89,7 +90,7 @@ class Tuning(Task):
     """How noisy each instrument is, and the motion of the vessel."""
 
     name = "Tuning"
-    rewards = ("error", "likelihood")
+    rewards = ("error", "gain", "likelihood")
 
     def action_space(self) -> spaces.Box:
         """``Box(-1, 1, (k + 1,), float32)``."""

@@ -70,7 +70,7 @@ class FilterTaskVectorEnv(VoyagesVectorEnv):
             self._filters = Filters(o.task, o.layout, o.reward, self.num_envs, pool.n)
         self._slots[i], self._k[i] = slot, 0
         self._filters.begin(i, pool.covariance[slot], pool.period[slot])
-        return {"seed": seed, "start": pool.start[slot]}
+        return {"seed": seed, "start": pool.start[slot], "instruments": pool.instruments[slot]}
 
     def _look(self, mask: Flags) -> None:
         if not mask.any():

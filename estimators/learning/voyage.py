@@ -62,8 +62,9 @@ class Voyage:
     error : (9,) array
         Of the plain filter at its end: position north, east, down [m], velocity [m/s], two zeros, heading [rad]; NaN
         where the filter estimates or the reference of a log holds no such thing.
-    oracle : (2,) array
-        The oracle's horizontal error and its horizontal sigma [m].
+    oracle : (3,) array
+        The oracle's horizontal error and its horizontal sigma s [m], and the root of the mean of ``p^2 + s^2`` from the
+        start on, p the horizontal error of the plain filter [m].
     faulty : (e,) bool array
         Which of the events' measurements a fault has touched.
     estimate : Estimate
@@ -91,7 +92,8 @@ class Voyage:
                 self._knowing = None
         self._context = Context(recording.start, recording.instruments.step)
         self._streams = [recording.data.aids.get(name) for name in names]
-        self.oracle = np.full(2, np.nan)
+        self.oracle = np.full(3, np.nan)
+        self._squares, self._known = 0.0, 0
         self.step, self.steps = -1, len(recording.data.truth)
 
     def advance(self) -> bool:
@@ -111,7 +113,11 @@ class Voyage:
             error = _error(knowing, self.truth)
             assert knowing.covariance is not None
             sigma = math.sqrt(max(knowing.covariance[0, 0] + knowing.covariance[1, 1], 0.0))
-            self.oracle = np.array([math.hypot(error[0], error[1]), sigma])
+            square = float(self.error[0] ** 2 + self.error[1] ** 2) + sigma * sigma
+            if square == square:  # the reference of a log may have gaps
+                self._squares, self._known = self._squares + square, self._known + 1
+            usual = math.sqrt(self._squares / self._known) if self._known else math.nan
+            self.oracle = np.array([math.hypot(error[0], error[1]), sigma, usual])
         linear = self.filter.linear
         self.faulty = np.zeros(self.filter.count, np.bool_)
         for e in range(self.filter.count):
@@ -130,7 +136,7 @@ class Prepared(NamedTuple):
     end: Array  # (S,)
     context: Array  # (S, 11)
     error: Array  # (S, 9)
-    oracle: Array  # (S, 2)
+    oracle: Array  # (S, 3)
     faulty: NDArray[np.bool_]  # (e,)
     start_covariance: Array  # (n, n)
     instruments: Instruments

@@ -35,6 +35,8 @@ class GtsamBatch(Row, solver=BatchEstimator):
     Source: F. Dellaert and others, GTSAM 4.3.
     """
 
+    real_time_as = "gtsam-fixed-lag"
+
 
 @register("gtsam-gnc")
 class GtsamGnc(Row, solver=GncEstimator):
@@ -43,3 +45,5 @@ class GtsamGnc(Row, solver=GncEstimator):
     Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
     IEEE Robotics and Automation Letters 5(2), 2020.
     """
+
+    real_time_as = "gtsam-fixed-lag"

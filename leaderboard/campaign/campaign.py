@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+from simnav.leaderboard.campaign.confinement.session import ServerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import (
     recording_digest,
@@ -31,11 +32,12 @@ from simnav.leaderboard.campaign.fingerprint import (
 )
 from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
 from simnav.leaderboard.campaign.plan import Plan, in_part
+from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.resolution import resolve, variant_of
 from simnav.leaderboard.campaign.seal import Seal
-from simnav.leaderboard.campaign.sources import digest
+from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -43,15 +45,15 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["MEMORY", "RUNS", "CampaignError", "Progress", "Summary", "run_campaign", "time_limit"]
+__all__ = ["MEMORY", "RUNS", "CampaignError", "Progress", "Summary", "run_campaign"]
 
 #: Seeds of a campaign, by default.
 RUNS = 50
 #: Memory that an estimator may take, by default [bytes].
 MEMORY = 2 << 30
 
-_IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
 _RESTARTS = 3  # of the workers, where one died
+_GATHERED = 5000  # results that are gathered into one file meanwhile, so that a killed campaign is soon read again
 
 
 class CampaignError(RuntimeError):
@@ -134,11 +136,6 @@ def combined(summaries: Sequence[Summary]) -> Summary:
         statuses.update(s.statuses)
     total, skipped = sum(s.total for s in summaries), sum(s.skipped for s in summaries)
     return Summary(summaries[0].folder, total, skipped, dict(statuses), sum(s.seconds for s in summaries))
-
-
-def time_limit(scenario: Scenario) -> float:
-    """Default time that an estimator may take for a run [s]: a fifth of real time, at least a minute."""
-    return max(60.0, 0.2 * scenario.duration)
 
 
 def run_campaign(
@@ -255,10 +252,16 @@ def run_campaign(
     path = store.create(Path(folder).resolve())
     endings = store.keys(path)
     simulator = simulator_version()
-    entrants = [resolve(request, chosen, path, workers == 1 and backend == "loky") for request in estimators]
+    hidden = [path] if seal is None or seal.file is None else [path, seal.file]
+    try:
+        entrants = [resolve(request, chosen, hidden, workers == 1 and backend == "loky") for request in estimators]
+    except ServerError as error:
+        raise CampaignError(str(error)) from None
+    if seal is None:  # the seeds of a sealed campaign are drawn from 2**63
+        require_unseen(entrants, scenarios, seeds)
     recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
     if seal is not None:
-        recordings = {name: digest(known, "sealed", seal.hash) for name, known in recordings.items()}
+        recordings = {name: seal.recording(known) for name, known in recordings.items()}
     variants = {
         s.id: {e.label: variant_of(e, recordings[s.id]) for e in entrants} for s in scenarios
     }  # scenario -> label -> variant
@@ -282,7 +285,7 @@ def run_campaign(
         if scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
     }
     if stale:  # a score was edited: the trials that were kept have all that it needs
-        rescore_results(path, scenarios=scenarios, keys=stale)
+        rescore_results(path, scenarios=scenarios, keys=stale, seal=seal)
         endings = store.keys(path)
 
     def limit(scenario: Scenario) -> float:
@@ -312,13 +315,17 @@ def run_campaign(
                 trials.discard(path, key)
         _compile(report)
         run_started = time.monotonic()
-        weight, left = 0.0, plan.weight
+        weight, left, loose = 0.0, plan.weight, 0
         report(Progress("run", skipped, total))
         end = math.inf if minutes is None else started + 60.0 * minutes
         units = itertools.takewhile(lambda _: time.monotonic() < end, plan.units(unit))
         with contextlib.closing(_outcomes(units, path, workers, backend, scheduler)) as outcomes:
             for done_unit, outcome in outcomes:
                 statuses.update(outcome)
+                loose += outcome.total()
+                if loose >= _GATHERED:
+                    store.compact(path)
+                    loose = 0
                 weight, left = weight + done_unit.weight, left - done_unit.weight
                 elapsed = time.monotonic() - run_started
                 failed = Summary(path, total, skipped, statuses, 0.0).failed
@@ -390,6 +397,8 @@ def _outcomes(
             for index, outcome in _parallel(dispatched(), workers, backend, scheduler):
                 yield left.pop(index), outcome
             return
+        except ServerError as error:
+            raise CampaignError(f"{error}; what is done is on disk") from None
         except BrokenProcessPool:
             endings = store.keys(folder)  # some of it was finished, and could not be told any more
             for index, unit in list(left.items()):

@@ -35,6 +35,8 @@ class Entrant:
         Entry point of another package that registers it; empty where there is none.
     search : tuple of str
         Folders in which the estimator's process looks for packages first.
+    learned_from : tuple of pairs of int
+        As of `simnav.estimator.Estimator`.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Entrant:
     code: bytes = b""
     point: str = ""
     search: tuple[str, ...] = ()
+    learned_from: tuple[tuple[int, int], ...] = ()
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

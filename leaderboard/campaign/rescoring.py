@@ -16,6 +16,7 @@ from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
@@ -63,6 +64,7 @@ def rescore_results(
     scenarios: Iterable[Scenario] = (),
     progress: Callable[..., None] | None = None,
     keys: Collection[str] | None = None,
+    seal: Seal | None = None,
 ) -> Rescored:
     """Compute scores of the current results of a folder again, from the trials that were kept.
 
@@ -78,6 +80,8 @@ def rescore_results(
         Called with how many of how many runs are done, and ``note=`` the next.
     keys : collection of str, optional
         Of the results; default: all that have a trial.
+    seal : Seal, optional
+        Of results with sealed seeds; then only these are scored.
 
     Returns
     -------
@@ -87,7 +91,8 @@ def rescore_results(
     ------
     RequestError
         If a score or a scenario is unknown, no trial was kept, or a scenario or the simulator has changed since, so
-        that the recording cannot be made again. The results keep what they had.
+        that the recording cannot be made again, or the key of sealed seeds is missing or another one. The results
+        keep what they had.
     StoreError
         If the folder or a trial in it cannot be used.
     """
@@ -105,16 +110,17 @@ def rescore_results(
     kept = [r for r in results if (keys is None or r.key in keys) and trials.is_kept(path, r.key)]
     if not kept:
         raise RequestError(f"no trials were kept in {path}; 'simnav campaign --keep-trials' keeps them")
+    kept = _sealed_alike(kept, seal)
     by_run: dict[tuple[str, int], list[Result]] = defaultdict(list)
     for result in kept:
         by_run[result.scenario, result.seed].append(result)
-    known = _scenarios({scenario: found[0] for (scenario, _), found in by_run.items()}, scenarios)
+    known = _scenarios({scenario: found[0] for (scenario, _), found in by_run.items()}, scenarios, seal)
     changed: dict[str, Mapping[str, float]] = {}
     for done, ((scenario, seed), found) in enumerate(sorted(by_run.items(), key=lambda item: item[0])):
         if progress is not None:
             progress(done, len(by_run), note=f"{scenario}, seed {seed}")
         with mistakes(ValueError, FileNotFoundError):
-            recording = record(known[scenario], seed)
+            recording = record(known[scenario], seed if seal is None else seal.seed(scenario, seed))
         for result in found:
             trial, thinned = trials.read(path, result.key, recording)
             wanted = [n for n in chosen if not (thinned and SCORES[n].uses_covariance and n in result.scores)]
@@ -137,7 +143,25 @@ def _store(path: Path, kept: list[Result], changed: Mapping[str, Mapping[str, fl
         store.rescore(path, scores, code)
 
 
-def _scenarios(examples: Mapping[str, Result], given: Iterable[Scenario]) -> dict[str, Scenario]:
+def _sealed_alike(kept: list[Result], seal: Seal | None) -> list[Result]:
+    """The results of a key, or those with public seeds; all of the others cannot be recorded again."""
+    wanted = "" if seal is None else seal.hash
+    mine = [r for r in kept if r.provenance.seal == wanted]
+    if mine:
+        return mine
+    if seal is None:
+        raise RequestError("the seeds of these results are sealed; give the key, with --key KEYFILE")
+    hashes = sorted({r.provenance.seal for r in kept} - {""})
+    raise RequestError(
+        f"the hash of this key is {seal.hash}, and the results carry {hashes[0]}: it is another key"
+        if hashes
+        else "the seeds of these results are public; leave out the key"
+    )
+
+
+def _scenarios(
+    examples: Mapping[str, Result], given: Iterable[Scenario], seal: Seal | None = None
+) -> dict[str, Scenario]:
     """The scenarios of results, by id, as they were when the results were computed."""
     from simnav.scenario import load
 
@@ -150,7 +174,8 @@ def _scenarios(examples: Mapping[str, Result], given: Iterable[Scenario]) -> dic
                 raise RequestError(
                     f"scenario {scenario} is not in the catalogue; give its file with --scenario"
                 ) from error
-        if recording_digest(found[scenario], simulator) != result.recording:
+        known = recording_digest(found[scenario], simulator)
+        if (known if seal is None else seal.recording(known)) != result.recording:
             raise RequestError(
                 f"the recordings of {scenario} cannot be made again, for the scenario or the simulator has changed "
                 "since; run the campaign again"

@@ -6,6 +6,7 @@ import contextlib
 import importlib
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from simnav.leaderboard.campaign.fingerprint import estimator_source, named_file
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav
 from simnav.leaderboard.campaign.session_class import carry, is_session
+from simnav.leaderboard.campaign.training_runs import ranges_of, told_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 __all__ = ["resolve", "variant_of"]
@@ -27,7 +29,7 @@ _IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
 _MEMORY = 2 << 30  # likewise [bytes]
 
 
-def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bool) -> Entrant:
+def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path], alone: bool) -> Entrant:
     """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
     name, source = request.name, ""
     file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
@@ -46,8 +48,9 @@ def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bo
         entrant = Entrant(name, parameters, request.label, False, "", point=point_of(cls.name))
         if comes_with_simnav(cls):
             with mistakes(EstimatorError):
-                request.make()
-            return replace(entrant, reference=is_own_reference(cls.name), source=estimator_source(cls))
+                made = request.make()
+            reference, learned_from = is_own_reference(cls.name), ranges_of(told_of(made))
+            return replace(entrant, reference=reference, source=estimator_source(cls), learned_from=learned_from)
         with contextlib.suppress(Exception):  # the other process says what is wrong
             source = estimator_source(cls)  # here, where the text of a session is known
         if request.cls is not None or is_session(cls.__module__):
@@ -57,7 +60,7 @@ def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bo
         found, why = outcome.value, outcome.reason
     else:
         try:
-            server = prepare(confinement, folder, loaded=alone)
+            server = prepare(confinement, hidden, loaded=alone)
             found, why = describe(server, entrant, Limits(_IMPORT_TIME, _MEMORY)), ""
         except ValueError as error:
             found, why = None, str(error)
@@ -69,7 +72,11 @@ def resolve(request: EstimatorRequest, confinement: str, folder: Path, alone: bo
             f"estimator {request.name!r} declares itself a reference; in a campaign only simnav's own references are "
             "told the truth"
         )
-    return replace(entrant, source=source or found["source"])
+    try:
+        learned_from = ranges_of(found["learned_from"])
+    except ValueError as error:
+        raise RequestError(f"estimator {request.name!r}: {error}") from None
+    return replace(entrant, source=source or found["source"], learned_from=learned_from)
 
 
 def _absolute(value: Any) -> Any:
@@ -81,8 +88,10 @@ def _absolute(value: Any) -> Any:
 
 def _describe(entrant: Entrant) -> dict[str, Any]:
     """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
-    cls = type(entrant.make())
-    return {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
+    made = entrant.make()
+    cls = type(made)
+    told = {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
+    return {**told, "learned_from": told_of(made)}
 
 
 def _import_estimators() -> None:

@@ -11,6 +11,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from simnav.leaderboard.campaign.sources import digest
 from simnav.leaderboard.results.errors import RequestError
 
 __all__ = ["Seal", "read_seal"]
@@ -26,9 +27,12 @@ class Seal:
     ----------
     key : bytes
         32 bytes, from the content of the file.
+    file : Path, optional
+        That estimators must not read.
     """
 
     key: bytes
+    file: Path | None = None
 
     def __repr__(self) -> str:
         return f"Seal({self.hash})"  # a key in a traceback would be a key that is published
@@ -37,6 +41,10 @@ class Seal:
     def hash(self) -> str:
         """What results carry: a hash of the key from which it cannot be found."""
         return hashlib.blake2b(self.key, digest_size=16, person=b"simnav seal").hexdigest()
+
+    def recording(self, known: str) -> str:
+        """The digest of sealed recordings of a scenario, from that of its public ones."""
+        return digest(known, "sealed", self.hash)
 
     def seed(self, scenario: str, number: int) -> int:
         """The seed of a run.
@@ -71,4 +79,4 @@ def read_seal(path: str | os.PathLike[str]) -> Seal:
         raise RequestError(
             f"the key file {file} holds {len(content)} bytes; a key has {_LEAST} to {_MOST}, drawn at random"
         )
-    return Seal(hashlib.blake2b(content, digest_size=32, person=b"simnav key").digest())
+    return Seal(hashlib.blake2b(content, digest_size=32, person=b"simnav key").digest(), file.resolve())

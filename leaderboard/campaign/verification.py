@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from simnav.leaderboard.campaign.campaign import run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
@@ -112,7 +114,7 @@ def verify_results(
                 continue
             if again.key != result.key:
                 without.append(f"{what}: simulator, scenario, estimator or parameters are not those of the result")
-            elif (again.status, _plain(again.scores)) != (result.status, _plain(result.scores)):
+            elif again.status != result.status or not _same(result.scores, again.scores):
                 different.append(what)
         report(len(chosen), len(chosen))
     return Verification(
@@ -138,6 +140,13 @@ def _repeat(
     return store.load(folder, series=False)[0]
 
 
-def _plain(scores: Mapping[str, float]) -> dict[str, str]:
-    """Scores but for wall times, so that NaN is equal to NaN."""
-    return {name: float(value).hex() for name, value in scores.items() if not name.startswith("update_")}
+def _same(stored: Mapping[str, float], again: Mapping[str, float]) -> bool:
+    """Whether scores are the same to the bit, wall times aside; NaN is equal to NaN.
+
+    What was stored in single precision (`simnav.leaderboard.results.packing`) is compared with the rounded score.
+    """
+    names = {name for name in (*stored, *again) if not name.startswith("update_")}
+    if not all(name in stored and name in again for name in names):
+        return False
+    pairs = [(float(stored[name]), float(again[name])) for name in names]
+    return all(a.hex() in (b.hex(), float(np.float32(b)).hex()) for a, b in pairs)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
-import random
 import signal
 import threading
 import time
@@ -14,21 +14,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, close_server, prepare, seed_words
+from simnav.leaderboard.campaign.attempts import try_estimator
+from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.own_scores import OwnScores
+from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
 from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.results import store, trials
-from simnav.leaderboard.results.errors import sentence
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
-    from simnav.trial import Trial
 
 __all__ = ["Unit", "run_unit"]
 
@@ -88,6 +87,12 @@ class Unit:
     seal: Seal | None = None
 
     @property
+    def hidden(self) -> tuple[Path, ...]:
+        """What estimators must not read: other results, the trials that are kept, and a secret key."""
+        key = None if self.seal is None else self.seal.file
+        return (self.folder,) if key is None else (self.folder, key)
+
+    @property
     def weight(self) -> float:
         """About how much work it is."""
         return self.scenario.duration * len(self.entrants)
@@ -119,23 +124,30 @@ def _prepare_worker(unit: Unit) -> None:
     """Once a worker: Ctrl-C is the parent's business, and it ends when the parent is gone."""
     global _prepared
     if unit.confinement != "none":
-        prepare(unit.confinement, unit.folder)  # loads its kernels while the first recording is made
+        prepare(unit.confinement, unit.hidden)  # loads its kernels while the first recording is made
     if _prepared:
         return
     _prepared = True
+    _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
     if os.getpid() != unit.parent:
         with contextlib.suppress(ValueError):  # not in the main thread of a Dask worker
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         if os.getppid() == unit.parent:
             threading.Thread(target=_end_with, args=(unit.parent,), daemon=True).start()
-    from simnav.estimator.registry import discover_own
-    from simnav.warmup import warmup
 
+
+def _load(estimators: bool) -> None:
+    """Load the kernels of what is made in forks of this process: of recordings, and of references if there are any."""
+    from simnav.compiled import kernels
+    from simnav.estimator.registry import discover_own
+
+    importlib.import_module("simnav.simulator")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if unit.confinement == "none":  # estimators are forked from here
-            warmup(load=True)
         discover_own()
+        for kernel in kernels():
+            if estimators or not kernel.__module__.startswith("simnav.estimators."):
+                kernel.compile()
 
 
 def _end_with(parent: int) -> None:
@@ -148,17 +160,15 @@ def _end_with(parent: int) -> None:
 
 def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     """Record a run and try everyone on it; return how many ended how."""
-    from simnav.source import record
-
     _prepare_worker(unit)
     unit.scores.register()
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
     try:
         seed = unit.seed if unit.seal is None else unit.seal.seed(unit.scenario.id, unit.seed)
-        recording = record(unit.scenario, seed)
-    except Exception as error:
-        reason = f"no recording: {sentence(error)}"
+        recording = record_within(unit.scenario, seed, max(unit.timeout, time_limit(unit.scenario)))
+    except NoRecordingError as error:
+        reason = f"no recording: {error}"
         for entrant, key in unit.entrants:
             store.write(unit.folder, unit.result(entrant, key, "no-recording", reason))
             statuses["no-recording"] += 1
@@ -176,11 +186,10 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
 
     from simnav.scoring import score, series
 
-    if unit.confinement == "none" or entrant.reference:
-        made = _in_a_fork(unit, entrant, recording)
-    else:
-        limits = Limits(unit.timeout, unit.memory)
-        made = attempt(prepare(unit.confinement, unit.folder), entrant, recording, limits)
+    limits = Limits(unit.timeout, unit.memory)
+    made = try_estimator(
+        entrant, recording, limits, unit.confinement, unit.hidden, sealed=unit.seal is not None
+    )  # fmt: skip
     trial = made.trial
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),
@@ -204,23 +213,3 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
         scoring=unit.scoring if scores else blank.scoring,
         series={name: np.asarray(values, dtype=np.float32) for name, values in curves.items()},
     )
-
-
-def _in_a_fork(unit: Unit, entrant: Entrant, recording: Recording) -> Attempt:
-    """Run an estimator in a process that has the recording: simnav's own references, or any where asked for."""
-    outcome = isolate(_attempt, entrant, recording, timeout=unit.timeout, memory=unit.memory)
-    trial: Trial | None = outcome.value if outcome.status == "ok" else None
-    status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
-    return Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
-
-
-def _attempt(entrant: Entrant, recording: Recording) -> Trial:
-    """In the isolated process: make the estimator and run it."""
-    import numpy as np
-
-    from simnav.trial import run_trial
-
-    words = seed_words(recording, entrant)
-    random.seed(sum(word << 32 * k for k, word in enumerate(words)))
-    np.random.seed(words)  # noqa: NPY002
-    return run_trial(entrant.make(), recording)

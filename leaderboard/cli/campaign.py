@@ -82,6 +82,9 @@ def command(
     sealed: Annotated[
         Path | None, typer.Option("--sealed", metavar="KEYFILE", help="Derive the seeds from the secret in this file.")
     ] = None,
+    oracle: Annotated[
+        bool, typer.Option(help="Run the oracles on simulated scenarios, too: the reference of a board, not ranked.")
+    ] = True,
     minutes: Annotated[
         float | None, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
     ] = None,
@@ -92,6 +95,7 @@ def command(
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking import tables
+        from simnav.leaderboard.ranking.confinement import confinement_line
         from simnav.leaderboard.ranking.failures import failure_table
         from simnav.leaderboard.ranking.ranking_table import ranking_tables
 
@@ -101,12 +105,14 @@ def command(
                 chosen, estimator, runs=runs, seed=seed, output=output, profile=profile, parameters=parameters(set_),
                 workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
                 covariance_interval=covariance_interval, confinement=confinement, sealed=sealed,
+                oracle=oracle,
                 backend=(Backend.DASK if scheduler else backend).value, scheduler=scheduler, shard=_shard(shard),
                 minutes=minutes, progress=campaign_progress(bar),
             )  # fmt: skip
         summary = report.summary
         out.document(report.to_dict())
         out.print(*ranking_tables(report.ranking), *failure_table(report.results))
+        out.print(*filter(None, [confinement_line(report.results)]))
         if summary.left:
             out.print(f"{summary.left} of {summary.total} runs are left; the same command continues")
         out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "

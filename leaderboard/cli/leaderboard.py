@@ -34,6 +34,7 @@ def command(
         from simnav.leaderboard import interface
         from simnav.leaderboard.papers.page import find
         from simnav.leaderboard.ranking.agreement import LEAST, correlation_table, rank_correlations
+        from simnav.leaderboard.ranking.confinement import confined, confinement_line
         from simnav.leaderboard.ranking.failures import failure_table, failures
         from simnav.leaderboard.ranking.ranking_table import ranking_tables
         from simnav.leaderboard.site.site import build
@@ -46,9 +47,10 @@ def command(
                 found, ranking, output, progress=progress, workers=workers, papers=find(papers), runs_shown=runs_shown,
                 figures=figures,
             )  # fmt: skip
-        document = {"site": str(index), "runs": len(found), "failed": failures(found), "ranking": ranking.to_dict()}
+        document = {"site": str(index), "runs": len(found), "failed": failures(found), "ranking": ranking.to_dict(),
+                    "confinement": confined(found)}  # fmt: skip
         out.document(document | {"correlations": [c.to_dict() for c in correlations]})
-        out.print(*ranking_tables(ranking), *failure_table(found))
+        out.print(*ranking_tables(ranking), *failure_table(found), *filter(None, [confinement_line(found)]))
         if correlations:
             out.print(correlation_table(correlations))
         elif against is not None:

@@ -22,6 +22,7 @@ def command(
     scenario: Annotated[
         list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")
     ] = None,
+    key: Annotated[Path | None, typer.Option(metavar="KEYFILE", help="The key, where the seeds are sealed.")] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -30,7 +31,7 @@ def command(
         from simnav.leaderboard import interface
 
         with out.progress("rescoring") as progress:
-            done = interface.rescore(results, ",".join(score or ()), scenarios=scenario, progress=progress)
+            done = interface.rescore(results, ",".join(score or ()), scenarios=scenario, key=key, progress=progress)
         out.document(done.to_dict())
         without = f", {done.without_trial} have no trial" if done.without_trial else ""
         out.print(

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     import matplotlib.figure
 
-    from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.recording import Recording
     from simnav.trial import Trial
@@ -193,15 +192,22 @@ class _Sketch:
 
     def _trial(self, scenario: str, method: str) -> Trial | None:
         """A method's run of the first seed, in a process of its own; None where it is not there or gives nothing."""
-        from simnav.leaderboard.campaign.isolation import isolate
+        from simnav.leaderboard.campaign.attempts import try_estimator
+        from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+        from simnav.leaderboard.campaign.confinement.session import Limits
+        from simnav.leaderboard.campaign.resolution import resolve
 
         request = self.found.stands_for[method]
         if request is None:
             return None
         key = (scenario, request.label)
         if key not in self.trials:
-            outcome = isolate(_attempt, request, self._recording(scenario), timeout=_TIMEOUT, memory=_MEMORY)
-            self.trials[key] = outcome.value if outcome.status == "ok" and len(outcome.value) else None
+            confinement = chosen_confinement()
+            entrant = resolve(request, confinement, (), alone=True)
+            made = try_estimator(entrant, self._recording(scenario), Limits(_TIMEOUT, _MEMORY), confinement)
+            self.trials[key] = (
+                made.trial if made.status == "ok" and made.trial is not None and len(made.trial) else None
+            )
         return self.trials[key]
 
     def _seed(self) -> str:
@@ -353,14 +359,6 @@ class _Sketch:
 def _bar(label: str, ours: Interval, runs: Iterable[float], paper: Range | None) -> Bar:
     ends = (math.nan, math.nan) if paper is None else paper if isinstance(paper, tuple) else (paper, paper)
     return Bar(label, ours.value, ours.low, ours.high, list(runs), ends)
-
-
-def _attempt(request: EstimatorRequest, recording: Recording) -> Trial:
-    """In the isolated process: make the estimator and run it."""
-    from simnav.estimator import make
-    from simnav.trial import run_trial
-
-    return run_trial(make(request.name, **request.parameters), recording, keep_covariance=False)
 
 
 def _true_sigma(recording: Recording, name: str) -> Iterator[Curve]:

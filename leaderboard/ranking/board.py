@@ -33,8 +33,8 @@ __all__ = [
 
 #: Whether a row is ranked, and if not, why: a reference is told the truth; one that is unsuitable needs instruments
 #: that a scenario of the track lacks; one that is incomplete has not run the whole track; one that is implausible has
-#: smaller errors than are possible.
-Standing = Literal["ranked", "reference", "unsuitable", "incomplete", "implausible"]
+#: smaller errors than are possible; one that is identical is another row in real time, and only smooths beside.
+Standing = Literal["ranked", "reference", "unsuitable", "incomplete", "implausible", "identical"]
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Reference:
         """What the ratios are to, in words."""
         if not self.estimator:
             return "1 m: there is no reference figure"
-        origin = "stored with the scenario" if self.stored else "here"
+        origin = "shipped with the scenario" if self.stored else "of this campaign"
         error = f" +- {100.0 * self.standard_error:.2g} %" if math.isfinite(self.standard_error) else ""
         what = "" if self.bounds else ", a plain filter: no oracle and no bound is known here"
         return (

@@ -39,9 +39,10 @@ from simnav.leaderboard.ranking.board import (
     TrackRanking,
     TrackRow,
 )
+from simnav.leaderboard.ranking.identity import real_time_twin
 from simnav.leaderboard.ranking.plausibility import beats, too_good
 from simnav.leaderboard.ranking.reference import reference_of
-from simnav.leaderboard.ranking.remarks import remarks
+from simnav.leaderboard.ranking.remarks import reference_remarks, remarks
 from simnav.leaderboard.ranking.runs import Runs, group
 from simnav.leaderboard.ranking.statistics import (
     FAILURE,
@@ -204,6 +205,8 @@ class _Scenario:
                 standing[n] = ("incomplete", _NO_SEED)
             elif self.implausible(n):
                 standing[n] = ("implausible", _IMPLAUSIBLE.format(self.name))
+            elif twin := real_time_twin(n, self.track.score, [{m: c.runs for m, c in self.cells.items()}]):
+                standing[n] = ("identical", _IDENTICAL.format(twin))
         shown = {n: self.cells[n] for n in self.cells if len(self.cells[n].logs)}
         rows, separation = _rows([self], {n: {self.name: c} for n, c in shown.items()}, standing)
         found = []
@@ -227,6 +230,7 @@ _NO_SEED = "it has not run the first seed that the others have run"
 _IMPLAUSIBLE = (
     "its errors on {} are below those of an oracle, which knows the noise and every fault, by more than chance"
 )
+_IDENTICAL = "in real time it is {}, to the bit; it is ranked by what it smooths"
 
 
 def _finite(result: Result, name: str) -> bool:
@@ -258,6 +262,8 @@ def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
             standing[n] = ("incomplete", f"it has not run {missing[0]}{more}")
         elif bad := [t.name for t in used if t.implausible(n, len(used))]:
             standing[n] = ("implausible", _IMPLAUSIBLE.format(bad[0]))
+        elif twin := real_time_twin(n, track.score, [{m: c.runs for m, c in t.cells.items()} for t in used]):
+            standing[n] = ("identical", _IDENTICAL.format(twin))
     shown = {n: c for n, c in cells.items() if c}
     rows, separation = _rows(used, shown, standing)
     found = []
@@ -273,10 +279,12 @@ def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
         if n not in shown:
             found.append(TrackRow(estimator=n, standing=kind, why=why, score=math.nan, scenarios=len(used)))
     unit = "recording" if any(t.recorded for t in used) else "seed"
-    relative = any(t.reference.estimator for t in used)
+    references = [t.reference for t in used]
+    relative = any(r.estimator for r in references)
     return TrackRanking(
         track.name, track.title, track.score, relative, unit, _units(found, used, shown),
-        tuple(t.name for t in used), remarks(separation, unit, found, [t.reference for t in used]), tuple(found),
+        tuple(t.name for t in used), (*remarks(separation, unit, found, references), *reference_remarks(references)),
+        tuple(found),
     )  # fmt: skip
 
 
@@ -334,7 +342,9 @@ def _rows(
     scores = {n: score(f.logs, f.strata, f.clusters, f.failed) for n, f in figures.items()}
     ranked = sorted((n for n in cells if standing[n][0] == "ranked"), key=lambda n: (scores[n].value, n))
     separation, places = _places(ranked, {n: figures[n] for n in ranked}, {n: scores[n].value for n in ranked})
-    order: dict[str, int] = {"ranked": 0, "implausible": 1, "incomplete": 2, "unsuitable": 3, "reference": 4}
+    order: dict[str, int] = {
+        "ranked": 0, "identical": 1, "implausible": 2, "incomplete": 3, "unsuitable": 4, "reference": 5,
+    }  # fmt: skip
     rest = sorted((n for n in cells if n not in places), key=lambda n: (order[standing[n][0]], scores[n].value, n))
     rows = []
     for n in [*ranked, *rest]:

@@ -38,7 +38,7 @@ def score_title(track: TrackRanking) -> str:
 def score_caption(track: TrackRanking) -> str:
     """What the score is, in two sentences."""
     what = f"{SCORES[track.score].title} [{SCORES[track.score].unit}]" if track.score in SCORES else track.score
-    what = f"× reference: {what} over the scenario's fixed reference figure" if track.relative else f"Error: {what}"
+    what = f"× reference: {what} over the scenario's reference figure" if track.relative else f"Error: {what}"
     return _CAPTION.format(score=what, cap=FAILURE)
 
 

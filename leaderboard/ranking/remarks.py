@@ -1,4 +1,4 @@
-"""What a board has to say about itself: that it is provisional, or that it decides nothing."""
+"""What a board has to say about itself: that it is provisional, that it decides nothing, what its ratios are to."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from simnav.leaderboard.ranking.statistics import FEWEST, Separation, smallest_p
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Reference, Row
 
-__all__ = ["remarks"]
+__all__ = ["reference_remarks", "remarks"]
 
 _LEVEL = 0.05
 
@@ -49,4 +49,28 @@ def remarks(
         what = "there is no reference figure" if len(without) == len(references) else (
             f"{len(without)} of {len(references)} scenarios have no reference figure, and count")  # fmt: skip
         found.append(f"Errors are in metres: {what}." if len(without) == len(references) else f"{what} in metres.")
+    return tuple(found)
+
+
+def reference_remarks(references: Sequence[Reference]) -> tuple[str, ...]:
+    """What the ratios of a track are to: figures that are shipped, or those of an oracle of this campaign.
+
+    Examples
+    --------
+    >>> from simnav.leaderboard.ranking.board import Reference
+    >>> reference_remarks([Reference(2.0, "oracle", 60, 0.3, stored=True)])
+    ('Reference figures: the error of oracle over 60 runs, shipped with the scenario.',)
+    """
+    found = []
+    for shipped in (True, False):
+        those = [r for r in references if r.estimator and r.stored == shipped]
+        if not those:
+            continue
+        names = " or ".join(sorted({r.estimator for r in those}))
+        few, many = min(r.runs for r in those), max(r.runs for r in those)
+        runs = f"{few} runs" if few == many else f"{few} to {many} runs"
+        where = "" if len(those) == len(references) else f" on {len(those)} of {len(references)} scenarios"
+        s = "s" if len(those) > 1 else ""
+        origin = f"shipped with the scenario{s}" if shipped else "of this campaign, for none is shipped"
+        found.append(f"Reference figures{where}: the error of {names} over {runs}, {origin}.")
     return tuple(found)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.board import Ranking
+from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.failures import failures
 from simnav.leaderboard.ranking.standing import Standing
 from simnav.leaderboard.results.frame import frame
@@ -69,6 +70,7 @@ class CampaignReport(_Report):
             "computed": self.summary.computed,
             "runs": len(self.results),
             "failed": failures(self.results),
+            "confinement": confined(self.results),
             "ranking": self.ranking.to_dict(),
         }
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-__all__ = ["POST_PROCESSED", "RECORDED", "Track", "catalogued_tracks", "tracks_of"]
+__all__ = ["POST_PROCESSED", "RECORDED", "SMOOTHED", "Track", "catalogued_tracks", "tracks_of"]
 
 RECORDED = "recorded"
+#: The score of the track of smoothed trajectories.
+SMOOTHED = "smoothed_horizontal_rmse"
 #: The tracks whose scenarios are ranked for smoothed output, too.
 POST_PROCESSED = ("aided-ins", "underwater")
 
@@ -78,7 +80,7 @@ def tracks_of(scenarios: Iterable[str], track: Mapping[str, str], score: str | N
     found = [Track(n, title(n), score or "horizontal_rmse", tuple(members[n])) for n in members]
     smoothed = tuple(s for n in POST_PROCESSED for s in members.get(n, ()))
     if smoothed and score is None:
-        found.append(Track("post-processing", title("post-processing"), "smoothed_horizontal_rmse", smoothed))
+        found.append(Track("post-processing", title("post-processing"), SMOOTHED, smoothed))
     order = list(_TITLES)
     return sorted(found, key=lambda t: (order.index(t.name) if t.name in order else len(order), t.name))
 

@@ -11,10 +11,12 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.result import Result, to_table, write_tables
@@ -22,13 +24,17 @@ from simnav.leaderboard.results.result import Result, to_table, write_tables
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["pack"]
+__all__ = ["pack", "shortened"]
 
 _ROWS = 4096  # of a group in a file
 
 
 def pack(
-    folder: str | os.PathLike[str], target: str | os.PathLike[str], estimators: Collection[str] | None = None
+    folder: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    estimators: Collection[str] | None = None,
+    *,
+    single: bool = False,
 ) -> list[Result]:
     """Write the current results of a folder into another one, without series and trials.
 
@@ -40,6 +46,8 @@ def pack(
         New, or a folder of results, which is replaced.
     estimators : collection of str, optional
         Labels of those that are taken. Default: all.
+    single : bool
+        Scores in single precision, and the draws of a run with one estimator only: less than half the size.
 
     Returns
     -------
@@ -57,6 +65,8 @@ def pack(
         for r in store.load(source, series=False)
         if estimators is None or r.estimator in estimators
     ]
+    if single:
+        found = shortened(found)
     if place.exists():
         store.create(place)  # refuses a folder of something else
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -71,7 +81,7 @@ def pack(
             store.keep_provenance(made, result.provenance)
         for label, mine in by.items():
             with store.atomic(made / "compacted" / f"part-{_file_name(label)}.parquet") as file:
-                write_tables(file, _tables(mine), level=15)
+                write_tables(file, _tables(mine), level=19, split=True)
         store.select(made, current)
         shutil.rmtree(made / "results")
         old = draft / "old"
@@ -80,6 +90,17 @@ def pack(
         os.replace(made, place)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+    return found
+
+
+def shortened(results: Iterable[Result]) -> list[Result]:
+    """Results with scores in single precision, and with the draws of a run at its first estimator only."""
+    told, found = set[tuple[str, int]](), []
+    for r in results:
+        scores = {name: float(np.float32(value)) for name, value in r.scores.items()}
+        draws = {} if (r.scenario, r.seed) in told else r.draws
+        told.add((r.scenario, r.seed))
+        found.append(replace(r, scores=scores, draws=draws))
     return found
 
 

@@ -18,7 +18,19 @@ from simnav.scoring.consistency import ending
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["BATCH", "FORMAT", "NO_TRIAL", "READABLE", "Result", "batches", "rows", "schema", "to_table", "write_tables"]
+__all__ = [
+    "BATCH",
+    "FORMAT",
+    "NO_TRIAL",
+    "READABLE",
+    "Result",
+    "batches",
+    "listed",
+    "rows",
+    "schema",
+    "to_table",
+    "write_tables",
+]
 
 #: Version of the format of results, and those that can be read.
 FORMAT = 4
@@ -40,6 +52,9 @@ _SINCE: dict[str, tuple[int, Any]] = {
     "provenance": (3, ""),
     "draws": (4, "{}"),
 }
+
+#: Columns that take most of the memory of a file of results.
+_HEAVY = frozenset({"scores", "series"})
 
 Series = NDArray[np.float32]
 
@@ -180,7 +195,7 @@ def to_table(result: Result) -> pa.Table:
 
 
 def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
-    """The contents of a file, checked, a row group (a few hundred results) at a time.
+    """The contents of a file, checked: a row group (a few hundred results) at a time, or at once where that is little.
 
     Raises
     ------
@@ -199,19 +214,37 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
             raise ValueError("it was not written by this version of simnav")
         wanted = names if columns is None else columns
         there = [n for n in wanted if n in found.names]
-        for group in range(file.num_row_groups):
-            table = file.read_row_group(group, columns=there, use_threads=False)
+        groups = range(file.num_row_groups)
+        heavy = columns is None or not _HEAVY.isdisjoint(columns)
+        for group in ([k] for k in groups) if heavy else filter(None, [list(groups)]):
+            table = file.read_row_groups(group, columns=there, use_threads=False)
             for name in (n for n in names if n in wanted and n not in there):
                 unknown = pa.array([_SINCE[name][1]] * len(table), schema().field(name).type)
                 table = table.append_column(schema().field(name), unknown)
             yield table.replace_schema_metadata(schema().metadata)
 
 
-def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | None = None) -> None:
-    """Write a file of results, with check sums; ``level`` is that of the compression."""
+def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | None = None, split: bool = False) -> None:
+    """Write a file of results, with check sums.
+
+    Parameters
+    ----------
+    file : file
+    tables : iterator of pyarrow.Table
+    level : int, optional
+        Of the compression.
+    split : bool
+        Store the bytes of scores by their place, which makes them smaller.
+    """
     import pyarrow.parquet as pq
 
-    options = {"compression": "zstd", "compression_level": level, "write_page_checksum": True}
+    options: dict[str, Any] = {"compression": "zstd", "compression_level": level, "write_page_checksum": True}
+    if split:
+        values = "scores.key_value.value"
+        options["column_encoding"] = {values: "BYTE_STREAM_SPLIT"}
+        options["use_dictionary"] = [n for n in schema().names if n not in ("scores", "series")] + [
+            "scores.key_value.key"
+        ]
     with pq.ParquetWriter(file, schema(), **options) as writer:
         for table in tables:
             writer.write_table(table)
@@ -244,10 +277,10 @@ def rows(
         convert = _CONVERTED.get(name)
         if name == "provenance":
             columns[name] = _shared(table.column(name), lambda t: provenances.get(t) or Provenance(identity=t))
-        elif convert is not None or table.schema.field(name).type == "string":
+        elif convert is not None:
             columns[name] = _shared(table.column(name), convert)
         else:
-            columns[name] = table.column(name).to_pylist()
+            columns[name] = listed(table.column(name))
     columns["scores"] = _scores(table.column("scores"), scores)
     if "series" in table.column_names:
         columns["series"] = list(decoded_series(table.column("series")))
@@ -259,6 +292,11 @@ def rows(
 
 
 _CONVERTED: dict[str, Callable[[str], Any]] = {"parameters": json.loads, "draws": json.loads}
+
+
+def listed(column: pa.ChunkedArray) -> list[Any]:
+    """The values of a column; equal texts are one object."""
+    return _shared(column, None) if column.type == "string" else list(column.to_pylist())
 
 
 def _shared(column: pa.ChunkedArray, convert: Callable[[str], Any] | None) -> list[Any]:

@@ -39,6 +39,7 @@ from simnav.leaderboard.results.result import (
     READABLE,
     Result,
     batches,
+    listed,
     rows,
     schema,
     to_table,
@@ -385,11 +386,13 @@ def keys(folder: str | os.PathLike[str]) -> dict[str, Ending]:
 
     def scan() -> dict[str, Ending]:
         found: dict[str, Ending] = {}
-        # A loose file is read as a whole, to know that it is; of a part the series, nearly all of it, are left out.
-        for _, tables in _scan(path, [n for n in schema().names if n != "series"], schema().names):
+        # A loose file is read as a whole, to know that it is. Of a part only what is asked for is read, or a resumed
+        # campaign of many results would wait; what is damaged elsewhere in it is found when it is loaded.
+        for _, tables in _scan(path, ["key", *Ending._fields], schema().names):
             for table in tables:
-                key, *columns = (table.column(name).to_pylist() for name in ("key", *Ending._fields))
-                found = dict(zip(key, map(Ending._make, zip(*columns, strict=True)), strict=True)) | found
+                statuses, limits, memories, codes = (listed(table.column(name)) for name in Ending._fields)
+                for key, *ending in zip(listed(table.column("key")), statuses, limits, memories, codes, strict=True):
+                    found.setdefault(key, Ending(*ending))
         return found
 
     return _steadily(scan)

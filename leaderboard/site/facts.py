@@ -179,7 +179,7 @@ def _table(values: Mapping[str, Any], skip: Iterable[str] = ()) -> str:
     """A table of a scenario file on one line; what is zero or not given is left out."""
     found = []
     for key, value in values.items():
-        if key in skip or value is None or value == "" or not np.any(value):
+        if key in skip or value is None or (isinstance(value, str) and not value) or not np.any(value):
             continue
         if isinstance(value, Mapping):
             if inner := _table(value):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.site.charts import accuracy_and_cost, detection, short, spread
 from simnav.leaderboard.site.columns import Column, plain
 
@@ -188,7 +189,8 @@ def _track(
         "remarks": list(track.remarks),
         "provisional": track.provisional,
         "facts": f"{len(track.scenarios)} scenarios, {len(scored)} ranked estimators, "
-        f"at least {track.units} {track.unit}s each",
+        f"at least {track.units} {track.unit}s each, confined by "
+        + ", ".join(confined(r for s in track.scenarios for x in runs[s].values() for r in x.results)),
         "table": {
             "name": track.track,
             "title": f"{track.title}: ranking",

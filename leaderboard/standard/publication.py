@@ -15,7 +15,7 @@ from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.gathering import gather
-from simnav.leaderboard.results.packing import pack
+from simnav.leaderboard.results.packing import pack, shortened
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.standard import shipped
 from simnav.leaderboard.standard.currency import outdated
@@ -110,7 +110,7 @@ def publish(working: Path, profile: Profile, folder: Path, history: Path, readme
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", store.StoreWarning)
-        results = store.load(working, series=False)
+        results = shortened(store.load(working, series=False))  # as others will have them
     old = outdated(working)
     if old:
         raise RequestError(
@@ -126,7 +126,7 @@ def publish(working: Path, profile: Profile, folder: Path, history: Path, readme
     ranking = rank(results)
     text = replaced(readme, tables(ranking, results)) if readme is not None else ""  # fails before anything is written
     if working.resolve() != folder.resolve():
-        results = pack(working, folder)
+        pack(working, folder, single=True)
     edition = append(history, ranking, results)
     if readme is not None:
         write_whole(readme, text)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from simnav.leaderboard.ranking.board import Ranking, TrackRanking
+from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
 from simnav.leaderboard.ranking.ranking_table import between, ratio
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
@@ -42,10 +42,15 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
         parts.append(f"The first {min(_ROWS, sum(r.ranked for r in main.rows))} rows of the track *{main.title}*:")
         parts.append("\n".join([
             "| rank | estimator | score, 95 % interval | worst run | failed runs |", "|---|---|---|---|---|",
-            *(f"| {r.ranks} | `{r.estimator}` | {ratio(r.score)} [{between(r.low, r.high, ratio)}] | {ratio(r.worst)} "
+            *(f"| {r.ranks} | `{r.estimator}` | {ratio(r.score)}{_interval(r)} | {ratio(r.worst)} "
               f"| {r.failed} of {r.runs} |" for r in [r for r in main.rows if r.ranked][:_ROWS]),
         ]))  # fmt: skip
     return "\n\n".join(parts)
+
+
+def _interval(row: TrackRow) -> str:
+    found = between(row.low, row.high, ratio)
+    return f" [{found}]" if found else ""
 
 
 def _track(track: TrackRanking) -> str:

@@ -115,34 +115,30 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
     """Repeat the runs; returns them, and the provenance of this environment."""
     requests = {e.label: e for e in asked.estimators}
     seal = Seal(bytes.fromhex(asked.key)) if asked.key else None
-    failed: list[Again] = []
+    found: dict[tuple[bool, str, str, int], Again] = {}
     total, done = sum(len(w.seeds) for w in asked.runs), 0
-    for wanted in asked.runs:
-        progress(done, total, f"{wanted.label} on {wanted.scenario}")
-        folder = Path(asked.folder) / ("sealed" if wanted.sealed else "public")
-        try:
-            run_campaign(
-                [load(wanted.scenario)], [requests[wanted.label]], wanted.seeds, folder, workers=1,
-                timeout=wanted.time_limit or None, confinement=asked.confinement,
-                seal=seal if wanted.sealed else None, memory=wanted.memory_limit or MEMORY,
-            )  # fmt: skip
-        except Exception as error:
-            failed += [
-                Again(wanted.scenario, wanted.label, seed, wanted.sealed, "not-run", sentence(error))
-                for seed in wanted.seeds
-            ]
-        done += len(wanted.seeds)
-        progress(done, total, wanted.scenario)
-    found = [
-        Again(
-            r.scenario, r.estimator, r.seed, sealed, r.status, r.reason, r.key, r.recording,
-            {name: float(value).hex() for name, value in r.scores.items()},
-        )
-        for sealed in (False, True)
-        if (place := Path(asked.folder) / ("sealed" if sealed else "public")).is_dir()
-        for r in store.load(place, series=False)
-    ]  # fmt: skip
-    return {"runs": [asdict(a) for a in (*found, *failed)], "provenance": here().to_dict()}
+    for sealed in (False, True):  # in one folder, because the estimators' processes are made for one
+        for wanted in (w for w in asked.runs if w.sealed == sealed):
+            progress(done, total, f"{wanted.label} on {wanted.scenario}")
+            try:
+                run_campaign(
+                    [load(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder, workers=1,
+                    timeout=wanted.time_limit or None, confinement=asked.confinement, seal=seal if sealed else None,
+                    memory=wanted.memory_limit or MEMORY,
+                )  # fmt: skip
+            except Exception as error:
+                for seed in wanted.seeds:
+                    key = sealed, wanted.scenario, wanted.label, seed
+                    found[key] = Again(wanted.scenario, wanted.label, seed, sealed, "not-run", sentence(error))
+            done += len(wanted.seeds)
+            progress(done, total, wanted.scenario)
+        for r in store.load(asked.folder, series=False) if Path(asked.folder).is_dir() else ():
+            if bool(r.provenance.seal) == sealed:
+                found[sealed, r.scenario, r.estimator, r.seed] = Again(
+                    r.scenario, r.estimator, r.seed, sealed, r.status, r.reason, r.key, r.recording,
+                    {name: float(value).hex() for name, value in r.scores.items()},
+                )  # fmt: skip
+    return {"runs": [asdict(a) for a in found.values()], "provenance": here().to_dict()}
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from simnav.estimator.needs import Needs
@@ -31,11 +32,15 @@ class Estimator(ABC):
     slow : bool
         True for rows that take several milliseconds an epoch or more; a quick campaign leaves them out unless it is
         asked for them.
+    real_time_as : str
+        Name of the estimator whose real-time estimates this one gives, to the bit, and only smooths beside; empty for
+        all others. Boards then rank it by what it smooths.
     """
 
     name: ClassVar[str] = ""
     reference: ClassVar[bool] = False
     slow: ClassVar[bool] = False
+    real_time_as: ClassVar[str] = ""
 
     @property
     def needs(self) -> Needs:
@@ -44,6 +49,15 @@ class Estimator(ABC):
         Each entry is a kind of instrument, ``"imu"``, ``"aid"`` (any instrument beside the IMU), or a tuple of these of
         which one is enough. The harness gives it no scenario that lacks one of them. To refuse a scenario that has them
         all is a failure. By default nothing is needed.
+        """
+        return ()
+
+    @property
+    def learned_from(self) -> Sequence[tuple[int, int]]:
+        """The runs that its parameters were learned from: pairs of a first and a last number.
+
+        The numbers are those that the random streams of the runs start from, `simnav.scenario.Scenario.root` of their
+        seeds. A campaign refuses to score an estimator on a run in one of these ranges. By default there is none.
         """
         return ()
 

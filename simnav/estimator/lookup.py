@@ -38,6 +38,8 @@ class Description:
         Line of the class in this file.
     reference, slow : bool
         As in `Estimator`: it is told the truth; it takes several milliseconds an epoch or more.
+    real_time_as : str
+        As in `Estimator`: what it is in real time, where it only smooths beside.
     parameters : tuple of Parameter
         Parameters of its constructor.
     """
@@ -49,6 +51,7 @@ class Description:
     line: int
     reference: bool
     slow: bool
+    real_time_as: str
     parameters: tuple[Parameter, ...]
 
 
@@ -85,6 +88,7 @@ def describe(name_or_path: str) -> Description:
         line=line,
         reference=cls.reference,
         slow=cls.slow,
+        real_time_as=cls.real_time_as,
         parameters=tuple(
             Parameter(p.name, p.default, "" if p.annotation is p.empty else inspect.formatannotation(p.annotation))
             for p in parameters_of(cls)

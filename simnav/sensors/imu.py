@@ -227,10 +227,11 @@ class _Triad:
 
         self._variates = np.zeros((_CHUNK, 3))
 
-    def ahead(self, n: int, until: float) -> tuple[Array, Array, int, Array, int]:
-        """What `sense` takes for n samples: variates, and both tables of biases with their first grid points."""
-        variates = self._rng.standard_normal((n, 3)) if self.density > 0.0 else np.zeros((n, 3))
-        return variates, *self.instability.table(until), *self.walk.table(until)
+    def ahead(self, variates: Array, until: float) -> tuple[Array, int, Array, int]:
+        """What `sense` takes: (n, 3) variates, filled in; both tables of biases, and their first grid points."""
+        if self.density > 0.0:
+            self._rng.standard_normal(out=variates)
+        return *self.instability.table(until), *self.walk.table(until)
 
     def sense(self, ideal: Array, time: Array, interval: Array, overwrite: bool) -> Array:
         ideal = ready(ideal)

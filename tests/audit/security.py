@@ -9,16 +9,21 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.leaderboard.results import store
 from tests.fuzz import fuzz_logs, fuzz_tomls
-from tests.hostile.attacks import CHEATS, cheats, plain, vandals
+from tests.hostile.attacks import CHEATS, Harm, cheats, plain, vandals
 
-__all__ = ["kills", "rows"]
+__all__ = ["kills", "parts", "rows"]
 
 KILLS, TOMLS, LOGS = 100, 10_000, 3_000
+_KILLS, _TOMLS, _LOGS = 10, 10, 3  # parts of each
 
 _CAMPAIGN = """
 import sys
@@ -33,37 +38,72 @@ if __name__ == "__main__":
 _SCENARIO = Path(__file__).parents[1] / "hostile" / "cheats" / "scenario.toml"
 
 
-def rows() -> Iterator[tuple[str, str, str, bool]]:
+def parts() -> dict[str, Callable[[], Any]]:
+    """What is measured, by name."""
+    found: dict[str, Callable[[], Any]] = {}
+    for kind in confinements():
+        found[f"cheats-{kind}"] = partial(_in_folder, partial(cheats, confinement=kind))
+        found[f"vandals-{kind}"] = partial(_in_folder, lambda folder, kind=kind: asdict(vandals(folder, kind)))
+    found |= {f"kills-{k}": partial(kills, KILLS // _KILLS, k) for k in range(_KILLS)}
+    found |= {f"tomls-{k}": partial(_tracebacks, fuzz_tomls, TOMLS // _TOMLS, k) for k in range(_TOMLS)}
+    found |= {f"logs-{k}": partial(_tracebacks, fuzz_logs, LOGS // _LOGS, k) for k in range(_LOGS)}
+    return found
+
+
+def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
     """What, figure, promised, kept."""
-    with tempfile.TemporaryDirectory() as folder:
-        gained = cheats(Path(folder))
-    yield "cheats that gained", f"{len(gained)} of {len(CHEATS)}", "0", not gained
-    with tempfile.TemporaryDirectory() as folder:
-        harm = vandals(Path(folder))
-    yield "hostile rows that touched others", f"{len(harm.touched)} by {harm.tried}", "0", not harm.touched
-    yield "hostile rows without a status of their own", f"{len(harm.unnamed)} of {harm.tried}", "0", not harm.unnamed
-    number, differ = kills(KILLS)
-    yield "tables that differ after SIGKILLs", f"{differ} of {number}, {KILLS} kills", "0", not differ
-    for what, found, count in (("TOMLs", fuzz_tomls(TOMLS), TOMLS), ("logs", fuzz_logs(LOGS), LOGS)):
-        bad = sum(n for name, n in found.items() if name.startswith("traceback"))
-        yield f"broken {what} that give a traceback", f"{bad} of {count}", "0", not bad
+    for kind in confinements():
+        gained, harm = found[f"cheats-{kind}"], Harm(**found[f"vandals-{kind}"])
+        yield f"cheats that gained ({kind})", f"{len(gained)} of {len(CHEATS)}", "0", not gained
+        yield (
+            f"hostile rows that touched others ({kind})",
+            f"{len(harm.touched)} by {harm.tried}",
+            "0",
+            not harm.touched,
+        )
+        what = f"hostile rows without a status of their own ({kind})"
+        yield what, f"{len(harm.unnamed)} of {harm.tried}", "0", not harm.unnamed
+    wars = [found[f"kills-{k}"] for k in range(_KILLS)]
+    killed, campaigns, differ = (sum(column) for column in zip(*wars, strict=True))
+    yield f"campaigns with other results after {killed} SIGKILLs", f"{differ} of {campaigns}", "0", not differ
+    for what, count, blocks in (("tomls", TOMLS, _TOMLS), ("logs", LOGS, _LOGS)):
+        bad = sum(len(found[f"{what}-{k}"]) for k in range(blocks))
+        name = what.replace("tomls", "TOMLs")
+        yield f"broken {name} that give a traceback", f"{bad} of {count}", "0", not bad
 
 
-def kills(count: int) -> tuple[int, int]:
+def confinements() -> list[str]:
+    """Those that work here."""
+    return ["process"] if bubblewrap.available() else ["process", "bubblewrap"]
+
+
+def _in_folder(measure: Callable[[Path], Any]) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        return measure(Path(folder))
+
+
+def _tracebacks(fuzz: Callable[[int, int], Mapping[str, int]], number: int, seed: int) -> list[str]:
+    return [name for name in fuzz(number, seed) if name.startswith("traceback")]
+
+
+def kills(count: int, seed: int = 0) -> tuple[int, int, int]:
     """Kill campaigns at random moments, and start them again until they end.
 
     Parameters
     ----------
     count : int
-        SIGKILLs.
+        SIGKILLs, at least.
+    seed : int
+        Of the moments.
 
     Returns
     -------
-    campaigns, differ : int
-        How many campaigns were killed, once or more, and how many tables differ from that of one that was not.
+    killed, campaigns, differ : int
+        How many SIGKILLs there were, in how many campaigns, and how many tables differ from that of one that was not
+        killed.
     """
     with tempfile.TemporaryDirectory() as name:
-        folder, chance, differ, killed, number = Path(name), random.Random(0), 0, 0, 0
+        folder, chance, differ, killed, number = Path(name), random.Random(seed), 0, 0, 0
         script = folder / "campaign.py"
         script.write_text(_CAMPAIGN)
 
@@ -89,4 +129,4 @@ def kills(count: int) -> tuple[int, int]:
                     killed += 1
                 process.wait()
             differ += start(results).wait() != 0 or table(results) != table(folder / "peace")
-    return number, differ
+    return killed, number, differ

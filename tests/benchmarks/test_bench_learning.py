@@ -1,4 +1,5 @@
-"""Learning tasks: steps a second of the tuning task in its vector form, beside Gymnasium's, and a step of guidance.
+"""Learning tasks: steps a second of the tuning task and of guidance in their vector forms,
+beside Gymnasium's, and single steps in closed loop.
 
 ``pytest tests/benchmarks/test_bench_learning.py --benchmark-enable -s``. The three vector forms step the same voyages
 in turn, so that the ratios hold on a machine that is busy. All is in one process on one core, but for
@@ -18,6 +19,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from simnav.environment import NavigationEnv
 from simnav.estimators.learning.environment import FilterTaskEnv
 from simnav.estimators.learning.guidance import GuidanceEnv
+from simnav.estimators.learning.guidance_vector import GuidanceVectorEnv
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
 NAME, N, STEPS = "training-gnss-faults", 64, 200
@@ -64,6 +66,29 @@ def test_vector_forms_side_by_side(bank, benchmark):
     actions = np.zeros(bank.action_space.shape, np.float32)
     benchmark.pedantic(bank.step, (actions,), rounds=5, iterations=30, warmup_rounds=1)
     assert median["bank"] > 10.0 * median["SyncVectorEnv"]
+
+
+def test_vector_forms_of_guidance_side_by_side(benchmark):
+    """Nothing is prepared here: each step is one of the world, the instruments, the filter and the scores."""
+    n = 16
+    forms = {
+        "bank": GuidanceVectorEnv("gnss-noise-step", n),
+        "SyncVectorEnv": SyncVectorEnv([lambda: GuidanceEnv("gnss-noise-step")] * n),
+    }
+    rates = {name: [] for name in forms}
+    for envs in forms.values():
+        envs.reset(seed=1)
+        rate(envs, 4)
+    for _ in range(5):  # in turn
+        for name, envs in forms.items():
+            rates[name].append(rate(envs, 20))
+    median = {name: float(np.median(values)) for name, values in rates.items()}
+    print("\nsteps of guidance a second:", {name: round(value) for name, value in median.items()})
+    bank = forms["bank"]
+    bank.reset(seed=1)
+    actions = np.zeros(bank.action_space.shape, np.float32)
+    benchmark.pedantic(bank.step, (actions,), rounds=5, iterations=30, warmup_rounds=1)
+    assert median["bank"] > 1.1 * median["SyncVectorEnv"]
 
 
 def test_a_step_of_guidance(benchmark):

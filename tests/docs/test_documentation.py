@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from simnav.estimator import make
 from simnav.scenario import load
 from simnav.testing.contract_check import check
 
@@ -112,6 +113,20 @@ def test_a_log_becomes_a_scenario(tmp_path, monkeypatch):
     (tmp_path / "voyage.toml").write_text(scenario + outage)
     assert "ship-ekf" in simnav(tmp_path, lines[1])
     assert [f.kind for f in load(str(tmp_path / "voyage.toml")).faults] == ["outage"]
+
+
+def test_a_learning_agent(tmp_path, monkeypatch, capsys):
+    page, names = "tutorials/learning-agent.md", {}
+    monkeypatch.chdir(tmp_path)
+    for block in blocks(page, "python"):
+        exec(block, names)
+    assert "(4, 24) (2,)" in capsys.readouterr().out
+    assert abs(names["returns"][0.0]) < 1e-6
+    assert names["best"] > 0.0
+    (line,) = commands(page)
+    words = shlex.split(line)
+    assert words[2] == "policy-ekf:file=policy.npz"
+    assert make("policy-ekf", file="policy.npz").policy.trained_on["voyages"] == 4
 
 
 # -- guides --------------------------------------------------------------------------------------------------

@@ -54,10 +54,14 @@ def test_the_cross_entropy_method_learns(example, tmp_path):
 def test_learning_curves_over_training_seeds(example, tmp_path):
     curve, agent = example("learning_curve"), example("cross_entropy")
     options = {"generations": 5, "population": 8, "repeats": 1, "voyages": 1, "length": 20}
-    steps, found = curve.curves(agent, range(2), [1, 2], **options)
+    steps, found = curve.curves(agent, range(2), [1, 2], tmp_path / "kept", **options)
     assert steps.tolist() == [5 * 8 * 20]
     assert found.shape == (2, 1)
-    curve.draw(np.array([1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 3.0]]), "two seeds", tmp_path / "curve.png")
+    agent.train = None  # what is there is not trained again
+    np.testing.assert_array_equal(curve.curves(agent, range(2), [1, 2], tmp_path / "kept")[1], found)
+    assert Policy.load(tmp_path / "kept" / "cross_entropy-1.npz").trained_on["seed"] == 1
+    two = np.array([1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 3.0]])
+    curve.draw({"one": two, "other": two}, "two seeds", tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 1000
 
 
@@ -65,21 +69,29 @@ def test_stable_baselines(example, tmp_path):
     pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
     module = example("stable_baselines")
     seen = []
-    policy = module.train(steps=1280, num_envs=4, voyages=2, length=20, after=lambda done, p: seen.append((done, p)))
-    assert [done for done, _ in seen] == [256, 512, 768, 1024, 1280]
+    options = {"num_envs": 4, "same": 2, "voyages": 2, "length": 20, "parts": 3}
+    policy = module.train(steps=480, after=lambda done, p: seen.append((done, p)), **options)
+    assert [done for done, _ in seen] == [160, 320, 480]
+    assert [p.trained_on["steps"] for _, p in seen] == [160, 320, 480]
     first, last = (p(np.ones(24)) for p in (seen[0][1], seen[-1][1]))
     assert np.abs(first - last).max() > 1e-4
     again = runs_as_an_estimator(policy, tmp_path / "policy.npz")
     np.testing.assert_array_equal(again(np.ones(24)), last)
+    assert set(again.trained_on["versions"]) == {"simnav", "stable-baselines3", "torch", "numpy"}
 
 
 def test_a_policy_in_plain_arrays_is_the_network_of_the_library(example):
+    """With its normalisation of observations, after some of them; it begins as the plain filter."""
     pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
     module = example("stable_baselines")
-    envs = module.FilterTaskVectorEnv(
-        module.FAMILY, "Tuning", 2, instruments="fixes", steps=3, voyages=1, autoreset_mode="SAME_STEP"
-    )
-    model = module.PPO("MlpPolicy", module.BankOfFilters(envs), device="cpu", n_steps=8, batch_size=16)
-    policy = module.policy_of(model, envs, {})
-    observation = np.linspace(-2.0, 2.0, 24, dtype=np.float32)
-    np.testing.assert_allclose(policy(observation), model.predict(observation, deterministic=True)[0], atol=1e-5)
+    envs, model = module.made(num_envs=2, same=2, voyages=1, length=20)
+    observation = np.random.default_rng(1).normal(size=(50, 24)).astype(np.float32)
+    told = module.record_of_training(module.FAMILY, 1)
+    assert np.abs(module.policy_of(model, envs, told)(observation)).max() < 0.1
+    model.learn(80)
+    normalisation = model.get_vec_normalize_env()
+    assert normalisation.obs_rms.var.max() < 0.5  # it has seen observations, not only its start at 1
+    actions = model.predict(normalisation.normalize_obs(observation), deterministic=True)[0]
+    policy = module.policy_of(model, envs, told)
+    assert np.abs(actions).max() > 0.01
+    np.testing.assert_allclose(policy(observation), actions, atol=1e-5)

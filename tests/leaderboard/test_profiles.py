@@ -81,4 +81,5 @@ def test_a_campaign_runs_the_parts_of_a_profile(tmp_path: Path):
         f'[[part]]\nscenarios = ["{pond}"]\nestimators = ["gnss-only"]\nruns = 3\n'
     )
     report = simnav.campaign(profile=file, output=tmp_path / "out", workers=1)
-    assert (len(report.results), report.summary.computed, report.summary.total) == (3, 3, 5)
+    assert (len(report.results), report.summary.computed, report.summary.total) == (6, 6, 10)
+    assert {r.estimator for r in report.results if r.reference} == {"oracle"}  # which is added

@@ -20,6 +20,8 @@ from simnav.trial_log import TrialLog
 from simnav.wire import InvalidOutputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.recording import Recording
 
@@ -92,16 +94,18 @@ def chosen_confinement(asked: str = "auto") -> str:
         "process" if asked == "auto" else asked)  # fmt: skip
 
 
-def prepare(confinement: str, hidden: Path, *, loaded: bool = True) -> EstimatorServer:
+def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, sealed: bool = False) -> EstimatorServer:
     """The server of this process: the one that is there, or a new one that begins to load its kernels.
 
     Parameters
     ----------
     confinement : {"process", "bubblewrap"}
-    hidden : Path
-        Folder of the results.
+    hidden : sequence of Path
+        What estimators must not read.
     loaded : bool
         With kernels; False will do for looking at estimators.
+    sealed : bool
+        Of a sealed campaign.
     """
     global _server, _owner
     if _server is not None and _owner != os.getpid():
@@ -111,6 +115,7 @@ def prepare(confinement: str, hidden: Path, *, loaded: bool = True) -> Estimator
         _server = None
     if _server is None:
         _server, _owner = EstimatorServer(confinement, hidden, loaded=loaded), os.getpid()
+    _server.hidden, _server.sealed = tuple(hidden), sealed
     return _server
 
 
@@ -174,7 +179,8 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     Returns
     -------
     dict
-        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty).
+        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty), and
+        ``learned_from`` as it was told, not checked.
 
     Raises
     ------
@@ -190,4 +196,5 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     source, failure = told.get("source"), told.get("failure")
     if not isinstance(source, str) or not isinstance(failure, str) or len(source) > 200:
         raise ValueError("it says nothing of itself that can be read")
-    return {"reference": told.get("reference") is True, "source": source, "failure": failure[:1000]}
+    known = {"reference": told.get("reference") is True, "source": source, "failure": failure[:1000]}
+    return {**known, "learned_from": told.get("learned_from", [])}

@@ -40,7 +40,7 @@ def available() -> str:
 
 
 def wrapped(
-    command: Sequence[str], environment: dict[str, str], hidden: Path | None, writable: Path | None
+    command: Sequence[str], environment: dict[str, str], hidden: Sequence[Path], writable: Path | None
 ) -> list[str]:
     """A command line that runs a command in a sandbox.
 
@@ -49,8 +49,8 @@ def wrapped(
     command : sequence of str
     environment : dict
         That the command is started with; what the sandbox needs is set in it.
-    hidden : Path or None
-        Folder that is shown empty.
+    hidden : sequence of Path
+        Folders and files that are shown empty.
     writable : Path or None
         Folder that stays as it is: for the kernels that estimators compile.
     """
@@ -64,6 +64,9 @@ def wrapped(
     options = list(_BASE)
     if writable is not None:
         options += ["--bind", str(writable), str(writable)]
-    if hidden is not None and os.path.isdir(hidden):
-        options += ["--tmpfs", str(hidden)]
+    for path in hidden:
+        if path.is_dir():
+            options += ["--tmpfs", str(path)]
+        elif path.exists():
+            options += ["--ro-bind", os.devnull, str(path)]
     return [shutil.which("bwrap") or "bwrap", *options, "--chdir", "/", "--as-pid-1", "--", *command]

@@ -15,6 +15,7 @@ from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
 from simnav.kinds import INSTRUMENTS
 from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, command_of, read_message, write_all
 from simnav.leaderboard.campaign.fingerprint import estimator_source
+from simnav.leaderboard.campaign.training_runs import told_of
 from simnav.plugins import load_plugin
 from simnav.trial import describe_failure
 from simnav.types import NavigationStates
@@ -93,9 +94,9 @@ class _Session:
             sys.path[:] = [*entrant.search, *path]
             _seed(words)
             cls = entrant.find()
-            told = {"reference": bool(cls.reference), "source": estimator_source(cls), "failure": ""}
+            told: dict[str, Any] = {"reference": bool(cls.reference), "source": estimator_source(cls), "failure": ""}
             try:
-                entrant.make()
+                told["learned_from"] = told_of(entrant.make())
             except EstimatorError as error:
                 if error.__cause__ is None or entrant.parameters:  # what was asked for does not fit
                     raise

@@ -1,6 +1,7 @@
 """Landlock: a Linux process that gives up rights for itself and all that it starts (Linux 5.13 and later).
 
-An estimator process can then write only below a few folders. From Linux 6.7 on it can open no TCP connection, and from
+An estimator process can then write only below a few folders, and read nothing in the folder of the results or in the
+file of a secret key. From Linux 6.7 on it can open no TCP connection, and from
 6.12 on it can send no signal to a process outside its own domain. It can trace no process outside, either.
 Needs no privilege and no package; see the kernel's documentation, "Landlock: unprivileged access control".
 """
@@ -15,13 +16,13 @@ import struct
 import sys
 from collections.abc import Iterable
 
-__all__ = ["available", "restrict", "signals_are_scoped"]
+__all__ = ["Unreadable", "available", "restrict", "signals_are_scoped"]
 
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # system calls, the same on all architectures
 _PR_SET_NO_NEW_PRIVS = 38
 _PATH_BENEATH = 1
 
-_WRITE_FILE, _TRUNCATE = 1 << 1, 1 << 14
+_WRITE_FILE, _READ_FILE, _TRUNCATE = 1 << 1, 1 << 2, 1 << 14
 #: Rights over files by the version of the interface that brought them: all that change something.
 _WRITING = {1: sum(1 << bit for bit in (1, 4, 5, 6, 7, 8, 9, 10, 11, 12)), 2: 1 << 13, 3: _TRUNCATE}
 _TCP = (4, 0b11)  # version, bind and connect
@@ -62,30 +63,97 @@ def restrict(writable: Iterable[str | os.PathLike[str]]) -> bool:
         Whether it is in force.
     """
     version = _version()
-    if not version:
-        return False
-    libc = ctypes.CDLL(None)
     rights = sum(bits for since, bits in _WRITING.items() if since <= version)
-    attributes = struct.pack("=Q", rights)
-    if version >= _TCP[0]:
-        attributes += struct.pack("=Q", _TCP[1])
-    if version >= _SCOPES[0]:
-        attributes += struct.pack("=Q", _SCOPES[1])
-    ruleset = libc.syscall(_CREATE_RULESET, attributes, ctypes.c_size_t(len(attributes)), ctypes.c_uint32(0))
+    ruleset = _ruleset(rights, _TCP[1] if version >= _TCP[0] else 0, _SCOPES[1] if version >= _SCOPES[0] else 0)
     if ruleset < 0:
         return False
     try:
         for path in writable:
-            with contextlib.suppress(OSError):
-                opened = os.open(path, os.O_PATH | os.O_CLOEXEC)
-                try:
-                    own = rights if os.path.isdir(path) else rights & (_WRITE_FILE | _TRUNCATE)
-                    rule = struct.pack("=Qi", own, opened)
-                    libc.syscall(_ADD_RULE, ruleset, _PATH_BENEATH, rule, ctypes.c_uint32(0))
-                finally:
-                    os.close(opened)
-        if libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
-            return False
-        return bool(libc.syscall(_RESTRICT_SELF, ruleset, ctypes.c_uint32(0)) == 0)
+            _allow(ruleset, path, rights if os.path.isdir(path) else rights & (_WRITE_FILE | _TRUNCATE))
+        return _enforce(ruleset)
     finally:
         os.close(ruleset)
+
+
+class Unreadable:
+    """Files that a process and its children give up to read.
+
+    Landlock knows rights that are granted, for a folder with all that is below it. So the right to read is granted for
+    everything beside the way to the hidden places. The folders on this way can still be listed.
+
+    Parameters
+    ----------
+    hidden : iterable of str
+        Files and folders. They need not exist.
+    """
+
+    def __init__(self, hidden: Iterable[str]):
+        self._hidden = {os.path.realpath(path) for path in hidden}
+        self._way = {parent for path in self._hidden for parent in _parents(path)}
+        self._ruleset, self._seen = -1, dict[str, int]()
+
+    def prepare(self) -> None:
+        """Note what can be read; done again where a folder on the way has changed, so that new files count."""
+        if not self._hidden or not available():
+            return
+        seen = {folder: os.stat(folder).st_mtime_ns for folder in self._way if os.path.isdir(folder)}
+        if self._ruleset >= 0:
+            if seen == self._seen:
+                return
+            os.close(self._ruleset)
+        self._seen, self._ruleset = seen, _ruleset(_READ_FILE)
+        if self._ruleset < 0:
+            return
+        for folder in self._way:
+            with contextlib.suppress(OSError), os.scandir(folder) as entries:
+                for entry in entries:  # what a link leads to counts where it lies
+                    if entry.path not in self._hidden and entry.path not in self._way and not entry.is_symlink():
+                        _allow(self._ruleset, entry.path, _READ_FILE)
+
+    def enforce(self) -> bool:
+        """Give the rest up; whether that is in force."""
+        return not self._hidden or (self._ruleset >= 0 and _enforce(self._ruleset))
+
+
+def _parents(path: str) -> list[str]:
+    found = []
+    while (parent := os.path.dirname(path)) != path:
+        found.append(parent)
+        path = parent
+    return found
+
+
+def _ruleset(files: int, tcp: int = 0, scopes: int = 0) -> int:
+    """Descriptor of a new set of rules over these rights; negative where there is none."""
+    version = _version()
+    if not version:
+        return -1
+    attributes = struct.pack("=Q", files)
+    if version >= _TCP[0]:
+        attributes += struct.pack("=Q", tcp)
+    if version >= _SCOPES[0]:
+        attributes += struct.pack("=Q", scopes)
+    return int(_libc().syscall(_CREATE_RULESET, attributes, ctypes.c_size_t(len(attributes)), ctypes.c_uint32(0)))
+
+
+def _allow(ruleset: int, path: str | os.PathLike[str], rights: int) -> None:
+    """Grant rights below a path; nothing where it does not exist."""
+    with contextlib.suppress(OSError):
+        opened = os.open(path, os.O_PATH | os.O_CLOEXEC)
+        try:
+            rule = struct.pack("=Qi", rights, opened)
+            _libc().syscall(_ADD_RULE, ruleset, _PATH_BENEATH, rule, ctypes.c_uint32(0))
+        finally:
+            os.close(opened)
+
+
+def _enforce(ruleset: int) -> bool:
+    libc = _libc()
+    if libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
+        return False
+    return bool(libc.syscall(_RESTRICT_SELF, ruleset, ctypes.c_uint32(0)) == 0)
+
+
+@functools.cache
+def _libc() -> ctypes.CDLL:
+    return ctypes.CDLL(None)

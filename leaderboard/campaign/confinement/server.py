@@ -25,8 +25,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+from simnav.leaderboard.campaign.confinement import seccomp
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES, live
-from simnav.leaderboard.campaign.confinement.landlock import restrict
+from simnav.leaderboard.campaign.confinement.landlock import Unreadable, restrict
 from simnav.leaderboard.campaign.confinement.limits import (
     become_reaper,
     death_of,
@@ -54,6 +55,8 @@ def main() -> None:
     become_reaper()
     _load()
     own = Path(tempfile.mkdtemp(prefix="simnav-estimator-"))
+    hidden: list[str] = []
+    unreadable = Unreadable(hidden)
     try:
         control.sendall(json.dumps({"ready": True}).encode())
         while True:
@@ -61,7 +64,10 @@ def main() -> None:
             if request is None:
                 return
             if "fork" in request:
-                _fork(control, request["fork"], descriptors, own)
+                if hidden != request["fork"]["hidden"]:
+                    hidden = request["fork"]["hidden"]
+                    unreadable = Unreadable(hidden)
+                _fork(control, request["fork"], descriptors, own, unreadable)
             for name in request.get("import", ()):
                 if name in LIBRARIES:
                     with contextlib.suppress(Exception):
@@ -76,6 +82,8 @@ def _load() -> None:
     from simnav.estimator.registry import discover_own
 
     discover_own()
+    importlib.import_module("simnav.leaderboard.campaign.entrant")  # or each estimator process would
+    importlib.import_module("numpy.random")
     source, target = os.environ.pop(COPY_FROM, ""), cache_directory()
     if source and target is not None and "kernels" in sys.argv[2:]:
         for part in {k.fingerprint() for kernel in kernels() for k in kernel.tree()}:
@@ -94,16 +102,21 @@ def _receive(control: socket.socket) -> tuple[dict[str, Any] | None, list[int]]:
     return (json.loads(data) if data else None), descriptors
 
 
-def _fork(control: socket.socket, asked: dict[str, Any], descriptors: list[int], own: Path) -> None:
+def _fork(
+    control: socket.socket, asked: dict[str, Any], descriptors: list[int], own: Path, unreadable: Unreadable
+) -> None:
     """Fork an estimator process and look after it until the worker has done with it."""
     temporary = own / "run"
     temporary.mkdir()
+    cache = asked["cache"] and str(own / asked["cache"])  # below its own folder, or an absolute path
+    if asked["landlock"]:
+        unreadable.prepare()
     before, parent = out_of_memory_kills(), os.getpid()
     child = os.fork()
     if child == 0:
         try:
             control.close()
-            _become_estimator(parent, asked, descriptors, temporary)
+            _become_estimator(parent, asked | {"cache": cache}, descriptors, temporary, unreadable)
         finally:
             os._exit(70)
     for descriptor in descriptors:
@@ -140,11 +153,15 @@ def _fork(control: socket.socket, asked: dict[str, Any], descriptors: list[int],
     control.sendall(json.dumps(told).encode())
 
 
-def _become_estimator(parent: int, asked: dict[str, Any], descriptors: list[int], temporary: Path) -> None:
+def _become_estimator(
+    parent: int, asked: dict[str, Any], descriptors: list[int], temporary: Path, unreadable: Unreadable
+) -> None:
     """The forked process until it ends."""
     os.setsid()  # Ctrl-C in the terminal is not for it
     die_with_parent(parent)
     faulthandler.disable()
+    if asked["landlock"]:
+        unreadable.enforce()
     for which in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
         signal.signal(which, signal.SIG_DFL)
     nothing = os.open(os.devnull, os.O_RDWR)
@@ -169,6 +186,7 @@ def _become_estimator(parent: int, asked: dict[str, Any], descriptors: list[int]
         os.chdir(asked["folder"])
     if asked["landlock"]:
         restrict(writable)
+    seccomp.deny()
     limit(asked["timeout"], asked["memory"])
     live(down, up)
     os._exit(0)

@@ -12,7 +12,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -87,15 +87,20 @@ class EstimatorServer:
     Parameters
     ----------
     confinement : {"process", "bubblewrap"}
-    hidden : Path
-        Folder that a sandbox does not show: that of the results.
+    hidden : sequence of Path
+        What estimators must not read: the folder of the results, and the file of a secret key.
     loaded : bool
         Load all kernels.
+    sealed : bool
+        Keep nothing that estimators write from one campaign to the next.
 
     Attributes
     ----------
     confinement : str
         What is in force: ``process``, ``landlock`` or ``bubblewrap``.
+    hidden : tuple of Path
+    sealed : bool
+        Of ``bubblewrap`` what is hidden is fixed; otherwise both count for the next run.
 
     Raises
     ------
@@ -103,10 +108,10 @@ class EstimatorServer:
         If it does not start.
     """
 
-    def __init__(self, confinement: str, hidden: Path | None = None, *, loaded: bool = True):
+    def __init__(self, confinement: str, hidden: Sequence[Path] = (), *, loaded: bool = True, sealed: bool = False):
         self._landlock = landlock.available()
         self.confinement = confinement if confinement != "process" or not self._landlock else "landlock"
-        self._hidden = hidden
+        self.hidden, self.sealed = tuple(hidden), sealed
         self._loaded = loaded
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
@@ -115,7 +120,7 @@ class EstimatorServer:
         command_line = [sys.executable, "-P", "-m", f"{__package__}.server", str(theirs.fileno())]
         command_line += ["kernels"] if loaded else []
         if confinement == "bubblewrap":
-            command_line = bubblewrap.wrapped(command_line, environment, hidden, writable=self._caches())
+            command_line = bubblewrap.wrapped(command_line, environment, self.hidden, writable=self._caches())
         try:
             self._process = subprocess.Popen(
                 command_line, env=environment, cwd="/", pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL,
@@ -141,12 +146,25 @@ class EstimatorServer:
             return folder
         return None
 
-    def fits(self, confinement: str, hidden: Path | None, loaded: bool) -> bool:
+    def _cache(self, entrant: Entrant) -> str:
+        """Folder of the kernels that a file compiles; empty where there is none.
+
+        Each entrant has one of its own: two of one file could otherwise tell each other of a run that only one of them
+        has seen to its end. In a sealed campaign the folder goes with the server.
+        """
+        if not self._landlock:
+            return ""
+        known = f"{entrant.name} {entrant.label} {sorted(entrant.parameters.items())!r} {entrant.source}"
+        name = hashlib.blake2b(known.encode(errors="surrogatepass"), digest_size=8).hexdigest()
+        caches = None if self.sealed else self._caches()
+        return name if caches is None else str(caches / name)
+
+    def fits(self, confinement: str, hidden: Sequence[Path], loaded: bool) -> bool:
         """Whether it serves what is asked for, and is there."""
         if loaded and not self._loaded:
             return False
         same = self.confinement == confinement or (confinement == "process" and self.confinement == "landlock")
-        return same and (confinement != "bubblewrap" or hidden == self._hidden) and self._process.poll() is None
+        return same and (confinement != "bubblewrap" or tuple(hidden) == self.hidden) and self._process.poll() is None
 
     def wait_until_ready(self) -> None:
         """Wait until kernels are loaded.
@@ -203,14 +221,14 @@ class EstimatorServer:
         down, write = os.pipe()
         read, up = os.pipe()
         file = entrant.name.partition(".py")[0] + ".py" if ".py" in entrant.name else ""
-        caches = self._caches() if file else None
         asked = {
             "timeout": limits.timeout,
             "memory": limits.memory,
             "landlock": self._landlock,
             "core": core,
             "folder": os.path.dirname(file) or "/",
-            "cache": str(caches / hashlib.blake2b(file.encode(), digest_size=8).hexdigest()) if caches else "",
+            "cache": self._cache(entrant) if file else "",
+            "hidden": [str(path) for path in self.hidden],
         }
         try:
             try:

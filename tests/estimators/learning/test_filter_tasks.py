@@ -160,6 +160,28 @@ def test_disabled_voyages_stand_still_until_they_are_begun_anew(scenario):
     assert rewards[1] == 0.0
 
 
+def test_the_gain_is_relative_to_the_plain_filter_and_to_what_errors_are_usual(scenario):
+    def plain_filter(_):
+        return np.zeros(3, np.float32)
+
+    def agent(_):
+        return np.array([0.5, -0.4, 0.3], np.float32)
+
+    env = FilterTaskEnv(scenario, reward="gain", reveal_truth=True)
+    nothing, before = episode(env, 3, plain_filter)
+    gain, infos = episode(env, 3, agent)
+    assert np.abs(nothing).max() < 1e-6
+    assert np.abs(gain).max() > 0.02
+    alone, error = (np.array([info["error"] for info in found]) ** 2 for found in (before, infos))
+    ratio = np.exp(-2.0 * gain)  # (e^2 + r^2) / (p^2 + r^2)
+    moved = np.abs(ratio - 1.0) > 1e-3
+    usual = ((error - ratio * alone) / (ratio - 1.0))[moved]
+    least = np.cumsum(alone)[moved] / (1.0 + np.flatnonzero(moved))  # without the oracle's variance
+    assert (usual > least).all()
+    assert (usual < least + 100.0).all()
+    assert (np.sign(gain) == np.sign(alone - error))[moved].all()
+
+
 def test_the_labels_give_the_reward_of_detection(scenario):
     env = FilterTaskEnv(scenario, "Detection")
     assert isinstance(env.action_space, gymnasium.spaces.MultiBinary)
@@ -214,7 +236,7 @@ def test_training_voyages_have_seeds_of_their_own(scenario):
     ("call", "message"),
     [
         (lambda s: FilterTaskEnv(s, "Turning"), "task is one of Tuning, Detection, Correction, not 'Turning'"),
-        (lambda s: FilterTaskEnv(s, reward="labels"), "reward of Tuning is one of error, likelihood, not 'labels'"),
+        (lambda s: FilterTaskEnv(s, reward="labels"), "reward of Tuning is one of error, gain, likelihood, not"),
         (lambda s: FilterTaskEnv(s, steps=0), "steps is a positive integer or None, not 0"),
         (lambda s: FilterTaskEnv(s, instruments="some"), "instruments is 'all' or 'fixes', not 'some'"),
         (lambda s: FilterTaskEnv(s, render_mode="ascii"), "render_mode is 'human', 'rgb_array' or None"),

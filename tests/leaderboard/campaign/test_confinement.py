@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from simnav.estimator import make
-from simnav.leaderboard.campaign.confinement import bubblewrap
+from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, seccomp
 from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, chosen_confinement, seed_words
 from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits
 from simnav.leaderboard.campaign.entrant import Entrant
@@ -226,13 +227,77 @@ def test_what_can_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
         chosen_confinement("prison")
 
 
+@pytest.mark.skipif(not landlock.available(), reason="this system has no Landlock")
+def test_results_and_keys_cannot_be_read(
+    told: Callable[..., Any], server: EstimatorServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A trial that is kept holds the truth of the run; so does whoever knows the key."""
+    results, key, link = tmp_path / "results", tmp_path / "key", tmp_path / "link"
+    (results / "trials").mkdir(parents=True)
+    link.symlink_to(results)
+    for file in (results / "trials" / "a.parquet", key, tmp_path / "mine.csv"):
+        file.write_text("secret")
+    monkeypatch.setattr(server, "hidden", (results, key))
+
+    def readable(*names: str) -> list[bool]:
+        text = "[os.system(f'cat {n} > /dev/null 2>&1') == 0"
+        return list(told(f"{text} for n in {[str(tmp_path / n) for n in names]!r}]"))
+
+    files = ("results/trials/a.parquet", "link/trials/a.parquet", "key", "mine.csv", "mine.py")
+    assert readable(*files) == [False, False, False, True, True]
+    (tmp_path / "later.csv").write_text("mine, too")
+    assert readable("later.csv", "key") == [True, False]
+    assert told("open('/proc/self/stat').read() != ''")
+    monkeypatch.setattr(server, "hidden", ())
+    assert readable("key") == [True]
+
+
+@pytest.mark.skipif(not seccomp.available(), reason="the system calls are not known here")
+def test_no_channel_leads_to_another_process(server: EstimatorServer, recording: Recording, tmp_path: Path) -> None:
+    """A socket of the user's desktop would start programs outside; shared memory outlives an estimator."""
+    update = f"""
+        import ctypes, socket
+        found = []
+        for family, kind in ((1, 1), (2, 1), (2, 2)):  # to a path, TCP, UDP
+            try:
+                socket.socket(family, kind)
+            except PermissionError:
+                found.append("refused")
+        for number in {seccomp.DENIED[platform.machine()][1:4]}:  # shmget, semget, msgget
+            found.append(ctypes.CDLL(None).syscall(number, 0x5EC2E7, 1, 0o1600))
+        a, b = socket.socketpair()
+        a.send(b"x")
+        diagnostics = {{json.dumps([*found, b.recv(1).decode(), os.system("true")]): 1.0}}"""
+    there = ended(server, recording, tmp_path, update)
+    assert there.trial is not None, there.reason
+    assert json.loads(next(iter(there.trial.diagnostics))) == ["refused"] * 3 + [-1] * 3 + ["x", 0]
+
+
+@pytest.mark.skipif(not landlock.available(), reason="this system has no Landlock")
+def test_two_estimators_of_one_file_have_no_folder_in_common(
+    server: EstimatorServer, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that has seen the whole run could tell the other what will be measured."""
+    file = tmp_path / "mine.py"
+    file.write_text(HEAD.format(reset="", update="diagnostics = {os.environ['SIMNAV_CACHE_DIR']: 1.0}"))
+
+    def folder(label: str) -> str:
+        there = attempt(server, Entrant(str(file), {}, label, False, ""), recording, Limits(60.0, 1 << 30))
+        assert there.trial is not None
+        return next(iter(there.trial.diagnostics))
+
+    assert folder("a") == folder("a") != folder("b")
+    monkeypatch.setattr(server, "sealed", True)
+    assert "simnav-estimator-" in folder("a")  # gone with the server
+
+
 @pytest.mark.skipif(bool(bubblewrap.available()), reason=bubblewrap.available() or "it works")
 def test_a_sandbox_hides_results_and_has_no_network(recording: Recording, tmp_path: Path) -> None:
     results, outside = tmp_path / "results", tmp_path / "outside"
     results.mkdir()
     outside.mkdir()
     (results / "secret").touch()
-    server = EstimatorServer("bubblewrap", results)
+    server = EstimatorServer("bubblewrap", [results])
     try:
         update = f"""
         import socket
@@ -243,7 +308,8 @@ def test_a_sandbox_hides_results_and_has_no_network(recording: Recording, tmp_pa
                 return False
             return True
         found = [os.listdir({str(results)!r}), writes({str(outside)!r}), writes(os.environ['TMPDIR']),
-                 len(socket.if_nameindex()), sorted(int(p) for p in os.listdir('/proc') if p.isdigit())[0]]
+                 len(open('/proc/net/dev').readlines()) - 2,
+                 sorted(int(p) for p in os.listdir('/proc') if p.isdigit())[0]]
         diagnostics = {{json.dumps(found): 1.0}}"""
         there = ended(server, recording, tmp_path, update)
         assert there.status == "ok", there.reason

@@ -44,7 +44,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def campaign(**options: object) -> tuple[int, list[store.Result]]:
-    report = simnav.campaign("pond.toml", ESTIMATORS, runs=2, output="out", workers=1, **options)
+    report = simnav.campaign("pond.toml", ESTIMATORS, runs=2, output="out", workers=1, oracle=False, **options)
     return report.summary.computed, list(report.results)
 
 
@@ -72,12 +72,12 @@ def test_a_new_score_after_a_campaign(here: Path, monkeypatch: pytest.MonkeyPatc
     for label, median in medians.items():
         values = [r.scores["north_spread"] for r in after if r.estimator == label]
         assert median == pytest.approx(sum(values) / 2)
-    assert "north_spread" in simnav.campaign("pond.toml", ESTIMATORS, runs=2, output="out").to_frame()
+    assert "north_spread" in simnav.campaign("pond.toml", ESTIMATORS, runs=2, output="out", oracle=False).to_frame()
 
 
 def test_a_score_of_one_file_takes_part_in_a_campaign_of_several_workers(here: Path) -> None:
     load_plugin(shutil.copy(PLUGIN, here))  # a file of its own, so that it is imported anew
-    report = simnav.campaign("pond.toml", "gnss-only", runs=2, output="out", workers=2)
+    report = simnav.campaign("pond.toml", "gnss-only", runs=2, output="out", workers=2, oracle=False)
     assert [r.scores["share_above_10_m"] for r in report.results] == [0.0, 0.0]
 
 
@@ -110,10 +110,10 @@ def test_which_code_makes_scores_differ() -> None:
 
 def test_a_run_without_scores_is_not_void_by_an_edited_score(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (here / "bad.py").write_text(BAD)
-    first = simnav.campaign("pond.toml", "bad.py", runs=1, output="out", workers=1, keep_trials=True)
+    first = simnav.campaign("pond.toml", "bad.py", runs=1, output="out", workers=1, keep_trials=True, oracle=False)
     assert [r.status for r in first.results] == ["error"]
     monkeypatch.setattr("simnav.leaderboard.campaign.campaign.scoring_code", lambda: '{"simnav.scoring.accuracy": "1"}')
-    again = simnav.campaign("pond.toml", "bad.py", runs=1, output="out", workers=1, keep_trials=True)
+    again = simnav.campaign("pond.toml", "bad.py", runs=1, output="out", workers=1, keep_trials=True, oracle=False)
     assert again.summary.computed == 0
 
 
@@ -142,7 +142,7 @@ def test_what_cannot_be_rescored_is_one_sentence(here: Path, monkeypatch: pytest
         simnav.rescore("out")
     with pytest.raises(RequestError, match="there is no score 'cep05'; did you mean 'cep50'"):
         simnav.rescore("out", "cep05")
-    simnav.campaign("pond.toml", "gnss-only", runs=1, seed=7, output="out", keep_trials=True)
+    simnav.campaign("pond.toml", "gnss-only", runs=1, seed=7, output="out", keep_trials=True, oracle=False)
     with pytest.raises(RequestError, match="scenario pond-v1 is not in the catalogue; give its file with --scenario"):
         simnav.rescore("out")
     monkeypatch.setattr(rescoring, "simulator_version", lambda: "0.1.0+other")

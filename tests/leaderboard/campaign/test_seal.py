@@ -15,6 +15,7 @@ from simnav.leaderboard.campaign.campaign import run_campaign
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.plan import Plan
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.seal import Seal, read_seal
 from simnav.leaderboard.campaign.verification import verify_results
 from simnav.leaderboard.campaign.worker import Unit
@@ -38,7 +39,7 @@ def test_a_sealed_campaign_is_repeated_by_whoever_has_the_key(tmp_path: Path, ke
     scenario = load("harbour-multipath").model_copy(update={"duration": 20.0})
     request, out = EstimatorRequest("gnss-only"), tmp_path / "out"
     seal = read_seal(key)
-    run_campaign([scenario], [request], range(2), out, workers=1, seal=seal)
+    run_campaign([scenario], [request], range(2), out, workers=1, seal=seal, keep_trials=True)
     run_campaign([scenario], [request], range(2), tmp_path / "public", workers=1)
     found = store.load(out)
     assert [r.seed for r in found] == [0, 1]
@@ -57,6 +58,14 @@ def test_a_sealed_campaign_is_repeated_by_whoever_has_the_key(tmp_path: Path, ke
     assert verify_results(tmp_path / "public", scenarios=[scenario], sample=1).passed
     other = verify_results(out, Seal(bytes(32)), scenarios=[scenario])
     assert (other.passed, other.other_seals, other.repeated) == (False, 2, 0)
+
+    before = {r.key: r.scores["horizontal_rmse"] for r in found}
+    assert rescore_results(out, ["horizontal_rmse"], [scenario], seal=seal).rescored == 2
+    assert {r.key: r.scores["horizontal_rmse"] for r in store.load(out)} == pytest.approx(before, rel=1e-6)
+    with pytest.raises(RequestError, match="the seeds of these results are sealed; give the key, with --key KEYFILE"):
+        rescore_results(out, scenarios=[scenario])
+    with pytest.raises(RequestError, match=f"and the results carry {seal.hash}: it is another key"):
+        rescore_results(out, scenarios=[scenario], seal=Seal(bytes(32)))
 
 
 def test_a_changed_score_is_found(tmp_path: Path, key: Path) -> None:

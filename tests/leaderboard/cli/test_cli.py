@@ -340,7 +340,7 @@ def complaint_of(result) -> str:
 
 
 def test_campaign_goes_on_where_it_was_and_the_board_follows(here):
-    words = ["campaign", "-s", "pond.toml", "-e", "gnss-only,mine.py", "--workers", "1", "-o", "out"]
+    words = ["campaign", "-s", "pond.toml", "-e", "gnss-only,mine.py", "--no-oracle", "--workers", "1", "-o", "out"]
     first = document(*words, "--runs", "2")
     assert (first["asked"], first["computed"], first["runs"], first["failed"]) == (4, 4, 4, {})
     again = document(*words, "--runs", "3")
@@ -359,7 +359,18 @@ def test_campaign_goes_on_where_it_was_and_the_board_follows(here):
 
 
 def test_campaign_reports_failures_and_succeeds(here):
-    found = document("campaign", "-s", "pond.toml", "-e", "gnss-only,mine.py:choice=raise", "--workers", "1", "-n", "2")
+    found = document(
+        "campaign",
+        "-s",
+        "pond.toml",
+        "-e",
+        "gnss-only,mine.py:choice=raise",
+        "--no-oracle",
+        "--workers",
+        "1",
+        "-n",
+        "2",
+    )
     assert found["failed"] == {"error": 2}
     assert Path(found["results"]) == here / "results"
 
@@ -396,7 +407,9 @@ def test_folders_of_the_same_names_do_no_harm(tmp_path):
     found = json.loads(run.stdout)
     assert found["scenarios"]
     assert found["estimators"]
-    run = entry("campaign", "-s", "pond.toml", "-e", "gnss-only", "-n", "2", "--workers", "2", "--json", cwd=cwd)
+    run = entry(
+        "campaign", "-s", "pond.toml", "-e", "gnss-only", "--no-oracle", "-n", "2", "--workers", "2", "--json", cwd=cwd
+    )
     assert run.returncode == 0, run.stderr
     assert json.loads(run.stdout)["failed"] == {}
 

@@ -199,8 +199,10 @@ def test_damaged_files_are_set_aside(folder: Path, damage: str, compacted: bool)
         import pyarrow.parquet as pq
 
         pq.write_table(pa.table({"key": ["a"]}), victim)
+    noticed = store.load if compacted and damage == "flipped" else store.keys  # which reads the keys of parts only
     with pytest.warns(StoreWarning, match=victim.name):
-        there = store.keys(folder)
+        noticed(folder)
+    there = store.keys(folder)
     assert len(there) == 2
     aside = victim.with_name(victim.name + ".broken")
     assert aside.exists()

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
+import simnav
 from simnav.leaderboard import publishing
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results import store
@@ -166,6 +167,14 @@ def test_a_package_travels_as_a_wheel_and_is_never_imported_here(
     assert told.passed, told
     assert (told.identical, told.title) == (1, "simnav_packed_fix")
     assert not [n for n in sys.modules if n.startswith("simnav_packed_fix")]
+
+
+def test_a_bundle_is_merged_like_a_folder_of_results(made: Path, tmp_path: Path) -> None:
+    merged = simnav.merge([made], tmp_path / "out")
+    assert [(r.estimator, r.seed) for r in merged] == [("my_last_fix:MyLastFix(gain=0.9)", k) for k in range(2)]
+    bad = changed(made, tmp_path / "bad.zip", better_source, hashes=False)
+    with pytest.raises(RequestError, match="was changed"):
+        simnav.merge([bad], tmp_path / "other")
 
 
 # -- tampering ---------------------------------------------------------------------------------------------------

@@ -1,0 +1,81 @@
+"""No estimator is scored on a run that its parameters were learned from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from simnav.estimator import Estimator
+from simnav.leaderboard.results.errors import RequestError
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.entrant import Entrant
+    from simnav.scenario import Scenario
+
+__all__ = ["ranges_of", "require_unseen", "told_of"]
+
+_MOST_RANGES = 1000
+
+
+def told_of(estimator: Estimator) -> Any:
+    """What an estimator tells as `simnav.estimator.Estimator.learned_from`, as lists; a text where it is wrong."""
+    try:
+        return [[int(n) for n in pair] for pair in estimator.learned_from]
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+
+
+def ranges_of(told: Any) -> tuple[tuple[int, int], ...]:
+    """What `told_of` gave, perhaps in another process, checked.
+
+    Raises
+    ------
+    ValueError
+        If it is not pairs of integers: one sentence.
+    """
+    if not isinstance(told, list) or len(told) > _MOST_RANGES or not all(_is_pair(pair) for pair in told):
+        text = repr(told)
+        text = text if len(text) <= 100 else f"{text[:100]}..."
+        raise ValueError(
+            f"learned_from should hold at most {_MOST_RANGES} pairs of integers (first, last), but is {text}"
+        )
+    return tuple((int(first), int(last)) for first, last in told)
+
+
+def _is_pair(pair: object) -> bool:
+    return isinstance(pair, list) and len(pair) == 2 and all(type(n) is int for n in pair)
+
+
+def require_unseen(entrants: Sequence[Entrant], scenarios: Sequence[Scenario], seeds: Sequence[int]) -> None:
+    """Refuse runs whose random streams an estimator has learned from.
+
+    Runs of two scenarios with the same number share random streams, so the numbers are compared
+    (`simnav.scenario.Scenario.root`), whatever the scenarios are called.
+
+    Parameters
+    ----------
+    entrants, scenarios, seeds
+        Of a campaign that is not sealed.
+
+    Raises
+    ------
+    RequestError
+        Where there is one: estimator, scenario and the first such seed are named.
+    """
+    if not seeds or not any(entrant.learned_from for entrant in entrants):
+        return
+    dense = isinstance(seeds, range) and seeds.step == 1  # may be of any length
+    least, most = (seeds[0], seeds[-1]) if dense else (min(seeds), max(seeds))
+    for entrant in entrants:
+        for first, last in entrant.learned_from:
+            for scenario in scenarios:
+                shift = scenario.root(0)
+                low, high = max(first - shift, least), min(last - shift, most)
+                if low > high:
+                    continue
+                seen = low if dense else next((s for s in seeds if low <= s <= high), None)
+                if seen is not None:
+                    raise RequestError(
+                        f"estimator {entrant.label!r} has learned from the random streams of seed {seen} of "
+                        f"{scenario.id}; score it on other seeds"
+                    )
