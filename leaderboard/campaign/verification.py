@@ -108,7 +108,7 @@ def verify_results(
             what = f"{result.estimator} on {result.scenario}, run {result.seed}"
             report(k, len(chosen), note=what)
             try:
-                again = _repeat(result, Path(name) / str(k), seal, known, requests)
+                again = _repeat(result, Path(name) / "runs", seal, known, requests)  # one folder: one process
             except (RequestError, ValueError) as error:
                 without.append(f"{what}: {sentence(error)}")
                 continue
@@ -137,7 +137,8 @@ def _repeat(
         [scenario], [request], [result.seed], folder, workers=1, timeout=result.time_limit or None,
         memory=result.memory_limit or 2 << 30, seal=seal,
     )  # fmt: skip
-    return store.load(folder, series=False)[0]
+    mine = (result.scenario, result.estimator, result.seed)
+    return next(r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)
 
 
 def _same(stored: Mapping[str, float], again: Mapping[str, float]) -> bool:

@@ -24,7 +24,7 @@ __all__ = ["rows"]
 
 SCENARIO = "gnss-outage"
 ROWS = ("ekf", "gated-ekf", "iae", "sw-fgo")
-RUNS, WAITS = 4, 8
+RUNS, WAITS = 4, 6
 IDLE = 5.0  # for which the scheduler is watched without work [s]
 
 #: Stands for an estimator that has a core of its own, on a machine that has none free.
@@ -36,7 +36,7 @@ from simnav import Estimate, Estimator, register
 class Waiting(Estimator):
     def reset(self, start, instruments):
         self.position = start.position
-        time.sleep(4.0)
+        time.sleep(8.0)
 
     def update(self, measurements):
         return Estimate(measurements.time, position=self.position)
@@ -66,6 +66,14 @@ class _Cluster:
                         "--local-directory", str(self.folder / f"scratch-{len(self.workers)}"))
         )  # fmt: skip
 
+    def warm(self) -> None:
+        """Let each worker import simnav and load the kernels."""
+        from distributed import Client
+
+        with Client(self.address, set_as_default=False) as client:
+            client.wait_for_workers(len(self.workers))
+            client.run(exec, "import simnav.leaderboard.campaign.cluster\nfrom simnav.warmup import warmup\nwarmup()")
+
     def close(self) -> None:
         for process in (*self.workers, self.scheduler):
             process.kill()
@@ -83,11 +91,11 @@ def rows() -> Iterator[tuple[str, str, str, bool]]:
         cluster = _Cluster(folder)
         try:
             cluster.add()
-            _run(cluster, computing, folder / "warm", range(100, 101))  # kernels are loaded, and simnav is imported
+            cluster.warm()
             one = _run(cluster, computing, folder / "one", range(RUNS))
             one_waits = _run(cluster, waiting, folder / "one-waits", range(WAITS))
             cluster.add()
-            _run(cluster, computing, folder / "warm", range(101, 105))
+            cluster.warm()
             two = _run(cluster, computing, folder / "two", range(RUNS))
             two_wait = _run(cluster, waiting, folder / "two-wait", range(WAITS))
             before = _cpu(cluster.scheduler.pid)
@@ -100,13 +108,16 @@ def rows() -> Iterator[tuple[str, str, str, bool]]:
     runs = 2 * (RUNS + WAITS)
     scheduler = 1e3 * max(0.0, sum(c.scheduler - idle * c.wall for c in parts)) / runs
     campaign = 1e3 * sum(c.campaign for c in parts) / runs
+    four = 1e3 * (one.campaign + two.campaign) / (2 * RUNS)
+    single = 1e3 * (one_waits.campaign + two_wait.campaign) / (2 * WAITS)
     faster, waits = one.wall / two.wall, one_waits.wall / two_wait.wall
     yield f"two workers over one, {len(ROWS)} rows that compute", f"{faster:.2f}", "as cores are free", True
-    yield "two workers over one, a row that waits 4 s", f"{waits:.2f}", "at least 1.8", waits >= 1.8
+    yield "two workers over one, a row that waits 8 s", f"{waits:.2f}", "at least 1.8", waits >= 1.8
     yield "CPU of a worker for a run [ms]", f"{1e3 * one.workers / RUNS:.0f}, {1e3 * two.workers / RUNS:.0f}", "", True
     yield "CPU of the idle scheduler [% of a core]", f"{100.0 * idle:.1f}", "", True
     yield "CPU of the scheduler for a run, more than idle [ms]", f"{scheduler:.1f}", "", True
     yield "CPU of the campaign's process for a run [ms]", f"{campaign:.1f}", "", True
+    yield "  of four rows and of one [ms]", f"{four:.1f}, {single:.1f}", "", True
     yield "results of a run on disk [kB]", f"{size / 1e3:.0f}", "", True
 
 
@@ -121,19 +132,19 @@ class _Cost:
 
 
 def _run(cluster: _Cluster, requests: list[EstimatorRequest], folder: Path, seeds: range) -> _Cost:
-    begin: list[tuple[float, float, float, float]] = []
+    seen_at: list[tuple[float, float, float, float]] = []
 
     def now() -> tuple[float, float, float, float]:
         workers = sum(_cpu(pid) for worker in cluster.workers for pid in _family(worker.pid))
         return time.monotonic(), workers, _cpu(cluster.scheduler.pid), time.process_time()
 
     def seen(progress: Progress) -> None:
-        if progress.stage == "run" and not begin:  # the estimators are resolved, the kernels compiled
-            begin.append(now())
+        if progress.stage == "run":  # the first: estimators are resolved; the last: all runs are there
+            seen_at.append(now())
 
     run_campaign([load(SCENARIO)], requests, seeds, folder, backend="dask", scheduler=cluster.address, progress=seen,
                  confinement="none")  # fmt: skip
-    return _Cost(*(b - a for a, b in zip(begin[0], now(), strict=True)))
+    return _Cost(*(b - a for a, b in zip(seen_at[0], seen_at[-1], strict=True)))
 
 
 def _family(pid: int) -> list[int]:

@@ -34,6 +34,12 @@ def key(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture(autouse=True)
+def _unconfined(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seals do not depend on confinement, and its process takes a second to start for each folder."""
+    monkeypatch.setenv("SIMNAV_CONFINEMENT", "none")
+
+
 def test_a_sealed_campaign_is_repeated_by_whoever_has_the_key(tmp_path: Path, key: Path) -> None:
     warmup(load=False)
     scenario = load("harbour-multipath").model_copy(update={"duration": 20.0})
