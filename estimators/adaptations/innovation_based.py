@@ -160,7 +160,7 @@ class InnovationBased(EstimatedNoise):
         lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
-        scope: Scope = "fixes",
+        scope: Scope = "all",
     ):
         super().__init__(lowest, highest, full, scope)
         if source not in ("innovation", "residual"):
@@ -240,7 +240,7 @@ class FixedWindow(InnovationBased):
         lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
-        scope: Scope = "fixes",
+        scope: Scope = "all",
     ):
         super().__init__(
             source, innovations, innovations, forgetting=forgetting, newest=newest, significance=significance,

@@ -206,6 +206,7 @@ class EstimatedNoise(NoiseAdaptation):
         datasheet, and m (m - 1)/2 covariances that are zero cost accuracy to estimate.
     scope : "fixes" or "all"
         Whose noise is estimated: GNSS positions and terrain fixes (as in Mao, Wang and Fu 2025), or every instrument's.
+        With fixes only, a log that is wrong is believed in full, and the fixes that contradict it are doubted.
 
     Raises
     ------
@@ -213,7 +214,7 @@ class EstimatedNoise(NoiseAdaptation):
         If the bounds are not 0 < lowest <= highest, or the scope is none.
     """
 
-    def __init__(self, lowest: float, highest: float, full: bool = False, scope: Scope = "fixes"):
+    def __init__(self, lowest: float, highest: float, full: bool = False, scope: Scope = "all"):
         if not 0.0 < lowest <= highest:
             raise ValueError(f"lowest = {lowest:g} and highest = {highest:g}: it must be 0 < lowest <= highest")
         if scope not in ("fixes", "all"):

@@ -50,7 +50,7 @@ class SageHusa(EstimatedNoise):
         lowest: float = 1.0,
         highest: float = 30.0,
         full: bool = False,
-        scope: Scope = "fixes",
+        scope: Scope = "all",
     ):
         super().__init__(lowest, highest, full, scope)
         if not 0.0 < fading <= 1.0:

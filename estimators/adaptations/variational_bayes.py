@@ -85,7 +85,7 @@ class VariationalBayes(EstimatedNoise):
         iterations: int = 2,
         lowest: float = 1.0,
         highest: float = 30.0,
-        scope: Scope = "fixes",
+        scope: Scope = "all",
     ):
         super().__init__(lowest, highest, scope=scope)
         if not 0.0 < forgetting <= 1.0:

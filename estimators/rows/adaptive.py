@@ -40,7 +40,9 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
 
 
 @register("sage-husa-paper")
-class SageHusaPaper(_Adaptive, adaptation=piece(SageHusa, defaults={"fading": 1.0, "prior": 0, "lowest": 0.5})):
+class SageHusaPaper(
+    _Adaptive, adaptation=piece(SageHusa, defaults={"fading": 1.0, "prior": 0, "lowest": 0.5, "scope": "fixes"})
+):
     """Sage-Husa filter without fading, the rival in the figures of the paper on adaptive windows.
 
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph

@@ -14,6 +14,7 @@ __all__ = [
     "become_reaper",
     "death_of",
     "die_with_parent",
+    "keep_freed_memory",
     "kill_descendants",
     "limit",
     "out_of_memory_kills",
@@ -21,6 +22,7 @@ __all__ = [
 ]
 
 _LINUX = sys.platform == "linux"
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
 
@@ -57,6 +59,19 @@ def die_with_parent(parent: int) -> None:
             ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+
+
+def keep_freed_memory() -> None:
+    """Memory that is freed stays with this process and its forks (glibc).
+
+    A process that never held a large array gives freed memory back to the system at once, and asks for the same again
+    at every step: the pages of a window would be cleared anew for each epoch.
+    """
+    if _LINUX:
+        with contextlib.suppress(OSError, AttributeError):
+            libc = ctypes.CDLL(None)
+            for parameter, value in ((_M_MMAP_THRESHOLD, 32 << 20), (_M_TRIM_THRESHOLD, 256 << 20)):
+                libc.mallopt(parameter, value)
 
 
 def become_reaper() -> None:

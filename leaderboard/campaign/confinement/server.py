@@ -32,6 +32,7 @@ from simnav.leaderboard.campaign.confinement.limits import (
     become_reaper,
     death_of,
     die_with_parent,
+    keep_freed_memory,
     kill_descendants,
     limit,
     out_of_memory_kills,
@@ -53,6 +54,7 @@ def main() -> None:
     control = socket.socket(fileno=int(sys.argv[1]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     become_reaper()
+    keep_freed_memory()
     _load()
     own = Path(tempfile.mkdtemp(prefix="simnav-estimator-"))
     hidden: list[str] = []

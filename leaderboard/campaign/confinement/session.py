@@ -25,7 +25,7 @@ from simnav.leaderboard.campaign.confinement.kinds import homes_of_kinds
 from simnav.leaderboard.campaign.confinement.messages import LARGEST, Down, Up, command
 from simnav.trial import FailureError
 from simnav.types import NavigationStates
-from simnav.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
+from simnav.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketDecoder, PacketEncoder
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant
@@ -394,7 +394,7 @@ class RemoteSession:
         raise InvalidOutputError("the answer is not in the form of an estimate")
 
     def _send(self, buffers: list[Any]) -> None:
-        wanted = sum(memoryview(b).nbytes for b in buffers) if len(buffers) > 1 else len(buffers[0])
+        wanted = PacketDecoder.size(buffers[0]) if len(buffers) > 1 else len(buffers[0])
         try:
             sent = os.writev(self._write, buffers)
             if sent == wanted:

@@ -13,11 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from simnav.estimator import describe
 from simnav.leaderboard.ranking import reference
 from simnav.leaderboard.ranking.board import Ranking, Reference
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.ranking_table import track_table
 from simnav.leaderboard.ranking.statistics import FAILURE
+from simnav.leaderboard.ranking.tracks import SMOOTHED
 from simnav.leaderboard.results.result import Result
 
 TRACK = {"one-v1": "sea", "two-v1": "sea", "three-v1": "lake"}
@@ -328,3 +330,25 @@ def test_the_names_are_the_last_to_go_from_a_narrow_terminal(width: int):
     assert "a-row-with-a-long-name" in text
     assert "Left out for want of width" in " ".join(text.split())
     assert "estimator" in table.shown(10)
+
+
+def test_a_row_that_only_smooths_beside_another_is_ranked_by_what_it_smooths() -> None:
+    """As it declares, and only where the results agree in every run."""
+    assert describe("ekf-rts").real_time_as == "ekf"
+    base = campaign({"one-v1": {"ekf": 1.2, "iae": 1.3}, "two-v1": {"ekf": 2.2, "iae": 2.3}})
+    twins = [replace(r, estimator="ekf-rts", scores=r.scores | {SMOOTHED: 0.5}) for r in base if r.estimator == "ekf"]
+    found = row(ranked([*base, *twins]), "ekf-rts")
+    assert (found.standing, found.rank) == ("identical", None)
+    assert found.why == "in real time it is ekf, to the bit; it is ranked by what it smooths"
+    assert row(ranked([*base, *twins]), "ekf-rts", "one-v1").standing == "identical"
+    assert row(ranked([*base, *twins]), "ekf").ranked
+    # What declares nothing, differs in one run, or is alone is ranked.
+    copied = [replace(r, estimator="copy") for r in twins]
+    assert row(ranked([*base, *copied]), "copy").ranked
+    assert row(ranked([*base, *changed(twins, "ekf-rts", [3], "one-v1", rmse=1.0)]), "ekf-rts").ranked
+    assert row(ranked([*twins, *(r for r in base if r.estimator == "iae")]), "ekf-rts").ranked
+
+
+def test_a_board_says_what_its_ratios_are_to() -> None:
+    remarks = " ".join(ranked(campaign(SIMPLE)).track("sea").remarks)
+    assert "the error of oracle over 12 runs, of this campaign" in remarks
