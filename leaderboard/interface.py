@@ -444,6 +444,7 @@ def sweep(
     -------
     Sweep
     """
+    from simnav.leaderboard.site.sweeps import write
     from simnav.leaderboard.sweep.report import Sweep
     from simnav.leaderboard.sweep.settings import checked_score, chosen_dials, parse_dials, settings
 
@@ -458,8 +459,10 @@ def sweep(
     summary = _run([s.scenario for s in found], mine, seeds, folder, progress=progress, **limits)
     ids, labels = {s.scenario.id for s in found}, tuple(r.label for r in mine)
     results = [r for r in results_of(folder) if r.scenario in ids and r.estimator in labels and r.seed in seeds]
-    return Sweep(chosen.id, tuple(d for d, _ in turned), tuple(tuple(v) for _, v in turned), labels, score, limit,
+    made = Sweep(chosen.id, tuple(d for d, _ in turned), tuple(tuple(v) for _, v in turned), labels, score, limit,
                  results, tuple(found), summary)  # fmt: skip
+    write(made)
+    return made
 
 
 def rank(

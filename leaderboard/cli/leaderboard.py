@@ -17,6 +17,9 @@ def command(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the site.")] = Path("site"),
     papers: Annotated[Path, typer.Option(help="What 'simnav reproduce' wrote; gets pages.")] = Path("reproduced"),
+    sweeps: Annotated[
+        Path, typer.Option(help="Folder with the folders of sweeps; the pages of scenarios show them.")
+    ] = Path("results"),
     runs_shown: Annotated[
         int, typer.Option(min=1, help="Runs of each scenario of which the site has track and errors.")
     ] = 2,
@@ -37,6 +40,7 @@ def command(
         from simnav.leaderboard.ranking.confinement import confined, confinement_line
         from simnav.leaderboard.ranking.failures import failure_table, failures
         from simnav.leaderboard.ranking.ranking_table import ranking_tables
+        from simnav.leaderboard.site import sweeps as swept
         from simnav.leaderboard.site.site import build
 
         found = interface.results_of(results, series=True)
@@ -45,7 +49,7 @@ def command(
         with out.progress("site") as progress:
             index = build(
                 found, ranking, output, progress=progress, workers=workers, papers=find(papers), runs_shown=runs_shown,
-                figures=figures,
+                figures=figures, sweeps=swept.find(sweeps),
             )  # fmt: skip
         document = {"site": str(index), "runs": len(found), "failed": failures(found), "ranking": ranking.to_dict(),
                     "confinement": confined(found)}  # fmt: skip

@@ -25,9 +25,7 @@ from simnav.leaderboard.cli.options import (
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from simnav.leaderboard.ranking.statistics import Interval
+    from simnav.leaderboard.ranking.tables import Fitted
     from simnav.leaderboard.sweep.report import Sweep
 
 __all__ = ["command"]
@@ -81,37 +79,39 @@ def command(
         out.code = 0 if any(r.status == "ok" for r in sweep.results) else FAILED
 
 
-def _with_interval(i: Interval) -> str:
+def _figure(x: float) -> str:
     from simnav.leaderboard.ranking import tables
 
-    if math.isnan(i.value):
-        return "–"
-    if math.isinf(i.value):
-        return "failed"
-    known = not (math.isnan(i.low) or math.isnan(i.high))
-    return tables.number(i.value) + (f" [{tables.number(i.low)}, {tables.number(i.high)}]" if known else "")
+    return "failed" if math.isinf(x) else tables.number(x)
 
 
-def _errors(sweep: Sweep) -> Table:
-    """A row a setting, a column an estimator."""
+def _errors(sweep: Sweep) -> Fitted:
+    """A row an estimator and setting."""
     from simnav.leaderboard.ranking import tables
+    from simnav.leaderboard.ranking.ranking_table import between
     from simnav.leaderboard.sweep.report import axis_label
     from simnav.scoring import SCORES
 
     at = {(p.estimator, p.values): p for p in sweep.points}
     rows = []
-    for setting in sweep.settings:
-        cells = [f"{v:g}" for v in setting.values]
-        for e in sweep.estimators:
+    for e in sweep.estimators:
+        for setting in sweep.settings:
             p = at[e, setting.values]
-            cells.append(_with_interval(p.error) + (f", {p.failed} of {p.runs} failed" if p.failed else ""))
-        rows.append(cells)
-    score = SCORES[sweep.score]
-    title = f"{sweep.scenario}: {score.title} [{score.unit}], median of the runs"
-    return tables.table(title, [*(axis_label(d) for d in sweep.dials), *sweep.estimators], rows)
+            failed = f"{p.failed} of {p.runs}" if p.failed else ""
+            dials = [f"{v:g}" for v in setting.values]
+            rows.append([e, *dials, _figure(p.error.value), between(p.error.low, p.error.high), failed])
+    score, dials = SCORES[sweep.score], [axis_label(d) for d in sweep.dials]
+    return tables.Fitted(
+        f"{sweep.scenario}: {score.title}, median of the runs",
+        ["estimator", *dials, f"error [{score.unit}]", "95 % interval", "failed"],
+        rows,
+        ["estimator", *dials, f"error [{score.unit}]", "95 % interval", "failed"],
+        always=2 + len(dials),
+        numeric=[*dials, f"error [{score.unit}]"],
+    )
 
 
-def _breaking(sweep: Sweep) -> Table:
+def _breaking(sweep: Sweep) -> Fitted:
     """Where each estimator breaks."""
     from simnav.leaderboard.ranking import tables
     from simnav.leaderboard.sweep.report import axis_label
@@ -124,12 +124,14 @@ def _breaking(sweep: Sweep) -> Table:
     rows = []
     for b in sweep.breaking_points:
         words = "twice its clean error" if b.criterion == "twice-clean" else "the limit"
-        between = f"{figure(b.value.low)} to {figure(b.value.high)}" if not math.isnan(b.value.low) else ""
+        interval = f"{figure(b.value.low)} to {figure(b.value.high)}" if not math.isnan(b.value.low) else ""
         passes = f"{words}, {tables.number(b.threshold)}"
-        rows.append([*([] if b.at is None else [f"{b.at:g}"]), b.estimator, passes, figure(b.value.value), between])
+        rows.append([b.estimator, *([] if b.at is None else [f"{b.at:g}"]), passes, figure(b.value.value), interval])
     second = [axis_label(sweep.dials[1])] if len(sweep.dials) == 2 else []
-    columns = [*second, "estimator", "passes", f"at: {axis_label(sweep.dials[0])}", "95 % interval"]
-    return tables.table("Breaking points", columns, rows)
+    at = f"at: {axis_label(sweep.dials[0])}"
+    columns = ["estimator", *second, "passes", at, "95 % interval"]
+    value = ["estimator", at, *second, "95 % interval", "passes"]
+    return tables.Fitted("Breaking points", columns, rows, value, always=2 + len(second), numeric=[*second, at])
 
 
 def _draw(sweep: Sweep, path: Path) -> Path:

@@ -15,9 +15,19 @@ if TYPE_CHECKING:
 __all__ = ["ranking_figure"]
 
 
-def ranking_figure(track: TrackRanking, style: Style | None = None) -> Figure:
-    """Score of every estimator of a track with its interval; references are hollow."""
-    rows = track.rows
+def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | None = None) -> Figure:
+    """Score of every estimator of a track with its interval; references are hollow.
+
+    Parameters
+    ----------
+    track : TrackRanking
+    style : Style, optional
+        Colours of the rows.
+    most : int, optional
+        Ranked rows that are drawn, the best first; what is not ranked is left out then, but for references.
+    """
+    best = [r for r in track.rows if r.ranked][:most]
+    rows = track.rows if most is None else [*best, *(r for r in track.rows if r.reference)]
     if style is None:
         style = Style([r.estimator for r in rows], [r.estimator for r in rows if r.reference])
     points = [

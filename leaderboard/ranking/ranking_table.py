@@ -102,7 +102,14 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
         notes.append(f"May be the best (95 %): {', '.join(best)}.")
     if any(r.reference for r in track.rows):
         notes.append("* reference: told the truth, not ranked.")
-    notes += [f"Not ranked: {r.estimator} ({r.standing}: {r.why})." for r in track.rows if r.why]
+    others = [r.estimator for r in track.rows if r.standing == "unsuitable"]
+    if others:
+        notes.append(f"Not ranked, for not all scenarios suit them: {', '.join(others)}.")
+    notes += [
+        f"Not ranked: {r.estimator} ({r.standing}: {r.why})."
+        for r in track.rows
+        if r.why and r.standing != "unsuitable"
+    ]
     scenarios = f"{len(track.scenarios)} scenario{'s' if len(track.scenarios) != 1 else ''}"
     units = f"{track.units} {track.unit}{'s' if track.units != 1 else ''}"
     return tables.Fitted(

@@ -48,6 +48,7 @@ class Runs:
         self.results = sorted(results, key=_run)
         self.scenario, self.estimator = results[0].scenario, results[0].estimator
         self.reference = any(r.reference for r in results)
+        self._medians: dict[str, Interval] = {}
         for a, b in pairwise(self.results):
             if _run(a) == _run(b):
                 what = f"two results of {self.estimator!r} on {self.scenario} for seed {a.seed}"
@@ -79,7 +80,9 @@ class Runs:
 
     def score(self, name: str) -> Interval:
         """Median of a score over the runs that ended well."""
-        return median(self.scores(name))
+        if name not in self._medians:
+            self._medians[name] = median(self.scores(name))
+        return self._medians[name]
 
     def numbers(self, name: str) -> Array:
         """A score over all runs, those that failed included as far as they went; only where it is finite."""

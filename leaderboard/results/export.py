@@ -9,16 +9,17 @@ of ``provenance``, in CSV and Parquet columns of its own.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.results.files import write_whole
+import numpy as np
+
+from simnav.leaderboard.results.files import whole
 from simnav.leaderboard.results.formats import writes
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.results.provenance import Provenance, benchmark_of, distinct
@@ -29,11 +30,15 @@ if TYPE_CHECKING:
 
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["SCHEMA_VERSION", "Document", "table", "write_csv", "write_json", "write_parquet"]
+__all__ = ["MOST_IN_JSON", "SCHEMA_VERSION", "Document", "table", "write_csv", "write_json", "write_parquet"]
 
 #: Raised whenever a reader of ``results.json`` would have to change.
 SCHEMA_VERSION = 2
 
+#: Runs that ``results.json`` holds at most; of more it holds the ranking alone.
+MOST_IN_JSON = 20_000
+
+_CHUNK = 8192  # runs that are converted at a time
 _UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
 _DEGREES = math.degrees(1.0)
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "reference", "status", "reason", "note")
@@ -82,79 +87,136 @@ class Document:
         RequestError
             If the results belong to different versions of the benchmark.
         """
+        return self._head() | {"results": [_run(r) for r in self.results]}
+
+    def _head(self) -> dict[str, Any]:
         return {
             "schema": {"name": "simnav-leaderboard", "version": SCHEMA_VERSION},
             "benchmark": benchmark_of(r.provenance for r in self.results),
             "generated": self.generated,
             "command": self.command,
+            "runs": len(self.results),
             "provenance": [p.to_dict() for p in distinct(r.provenance for r in self.results)],
             "scores": {name: {"title": s.title, "unit": s.unit, "better": s.better} for name, s in SCORES.items()},
             "scenarios": plain(self.scenarios),
             "ranking": plain(self.ranking),
-            "results": [
-                {
-                    **{name: plain(getattr(r, name)) for name in (*_FACTS, *_COSTS)},
-                    **_origin(r),
-                    "provenance": r.provenance.id,
-                    "scores": {name: plain(float(r.scores.get(name, math.nan))) for name in SCORES},
-                }
-                for r in self.results
-            ],
         }
+
+    @cached_property
+    def tables(self) -> list[pa.Table]:
+        """The results as tables of some thousand rows each; one without a row where there are none."""
+        starts = range(0, max(len(self.results), 1), _CHUNK)
+        return [table(self.results[k : k + _CHUNK]) for k in starts]
+
+
+def _run(result: Result) -> dict[str, Any]:
+    scores = ((name, float(result.scores.get(name, math.nan))) for name in SCORES)
+    return {
+        **{name: plain(getattr(result, name)) for name in (*_FACTS, *_COSTS)},
+        **_origin(result),
+        "provenance": result.provenance.id,
+        "scores": {name: value if math.isfinite(value) else None for name, value in scores},
+    }
 
 
 @writes("results", "json")
 def write_json(document: Document, path: Path) -> list[Path]:
-    """Write ``results.json``; NaN is not JSON and has become null."""
-    text = json.dumps(document.to_dict(), indent=1, allow_nan=False, ensure_ascii=False)
-    return [write_whole(path, text + "\n")]
+    """Write ``results.json``: a line a run. NaN is not JSON and has become null.
+
+    Of more than `MOST_IN_JSON` runs the list of the runs stays empty: they are in the CSV and Parquet files.
+    """
+    head = json.dumps(document._head(), indent=1, allow_nan=False, ensure_ascii=False)
+    results = document.results if len(document.results) <= MOST_IN_JSON else ()
+    lines = (json.dumps(_run(r), allow_nan=False, ensure_ascii=False, separators=(",", ":")) for r in results)
+    with whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+        file.write(head[: head.rindex("}")].rstrip() + ',\n "results": [')
+        for k, line in enumerate(lines):
+            file.write((",\n  " if k else "\n  ") + line)
+        file.write("\n ]\n}\n" if results else "]\n}\n")
+    return [path]
 
 
 @writes("results", "csv")
 def write_csv(document: Document, path: Path) -> list[Path]:
-    """A row a run."""
-    columns = {f"{name}{_UNIT_SUFFIX.get(s.unit, '_' + s.unit)}": (name, s.unit) for name, s in SCORES.items()}
-    text = io.StringIO()
-    writer = csv.writer(text)
-    origin = [*_ORIGIN, *_provenance(Provenance())]
-    writer.writerow([*_FACTS, "wall_time_s", "peak_memory_bytes", *columns, *origin])
-    for r in document.results:
-        row: list[Any] = [*_facts(r).values(), f"{r.seconds:.6g}", r.peak_memory]
-        for name, unit in columns.values():
-            value = r.scores.get(name, math.nan) * (_DEGREES if unit == "rad" else 1.0)
-            row.append("" if math.isnan(value) else f"{value:.9g}")
-        writer.writerow([*row, *_origin(r).values(), *_provenance(r.provenance).values()])
-    return [write_whole(path, text.getvalue())]
+    """A row a run; a score that does not apply is an empty cell."""
+    from pyarrow import csv
+
+    with whole(path) as partial:
+        writer = None
+        try:
+            for chunk in document.tables:
+                rows = _with_units(chunk)
+                writer = writer or csv.CSVWriter(partial, rows.schema)
+                writer.write_table(rows)
+        finally:
+            if writer is not None:
+                writer.close()
+    return [path]
+
+
+def _with_units(rows: pa.Table) -> pa.Table:
+    """The same rows with units in the names of the columns, angles in degrees, and flags as Python writes them."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    names = {"seconds": "wall_time_s", "peak_memory": "peak_memory_bytes"}
+    columns = {}
+    for name in rows.column_names:
+        values = rows.column(name)
+        if name in SCORES:
+            unit = SCORES[name].unit
+            values = pc.multiply(values, _DEGREES) if unit == "rad" else values
+            name += _UNIT_SUFFIX.get(unit, "_" + unit)
+        elif values.type == pa.bool_():
+            values = pc.if_else(values, "True", "False")
+        columns[names.get(name, name)] = values
+    return pa.table(columns)
 
 
 @writes("results", "parquet")
 def write_parquet(document: Document, path: Path) -> list[Path]:
-    """The same rows as Parquet, a column a score."""
-    import pyarrow as pa
+    """The same rows as Parquet, a column a score, in SI units and radians."""
     import pyarrow.parquet as pq
 
-    sink = pa.BufferOutputStream()
-    pq.write_table(table(document.results), sink, compression="zstd")
-    return [write_whole(path, sink.getvalue().to_pybytes())]
+    with whole(path) as partial:
+        writer = None
+        try:
+            for chunk in document.tables:
+                writer = writer or pq.ParquetWriter(partial, chunk.schema, compression="zstd")
+                writer.write_table(chunk)
+        finally:
+            if writer is not None:
+                writer.close()
+    return [path]
 
 
 def table(results: Sequence[Result]) -> pa.Table:
     """Results as a pyarrow table: a row a run, a column a score, in SI units and radians."""
     import pyarrow as pa
 
-    rows = [
-        {**_facts(r), **{name: getattr(r, name) for name in _COSTS}}
-        | {name: None if math.isnan(v := r.scores.get(name, math.nan)) else v for name in SCORES}
-        | _origin(r)
-        | _provenance(r.provenance)
-        for r in results
-    ]
-    text, flag, whole, real = pa.string(), pa.bool_(), pa.int64(), pa.float64()
-    kinds = {"seed": whole, "reference": flag, "seconds": real, "peak_memory": whole, "time_limit_s": real,
-             "memory_limit_bytes": whole, "dirty": flag, "cores": whole, **dict.fromkeys(SCORES, real)}  # fmt: skip
-    origin = [*_ORIGIN, *_provenance(Provenance())]
-    schema = pa.schema([(name, kinds.get(name, text)) for name in (*_FACTS, *_COSTS, *SCORES, *origin)])
-    return pa.Table.from_pylist(rows, schema=schema)
+    text, real = pa.string(), pa.float64()
+    kinds = dict.fromkeys(("seed", "peak_memory", "memory_limit_bytes", "cores"), pa.int64())
+    kinds |= dict.fromkeys(("reference", "dirty"), pa.bool_()) | dict.fromkeys(("seconds", "time_limit_s"), real)
+    columns: dict[str, Any] = {}
+    for name in (*_FACTS, *_COSTS):
+        values = [getattr(r, name) for r in results]
+        if name in ("draws", "parameters"):  # runs share them
+            texts = {id(v): v for v in values}
+            known = {key: json.dumps(plain(dict(v)), sort_keys=True) for key, v in texts.items()}
+            values = [known[id(v)] for v in values]
+        columns[name] = pa.array(values, kinds.get(name, text))
+    for name in SCORES:
+        scores = np.array([r.scores.get(name, math.nan) for r in results], dtype=np.float64)
+        columns[name] = pa.array(scores, real, mask=np.isnan(scores))
+    for column, name in _ORIGIN.items():
+        columns[column] = pa.array([getattr(r, name) for r in results], kinds.get(column, text))
+    index: dict[str, int] = {}
+    number = pa.array([index.setdefault(r.provenance.id, len(index)) for r in results], pa.int32())
+    by_id = {r.provenance.id: r.provenance for r in results}
+    origins = [_provenance(by_id[key]) for key in index]
+    for name in _provenance(Provenance()):
+        columns[name] = pa.array([o[name] for o in origins], kinds.get(name, text)).take(number)
+    return pa.table(columns)
 
 
 def _origin(result: Result) -> dict[str, Any]:
@@ -165,9 +227,3 @@ def _origin(result: Result) -> dict[str, Any]:
 def _provenance(provenance: Provenance) -> dict[str, Any]:
     """Columns of a provenance, with its id."""
     return {"provenance": provenance.id} | {name: getattr(provenance, name) for name in _PROVENANCE}
-
-
-def _facts(result: Result) -> dict[str, Any]:
-    found = {name: getattr(result, name) for name in _FACTS}
-    texts = {name: json.dumps(plain(dict(found[name])), sort_keys=True) for name in ("draws", "parameters")}
-    return found | texts

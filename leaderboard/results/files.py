@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["write_whole"]
+__all__ = ["whole", "write_whole"]
 
 
-def write_whole(path: Path, content: str | bytes) -> Path:
-    """Write a temporary file and move it to its place, so that a reader never sees a part of it.
+@contextlib.contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A temporary path to write to, which is moved to its place at the end, so that a reader never sees a part of it.
 
     Raises
     ------
@@ -17,6 +20,21 @@ def write_whole(path: Path, content: str | bytes) -> Path:
         As of writing; an older file stays as it was.
     """
     partial = path.with_name(f".{path.name}.part")
-    partial.write_bytes(content.encode() if isinstance(content, str) else content)
-    os.replace(partial, path)
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: str | bytes) -> Path:
+    """Write a file with `whole`.
+
+    Raises
+    ------
+    OSError
+        As of writing; an older file stays as it was.
+    """
+    with whole(path) as partial:
+        partial.write_bytes(content.encode() if isinstance(content, str) else content)
     return path

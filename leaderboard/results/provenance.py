@@ -16,7 +16,7 @@ import subprocess
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,7 @@ class Provenance:
     date: str = ""
     identity: str = ""
 
-    @property
+    @cached_property
     def id(self) -> str:
         """Short id: a digest of all fields; empty where nothing is known."""
         if self.identity or self == Provenance():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from array import array
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.leaderboard.results.provenance import Provenance
+from simnav.leaderboard.results.stored_scores import StoredScores
 from simnav.scoring.consistency import ending
 
 if TYPE_CHECKING:
@@ -77,7 +79,7 @@ class Result:
         True for rows that are told the truth; they are not ranked.
     status, reason : str
         As in `simnav.trial`, and ``timeout``, ``out-of-memory``, ``no-recording``.
-    scores : dict of str to float
+    scores : mapping of str to float
         As in `simnav.scoring.SCORES`.
     series : mapping of str to array
         As from `simnav.scoring.series`, in single precision.
@@ -114,7 +116,7 @@ class Result:
     reference: bool
     status: str
     reason: str
-    scores: dict[str, float]
+    scores: Mapping[str, float]
     series: Mapping[str, Series] = field(default_factory=dict)
     note: str = ""
     seconds: float = 0.0
@@ -307,7 +309,7 @@ def _shared(column: pa.ChunkedArray, convert: Callable[[str], Any] | None) -> li
     return [values[k] for k in encoded.indices.to_numpy(zero_copy_only=False).tolist()]
 
 
-def _scores(column: pa.ChunkedArray, wanted: Collection[str] | None) -> list[dict[str, float]]:
+def _scores(column: pa.ChunkedArray, wanted: Collection[str] | None) -> list[StoredScores]:
     """The scores of each row, by name."""
     maps = column.combine_chunks()
     edges = maps.offsets.to_numpy()
@@ -321,9 +323,16 @@ def _scores(column: pa.ChunkedArray, wanted: Collection[str] | None) -> list[dic
         kept = np.flatnonzero(np.array([n in wanted for n in names], dtype=bool)[code]) if len(code) else code
         edges = np.searchsorted(kept, edges)
         code, value = code[kept], value[kept]
-    pairs = list(zip([names[c] for c in code.tolist()], value.tolist(), strict=True))
-    cut = edges.tolist()
-    return [dict(pairs[a:b]) for a, b in pairwise(cut)]
+    values = array("d", np.ascontiguousarray(value, dtype=np.float64).tobytes())
+    places: dict[bytes, dict[str, int]] = {}
+    found = []
+    for start, end in pairwise(edges.tolist()):
+        mine = code[start:end]
+        place = places.get(key := mine.tobytes())
+        if place is None:
+            place = places[key] = {names[c]: k for k, c in enumerate(mine.tolist())}
+        found.append(StoredScores(place, values, start))
+    return found
 
 
 def decoded_series(column: pa.ChunkedArray) -> Iterator[dict[str, Series]]:

@@ -6,12 +6,13 @@ so that they stay on disk until then; a few row groups are kept in memory.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
 from simnav.leaderboard.results.result import Series, decoded_series
 
-__all__ = ["StoredSeries"]
+__all__ = ["StoredSeries", "read_ahead"]
 
 _KEPT = 24  # row groups in memory, of a few hundred results each
 
@@ -52,3 +53,20 @@ def _group(path: str, group: int) -> list[dict[str, Series]]:
     with open(path, "rb") as source:
         table = pq.ParquetFile(source, page_checksum_verification=True).read_row_group(group, ["series"])
     return list(decoded_series(table.column("series")))
+
+
+def read_ahead(series: Iterable[Mapping[str, Series]]) -> Iterator[Mapping[str, Series]]:
+    """The same series in the order of their places in the files, while a thread reads the next row group."""
+    stored = sorted((s for s in series if isinstance(s, StoredSeries)), key=lambda s: (s.path, s.group, s.row))
+    groups = list(dict.fromkeys((s.path, s.group) for s in stored))
+    with ThreadPoolExecutor(1) as pool:
+        waiting = [pool.submit(_group, *place) for place in groups[:1]]
+        current = -1
+        for s in stored:
+            if current < 0 or groups[current] != (s.path, s.group):
+                waiting.pop().result()
+                current += 1
+                if current + 1 < len(groups):
+                    waiting.append(pool.submit(_group, *groups[current + 1]))
+            yield s
+    yield from (s for s in series if not isinstance(s, StoredSeries))

@@ -19,11 +19,14 @@ __all__ = [
     "accuracy_and_cost",
     "columns",
     "detection",
+    "dial",
     "distribution",
     "over_time",
     "ratios_by_group",
     "short",
+    "shorts",
     "spread",
+    "stanford",
     "timeline",
     "track",
 ]
@@ -79,9 +82,27 @@ def short(value: Any, digits: int = 4) -> float | None:
     return float(f"{x:.{digits}g}") if math.isfinite(x) else None
 
 
+def shorts(values: Any, digits: int = 4) -> list[float | None]:
+    """`short` of an array.
+
+    >>> shorts([0.123456, float("nan"), 12345.6, 0.0])
+    [0.1235, None, 12350.0, 0.0]
+    """
+    x = np.asarray(values, dtype=np.float64)
+    known = np.isfinite(x)
+    size = np.where(known & (x != 0.0), np.abs(x), 1.0)
+    places = np.clip(digits - 1 - np.floor(np.log10(size)), -22.0, 22.0)
+    up, down = 10.0 ** np.maximum(places, 0.0), 10.0 ** np.maximum(-places, 0.0)  # one of them is 1: both are exact
+    found = (np.rint(np.where(known, x, 0.0) * up / down) / up * down).tolist()
+    if not known.all():
+        for k in np.flatnonzero(~known).tolist():
+            found[k] = None
+    return found  # type: ignore[no-any-return]
+
+
 def columns(**values: Iterable[Any]) -> dict[str, list[Any]]:
     """Columns of a data set: arrays become short lists."""
-    return {name: [short(x) for x in v] if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
+    return {name: shorts(v) if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
 
 
 def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
@@ -128,8 +149,17 @@ def _hover(points: Spec, tooltip: list[Spec]) -> Spec:
     }
 
 
-def over_time(name: str, title: str, unit: str, data: Mapping[str, Any], caption: str, *, spread: bool = True) -> Chart:
-    """An error over time: median with band (or one run), faults shaded, bound dashed.
+def over_time(
+    name: str,
+    title: str,
+    unit: str,
+    data: Mapping[str, Any],
+    caption: str,
+    *,
+    spread: bool = True,
+    log: bool = True,
+) -> Chart:
+    """A figure over time: median with band (or one run), faults shaded, bound dashed.
 
     Parameters
     ----------
@@ -138,8 +168,9 @@ def over_time(name: str, title: str, unit: str, data: Mapping[str, Any], caption
         ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
     """
     x = _axis("time", "Time [s]")
-    y = _axis("middle", f"{title} [{unit}]", log=True)
-    curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.middle > 0"}]}
+    y = _axis("middle", f"{title} [{unit}]", log=log)
+    kept = "datum.middle > 0" if log else "isValid(datum.middle)"
+    curves = {"data": {"name": "curves"}, "transform": [{"filter": kept}]}
     layers: list[Spec] = [
         {
             "data": {"name": "faults"},
@@ -326,6 +357,55 @@ def detection(name: str, data: Mapping[str, Any]) -> Chart:
     return Chart(name, "Detection against false alarms", caption, spec, data)
 
 
+def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str) -> Chart:
+    """Error against a dial, with the values at which estimators break.
+
+    Parameters
+    ----------
+    data : mapping
+        ``curves``: by row ``value`` (of the dial), ``middle``, ``low``, ``high``, ``failed``; ``marks``: by row ``at``
+        and ``threshold``, one each.
+    """
+    x, y = _axis("value", across), _axis("middle", up, log=True)
+    curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.middle > 0"}]}
+    sure = {"data": {"name": "curves"}, "transform": [{"filter": "datum.low > 0"}]}
+    layers: list[Spec] = [
+        {
+            **sure,
+            "mark": {"type": "area", "opacity": 0.13},
+            "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
+        },
+        {
+            **curves,
+            "params": [_ZOOM],
+            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
+            "encoding": {"x": x, "y": y, **_row()},
+        },
+        {
+            **curves,
+            "mark": {"type": "point", "filled": True, "size": 35},
+            "encoding": {
+                "x": x,
+                "y": y,
+                "color": _row()["color"],
+                "tooltip": _tip(row="Estimator", value=across, middle=up, low="Low", high="High", failed="Failed runs"),
+            },
+        },
+        {
+            "data": {"name": "marks"},
+            "mark": {"type": "point", "shape": "cross", "size": 130, "filled": True, "angle": 45},
+            "encoding": {
+                "x": {**x, "field": "at"},
+                "y": {**y, "field": "threshold"},
+                "color": _row()["color"],
+                "tooltip": _tip(row="Estimator", at="Breaks at", threshold="Twice its clean error"),
+            },
+        },
+    ]
+    words = f"{caption} Crosses: breaking points, where the error passes twice that at the clean value. {_ZOOM_HELP}"
+    return Chart(name, f"Error against {across}", words, {"height": 300, "layer": layers}, data, byrow=True)
+
+
 def spread(
     name: str, title: str, x_title: str, data: Mapping[str, Any], caption: str, *, ideal: Sequence[float] = ()
 ) -> Chart:
@@ -363,6 +443,71 @@ def spread(
         },
     ]
     return Chart(name, title, caption, {"height": {"step": 17}, "layer": layers}, data)
+
+
+def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> Chart:
+    """Epochs by error and protection level, a panel a row.
+
+    Parameters
+    ----------
+    data : mapping
+        ``curves``: cells by row: ``x``, ``x2`` (error), ``y``, ``y2`` (protection level), ``epochs``.
+    limit : float
+        Alert limit [m].
+    """
+    end = 2.0 * limit
+    x, y = ({"field": f, "type": "quantitative", "title": title, "scale": {"domain": [0.0, end], "nice": False}}
+            for f, title in (("x", "Horizontal error [m]"), ("y", "Protection level [m]")))  # fmt: skip
+    regions = [{"x": 0.0, "x2": end, "y": limit, "y2": end, "what": "not available"},
+               {"x": limit, "x2": end, "y": 0.0, "y2": limit, "what": "hazardously misleading"}]  # fmt: skip
+    diagonal = [{"x": 0.0, "y": 0.0}, {"x": end, "y": end}]
+    inner = [
+        {
+            "data": {"values": regions},
+            "mark": {"type": "rect", "opacity": 0.18},
+            "encoding": {
+                "x": x,
+                "x2": {"field": "x2"},
+                "y": y,
+                "y2": {"field": "y2"},
+                "color": {"condition": {"test": "datum.y > 0", "value": "$shade"}, "value": "$second"},
+                "tooltip": {"field": "what", "title": "Region"},
+            },
+        },
+        {
+            "mark": "rect",
+            "encoding": {
+                "x": x,
+                "x2": {"field": "x2"},
+                "y": y,
+                "y2": {"field": "y2"},
+                "color": {
+                    "field": "epochs",
+                    "type": "quantitative",
+                    "scale": {"type": "log", "scheme": "$scheme"},
+                    "legend": {"title": "Epochs", "orient": "bottom"},
+                },
+                "tooltip": _tip(row="Estimator", x="Error from [m]", y="Level from [m]", epochs="Epochs"),
+            },
+        },
+        {
+            "data": {"values": diagonal},
+            "mark": {"type": "line", "color": "$grey", "strokeWidth": 1},
+            "encoding": {"x": x, "y": y},
+        },
+    ]
+    spec = {
+        "data": {"name": "curves"},
+        "facet": {"field": "row", "type": "nominal", "title": None, "sort": None},
+        "columns": 6,
+        "spec": {"layer": inner},
+    }
+    words = (
+        f"{caption} Below the diagonal the error exceeds the protection level: the estimator misleads. Grey: the "
+        f"level is above the alert limit of {limit:g} m, so that the navigator is warned. Red: the error is above "
+        "that limit without a warning. What is beyond the axes counts at their ends."
+    )
+    return Chart(name, "Stanford diagrams: error against protection level", words, spec, data, byrow=True)
 
 
 def timeline(name: str, data: Mapping[str, Any], caption: str) -> Chart:

@@ -32,8 +32,8 @@ class EstimatorEntry:
     ----------
     label, page : str
         Label of the estimator, and file of its page.
-    data : str
-        Name of the file of its runs (``data/NAME.js``).
+    data, runs : str
+        Names of the files of its errors and of the scores of its runs (``data/NAME.js``).
     reference : bool
         Whether it is a reference, which is not ranked.
     facts : EstimatorFacts
@@ -43,6 +43,7 @@ class EstimatorEntry:
     label: str
     page: str
     data: str
+    runs: str
     reference: bool
     facts: EstimatorFacts
 

@@ -1,22 +1,31 @@
-"""From the series of results to the columns of charts: bands over the runs, quantiles, and one run."""
+"""From the series of results to the columns of charts: bands over the runs, quantiles, and one run.
+
+Series are read once, file by file, and what charts need of each is kept: a hundred thousand results do not fit into
+memory.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.site.charts import short
+from simnav.leaderboard.results.stored_series import read_ahead
+from simnav.leaderboard.site.charts import shorts
+from simnav.scoring.integrity import RISK
+from simnav.scoring.plot_series import DIAGNOSTICS
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["QUANTITIES", "band", "one_run", "quantiles"]
+__all__ = ["BAND_RUNS", "QUANTITIES", "Curves", "Gathered", "band", "gather", "integrity", "one_run", "quantiles"]
 
 Array = NDArray[np.float64]
+Thin = NDArray[np.float32]
 
 #: Errors over time: key of the series, title, unit, factor from SI.
 QUANTITIES = (
@@ -26,92 +35,208 @@ QUANTITIES = (
     ("heading", "Heading error", "°", math.degrees(1.0)),
 )
 
+#: Runs of a band: its percentiles are known well enough.
+BAND_RUNS = 40
+
 _POINTS = 120  # of a curve: more cannot be seen
 _RUN_POINTS = 150
-_RUNS = 50  # of a band: its percentiles are known well enough
+_TRACK_POINTS = 300
+#: From three standard deviations to the protection level that follows from a covariance.
+_PROTECTION = math.sqrt(-2.0 * math.log(RISK)) / 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """What charts over all runs need of one run.
+
+    Attributes
+    ----------
+    time : (k,) array
+        [s].
+    values : dict of str to (k,) array
+        Magnitudes of the errors, SI units; ``level``: protection level [m].
+    quantiles : (101,) array or None
+        Of the horizontal error [m].
+    diagnostics : dict of str to (b,) array
+        Weights of the instruments over ``diagnostics_time``.
+    """
+
+    time: Thin
+    values: dict[str, Thin]
+    quantiles: Thin | None = None
+    diagnostics: dict[str, Thin] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """What was read of the series of results, by result.
+
+    Attributes
+    ----------
+    curves : dict of Result to Curves
+    single : dict of Result to dict
+        As of `one_run`.
+    """
+
+    curves: dict[Result, Curves]
+    single: dict[Result, dict[str, Any]]
+
+
+def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
+    """Read series, each part of a file once.
+
+    Parameters
+    ----------
+    over_all : iterable of Result
+        Those whose `Curves` are wanted.
+    single : collection of Result
+        Those that are shown one by one.
+    """
+    wanted, alone = set(over_all), set(single)
+    times: dict[bytes, Thin] = {}  # nearly all runs of a scenario share theirs
+    found = Gathered({}, {})
+    every: dict[int, list[Result]] = {}
+    for result in wanted | alone:
+        every.setdefault(id(result.series), []).append(result)
+    for series in read_ahead([results[0].series for results in every.values()]):
+        for result in every[id(series)]:
+            if not _has(result, "time"):
+                continue
+            if result in wanted:
+                found.curves[result] = _curves(result, times)
+            if result in alone:
+                found.single[result] = one_run(result)
+    return found
 
 
 def _has(result: Result, name: str) -> bool:
-    values = result.series.get(name)
-    return result.status == "ok" and values is not None and len(values) > 0 and bool(np.isfinite(values).any())
+    values = result.series.get(name) if result.status == "ok" else None
+    return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
 
 
 def _thinned(n: int, points: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, n - 1, min(n, points)).round().astype(np.int64))
 
 
-def axis(results: Iterable[Result]) -> Array:
-    """The common time of the curves of a scenario [s]: that of its longest run, thinned."""
-    times = [r.series["time"] for r in results if _has(r, "time")]
-    if not times:
-        return np.zeros(0)
-    longest = max(times, key=lambda t: float(t[-1])).astype(np.float64)
-    return np.asarray(longest[_thinned(len(longest), _POINTS)])
+def _curves(result: Result, times: dict[bytes, Thin]) -> Curves:
+    s = result.series
+    keep = _thinned(len(s["time"]), _POINTS)
+    time = s["time"][keep]
+    time = times.setdefault(time.tobytes(), time)
+    values = {name: np.abs(s[name][keep]) for name, *_ in QUANTITIES if name in s and np.isfinite(s[name]).any()}
+    if (level := _level(result)) is not None:
+        values["level"] = level[keep].astype(np.float32)
+    weights = {n: s[n].copy() for n in s if n.startswith("weight.") and (s[n] < 0.999).any()}
+    if weights:
+        weights["time"] = times.setdefault(s["diagnostics_time"].tobytes(), s["diagnostics_time"].copy())
+    return Curves(time, values, s["quantiles"].copy() if _has(result, "quantiles") else None, weights)
 
 
-def band(results: Sequence[Result], name: str, factor: float, time: Array) -> dict[str, list[float | None]] | None:
-    """Median of the magnitude of an error over the runs that ended well, with its 5th and 95th percentile.
+def _level(result: Result) -> NDArray[Any] | None:
+    """Protection level over time: the estimator's own, or that of its covariance."""
+    s = result.series
+    if "protection_level" in s:
+        return s["protection_level"]
+    return _PROTECTION * s["three_sigma"] if _has(result, "three_sigma") else None
+
+
+def axis(curves: Iterable[Curves]) -> Array:
+    """The common time of the curves of a scenario [s]: that of its longest run."""
+    longest = max((c.time for c in curves), key=lambda t: float(t[-1]), default=np.zeros(0))
+    return np.asarray(longest, dtype=np.float64)
+
+
+def band(curves: Sequence[Curves], name: str, factor: float, time: Array) -> dict[str, list[float | None]] | None:
+    """Median of a magnitude over the runs, with its 5th and 95th percentile.
 
     Parameters
     ----------
-    results : sequence of Result
-        Of one estimator on one scenario; the first 50 are taken.
+    curves : sequence of Curves
+        Of one estimator on one scenario.
     name : str
-        Of the series.
+        Of an error, or of a weight.
     factor : float
+        From SI.
     time : (n,) array
         Where it is wanted [s].
 
     Returns
     -------
     dict or None
-        ``low``, ``middle``, ``high``; None where no run has the series.
+        ``low``, ``middle``, ``high``; None where no run has it.
     """
-    found = [r.series for r in results if _has(r, name)][:_RUNS]
-    if not found or not len(time):
+    pairs = [(c.diagnostics["time"], c.diagnostics[name]) if name in c.diagnostics else (c.time, c.values[name])
+             for c in curves if name in c.diagnostics or name in c.values]  # fmt: skip
+    if not pairs or not len(time):
         return None
-    rows = np.array([np.interp(time, s["time"], np.abs(s[name]), right=np.nan) for s in found])
+    rows = np.array(
+        [v if len(t) == len(time) and np.array_equal(t, time) else _at(time, t, v) for t, v in pairs], dtype=np.float64
+    )
     low, middle, high = factor * np.percentile(rows, (5.0, 50.0, 95.0), axis=0)
     gaps = np.flatnonzero(np.isnan(middle) & np.isfinite(rows).any(axis=0))  # some runs have a value, others none
     if len(gaps):
         low[gaps], middle[gaps], high[gaps] = factor * np.nanpercentile(rows[:, gaps], (5.0, 50.0, 95.0), axis=0)
-    return {"low": _list(low), "middle": _list(middle), "high": _list(high)}
+    return {"low": shorts(low), "middle": shorts(middle), "high": shorts(high)}
 
 
-def quantiles(results: Sequence[Result]) -> dict[str, list[float | None]] | None:
-    """Error at each percent of the epochs of all runs that ended well."""
-    rows = [r.series["quantiles"] for r in results if _has(r, "quantiles")]
+def _at(time: Array, t: Thin, v: Thin) -> Array:
+    return np.asarray(np.interp(time, t, v, right=np.nan), dtype=np.float64)
+
+
+def quantiles(curves: Sequence[Curves]) -> dict[str, list[float | None]] | None:
+    """Error at each percent of the epochs of all runs."""
+    rows = [c.quantiles for c in curves if c.quantiles is not None]
     if not rows:
         return None
-    values = np.sort(np.concatenate([np.asarray(r, dtype=np.float64) for r in rows]))
+    values = np.concatenate(rows).astype(np.float64)
     values = values[np.isfinite(values)]
     share = np.linspace(0.0, 100.0, 101)
-    return {"error": _list(np.percentile(values, share)), "share": share.tolist()}
+    return {"error": shorts(np.percentile(values, share)), "share": share.tolist()}
 
 
-def one_run(result: Result) -> dict[str, dict[str, list[float | None]]] | None:
-    """Track, errors and stated uncertainty of one run; None where it has none."""
-    if not _has(result, "time"):
+def integrity(curves: Sequence[Curves], limit: float) -> dict[str, list[Any]] | None:
+    """Cells of a Stanford diagram up to twice the alert limit: how many epochs are in each, by error and level.
+
+    Parameters
+    ----------
+    curves : sequence of Curves
+        Of one estimator on one scenario.
+    limit : float
+        Alert limit [m].
+    """
+    from simnav.scoring.integrity import Stanford
+
+    pairs = [(c.values["horizontal"], c.values["level"]) for c in curves if {"level", "horizontal"} <= c.values.keys()]
+    if not pairs:
         return None
+    error, level = (np.concatenate(x).astype(np.float64) for x in zip(*pairs, strict=True))
+    found = Stanford(np.where(np.isfinite(error), error, np.inf), np.where(np.isfinite(level), level, np.inf), limit)
+    edges = np.linspace(0.0, 2.0 * limit, 33)
+    counts = found.histogram(edges)
+    i, j = np.nonzero(counts)
+    sides = {"x": edges[i], "x2": edges[i + 1], "y": edges[j], "y2": edges[j + 1]}
+    return {**{name: shorts(values) for name, values in sides.items()}, "epochs": counts[i, j].tolist()}
+
+
+def one_run(result: Result) -> dict[str, Any]:
+    """Errors, stated uncertainty, tracks and diagnostics of one run that has series."""
     s = {name: np.asarray(values, dtype=np.float64) for name, values in result.series.items()}
     keep = _thinned(len(s["time"]), _RUN_POINTS)
-    found: dict[str, dict[str, list[float | None]]] = {}
+    found: dict[str, Any] = {}
     for name, _, _, factor in QUANTITIES:
         if name in s and np.isfinite(s[name]).any():
-            found[name] = {"time": _list(s["time"][keep]), "middle": _list(factor * np.abs(s[name][keep]))}
+            found[name] = {"time": shorts(s["time"][keep]), "middle": shorts(factor * np.abs(s[name][keep]))}
             if name == "horizontal" and np.isfinite(s.get("three_sigma", np.zeros(0))).any():
-                found[name]["bound"] = _list(s["three_sigma"][keep])
+                found[name]["bound"] = shorts(s["three_sigma"][keep])
     if "estimate_north" in s:
         track = {"time": s["time"], "east": s["estimate_east"], "north": s["estimate_north"]}
-        found["track"] = {name: _list(v[keep]) for name, v in track.items()}
+        found["track"] = {name: shorts(v[keep]) for name, v in track.items()}
+    if "truth_north" in s:
+        known = np.flatnonzero(np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"]))
+        known = known[_thinned(len(known), _TRACK_POINTS)] if len(known) else known
+        found["truth"] = [s[name][known] for name in ("truth_east", "truth_north", "time")]
+    for name, values in s.items():
+        if name.partition(".")[0] in DIAGNOSTICS and np.isfinite(values).any():
+            known = np.isfinite(values)
+            found[name] = {"time": shorts(s["diagnostics_time"][known]), "middle": shorts(values[known])}
     return found
-
-
-def _list(values: Array) -> list[float | None]:
-    return [short(x) for x in values]
-
-
-def columns_of(items: Iterable[dict[str, Any]]) -> dict[str, list[Any]]:
-    """A list of objects with the same keys, as columns."""
-    rows = list(items)
-    return {key: [row[key] for row in rows] for key in rows[0]} if rows else {}

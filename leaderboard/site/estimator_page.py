@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.site import charts, curves
+from simnav.leaderboard.site.background import Background
 from simnav.leaderboard.site.charts import short
 from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
 from simnav.leaderboard.site.content import Fact
-from simnav.leaderboard.site.scenario_page import chart_of
+from simnav.leaderboard.site.scenario_page import inside_chart, track_from
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Ranking, ScenarioRow
+    from simnav.leaderboard.ranking.board import Ranking, ScenarioRanking, ScenarioRow
     from simnav.leaderboard.ranking.runs import Runs
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["PLAIN", "estimator_data", "facts_of", "runs_data"]
+__all__ = ["PLAIN", "errors_data", "estimator_data", "facts_of", "runs_data", "worst_run"]
 
 #: The row that every estimator is compared with.
 PLAIN = "ekf"
@@ -62,19 +64,13 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
     return found
 
 
-def runs_data(
-    label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]], scenarios: Mapping[str, ScenarioEntry]
-) -> dict[str, Any]:
-    """Every run of an estimator with its ranked figure and its scores: ``data/row-NAME.js``.
+def errors_data(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry]) -> dict[str, Any]:
+    """The ranked figure of every run of an estimator: ``data/row-NAME.js``, of which two are compared.
 
-    ``error`` is the ratio to the reference figure as the ranking counts it, by seed or recording.
+    It is the ratio to the reference figure as the ranking counts it, by seed or recording.
     """
     found = {}
-    for table in ranking.scenarios:
-        row = next((r for r in table.rows if r.estimator == label), None)
-        if row is None:
-            continue
-        results = runs[table.scenario][label].results
+    for table, row in _tables(label, ranking):
         entry = scenarios[table.scenario]
         found[table.scenario] = {
             "name": entry.name,
@@ -82,9 +78,26 @@ def runs_data(
             "argument": entry.argument,
             "run": list(row.ratios),
             "error": [short(v, 5) for v in row.ratios.values()],
+        }
+    return {"label": label, "scenarios": found}
+
+
+def _tables(label: str, ranking: Ranking) -> Iterator[tuple[ScenarioRanking, ScenarioRow]]:
+    for table in ranking.scenarios:
+        row = next((r for r in table.rows if r.estimator == label), None)
+        if row is not None:
+            yield table, row
+
+
+def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> dict[str, Any]:
+    """Every run of an estimator with its scores: ``data/runs-NAME.js``; None stands for a column that says nothing."""
+    found = {}
+    for table, _ in _tables(label, ranking):
+        results = runs[table.scenario][label].results
+        found[table.scenario] = {
             "seed": [r.seed for r in results],
             "note": [r.note for r in results] if any(r.note for r in results) else None,
-            "status": [r.ending for r in results],
+            "status": [r.ending for r in results] if any(r.ending != "ok" for r in results) else None,
             "reason": [r.reason for r in results] if any(r.reason for r in results) else None,
             "seconds": [short(r.seconds, 3) for r in results],
             "scores": _scores(results),
@@ -104,8 +117,13 @@ def estimator_data(
     runs: Mapping[str, Mapping[str, Runs]],
     scenarios: Mapping[str, ScenarioEntry],
     estimators: Mapping[str, EstimatorEntry],
+    worst: tuple[Result, float] | None,
+    single: dict[str, Any] | None,
 ) -> dict[str, Any]:
-    """Everything that the page of an estimator shows."""
+    """Everything that the page of an estimator shows.
+
+    ``worst`` is as from `worst_run`, and ``single`` what `simnav.leaderboard.site.curves.one_run` made of it.
+    """
     label = entry.label
     rows = []
     shown = [
@@ -134,7 +152,6 @@ def estimator_data(
                 **{c.key: short(f * cell.score(c.key).value) for c, f in shown},
             }
         )
-    worst = _worst(label, ranking, runs)
     plain_row = estimators.get(PLAIN)
     return {
         "kind": "estimator",
@@ -152,7 +169,7 @@ def estimator_data(
         "charts": [c.to_dict() for c in _profile(label, ranking, scenarios)],
         "rows": {label: {"reference": entry.reference}},
         "first": [label],
-        "worst": None if worst is None else _worst_page(label, worst, scenarios),
+        "worst": None if worst is None or single is None else _worst_page(label, *worst, single, scenarios),
         "unsuitable": unsuitable,
         "parameters": [{"name": n, "default": d, "annotation": a} for n, d, a in entry.facts.parameters],
     }
@@ -186,24 +203,25 @@ def _profile(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry
     return [charts.ratios_by_group("profile", {"points": points}, caption)]
 
 
-def _worst(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> tuple[str, Result, float] | None:
-    """The run with the largest error, as a multiple of the reference figure: scenario, result, ratio."""
-    worst: tuple[str, Result, float] | None = None
-    for table in ranking.scenarios:
-        cell = runs[table.scenario].get(label)
-        for result in cell.good if cell is not None else ():
+def worst_run(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> tuple[Result, float] | None:
+    """The run that ended well with the largest error as a multiple of the reference figure, and this multiple."""
+    found = []
+    for table, _ in _tables(label, ranking):
+        for result in runs[table.scenario][label].good:
             ratio = result.scores.get("horizontal_rmse", math.nan) / table.reference.value
-            if math.isfinite(ratio) and len(result.series.get("time", ())) and (worst is None or ratio > worst[2]):
-                worst = table.scenario, result, ratio
-    return worst
+            if math.isfinite(ratio):
+                found.append((ratio, result))
+    found.sort(key=lambda f: -f[0])
+    return next(((result, ratio) for ratio, result in found if len(result.series.get("time", ()))), None)
 
 
-def _worst_page(label: str, worst: tuple[str, Result, float], scenarios: Mapping[str, ScenarioEntry]) -> dict[str, Any]:
-    identity, result, ratio = worst
-    scenario, one = scenarios[identity], curves.one_run(result) or {}
+def _worst_page(
+    label: str, result: Result, ratio: float, one: dict[str, Any], scenarios: Mapping[str, ScenarioEntry]
+) -> dict[str, Any]:
+    scenario = scenarios[result.scenario]
     made = []
     if "track" in one:
-        data = {"curves": {"rows": {label: one["track"]}}, **chart_of(None, [result])}
+        data = {"curves": {"rows": {label: one["track"]}}, **track_from([one])}
         made.append(charts.track("worst-track", "Track of the worst run", data, "Black: the true track."))
     for key, title, unit, _ in curves.QUANTITIES:
         if key not in one or key in ("vertical", "velocity"):
@@ -222,8 +240,14 @@ def _worst_page(label: str, worst: tuple[str, Result, float], scenarios: Mapping
             else "Of the worst run."
         )
         made.append(charts.over_time(f"worst-{key}", title, unit, data, caption, spread=False))
+    nothing: dict[str, list[Any]] = {"start": [], "end": [], "name": [], "time": [], "bound": []}
+    for key in sorted(k for k in one if k.partition(".")[0] in ("weight", "nis")):
+        if key.endswith(".motion"):
+            continue
+        data = {"curves": {"rows": {label: one[key]}}, "faults": nothing, "bound": nothing}
+        made.append(inside_chart(key, Background(), data))
     return {
-        "scenario": {"name": scenario.name, "page": scenario.page},
+        "scenario": {"name": scenario.name, "page": f"{scenario.page}#row={quote(label)}&seed={result.seed}"},
         "seed": result.seed,
         "note": result.note,
         "ratio": short(ratio),

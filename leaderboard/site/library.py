@@ -1,4 +1,7 @@
-"""The chart library of the site: one copy of Vega, Vega-Lite and Vega-Embed, as the package vl-convert holds them."""
+"""The chart library of the site: one copy of Vega, Vega-Lite and Vega-Embed, as the package vl-convert holds them.
+
+And the folder in the user's cache, for what takes seconds to make.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from pathlib import Path
 
 from simnav.leaderboard.results.files import write_whole
 
-__all__ = ["VEGA_LITE", "bundle"]
+__all__ = ["VEGA_LITE", "bundle", "cache"]
 
 #: Version of Vega-Lite that the specifications are written for.
 VEGA_LITE = "6.4"
@@ -39,7 +42,7 @@ def bundle() -> str:
     """
     from importlib.metadata import version
 
-    kept = _cache() / f"vega-{version('vl-convert-python')}-{VEGA_LITE}.js"
+    kept = cache() / f"vega-{version('vl-convert-python')}-{VEGA_LITE}.js"
     try:
         return kept.read_text(encoding="utf-8")
     except OSError:
@@ -54,6 +57,7 @@ def bundle() -> str:
     return made
 
 
-def _cache() -> Path:
+def cache() -> Path:
+    """Folder of simnav in the user's cache; it may not be there yet."""
     home = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(home) if os.path.isabs(home) else Path.home() / ".cache") / "simnav"

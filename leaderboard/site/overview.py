@@ -188,8 +188,8 @@ def _track(
         "title": track.title,
         "remarks": list(track.remarks),
         "provisional": track.provisional,
-        "facts": f"{len(track.scenarios)} scenarios, {len(scored)} ranked estimators, "
-        f"at least {track.units} {track.unit}s each, confined by "
+        "facts": f"{_count(len(track.scenarios), 'scenario')}, {_count(len(scored), 'ranked estimator')}, "
+        f"at least {_count(track.units, track.unit)} each, confined by "
         + ", ".join(confined(r for s in track.scenarios for x in runs[s].values() for r in x.results)),
         "table": {
             "name": track.track,
@@ -204,6 +204,10 @@ def _track(
         ],
         "ratios": {r.estimator: {s: short(v, 6) for s, v in r.ratios.items()} for r in scored},
     }
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("s" if number != 1 else "")
 
 
 def _once(rows: Sequence[TrackRow]) -> list[tuple[TrackRow, list[str]]]:

@@ -13,7 +13,8 @@ from simnav.leaderboard.site.library import VEGA_LITE
 __all__ = ["filled", "write_figure"]
 
 _PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255", "#999933")
-_INKS = {"$ink": "#1b2430", "$grey": "#5b6673", "$shade": "#9aa5b1", "$strong": _PALETTE[0], "$second": _PALETTE[1]}
+_INKS = {"$ink": "#1b2430", "$grey": "#5b6673", "$shade": "#9aa5b1", "$strong": _PALETTE[0], "$second": _PALETTE[1],
+         "$scheme": "blues"}  # fmt: skip
 _DASHES = ([1, 0], [6, 2], [2, 2], [6, 2, 2, 2])
 
 
@@ -45,7 +46,12 @@ def filled(chart: Chart, rows: Sequence[str], width: int = 620) -> Spec:
             if not any(p["name"] == "near" for p in x.get("params", ()))
             and datasets.get(x.get("data", {}).get("name"), True)
         ]
-    spec = {"$schema": "https://vega.github.io/schema/vega-lite/v6.json", "width": width, **fill(given)}
+    spec = {"$schema": "https://vega.github.io/schema/vega-lite/v6.json", **fill(given)}
+    if "facet" in spec:  # panels side by side, three a line
+        spec["columns"] = 3
+        spec["spec"] |= dict.fromkeys(("width", "height"), width // spec["columns"] - 40)
+    else:
+        spec.setdefault("width", width)
     spec["datasets"] = datasets
     if chart.equal:
         _one_scale(spec, chart.data["frame"], width)

@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from simnav.leaderboard.figures.run_figure import fixes, true_track
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, curves
+from simnav.leaderboard.site.background import Background, truth_of
 from simnav.leaderboard.site.charts import Chart, short
 from simnav.leaderboard.site.columns import SCORES_SHOWN
-from simnav.leaderboard.site.facts import catalogued, datasheets, events
+from simnav.leaderboard.site.curves import Curves, Gathered
 from simnav.leaderboard.site.overview import bar_scale, board_columns, board_row
+from simnav.leaderboard.site.sweeps import SweepFile
+from simnav.scoring.integrity import ALERT_LIMITS
+from simnav.scoring.plot_series import DIAGNOSTICS
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import ScenarioRanking
     from simnav.leaderboard.ranking.runs import Runs
     from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
-    from simnav.recording import Recording
 
-__all__ = ["BOUND_RUNS", "RUNS_SHOWN", "ScenarioData", "chart_of", "scenario_data", "shown_first"]
+__all__ = ["RUNS_SHOWN", "ScenarioData", "inside_chart", "scenario_data", "seeds_to_show", "shown_first", "track_from"]
 
 #: Runs of a scenario of which track and errors are kept, by default.
 RUNS_SHOWN = 2
-#: Seeds over which the bound is averaged.
-BOUND_RUNS = 2
 
 _FIRST = 6  # rows that a chart shows at first
 _PLAIN = "ekf"
@@ -58,12 +56,23 @@ class ScenarioData:
 
 
 def shown_first(ranking: ScenarioRanking) -> list[str]:
-    """Rows that charts show at first: the best, and the plain EKF, which everybody knows."""
-    ranked = [r.estimator for r in ranking.rows if not r.reference]
+    """Rows that charts show at first: the best, and the plain EKF, which everybody knows; of equal rows one."""
+    again = {name for names in same_results(ranking) for name in names[1:]}
+    ranked = [r.estimator for r in ranking.rows if not r.reference and r.estimator not in again]
     best = ranked[:_FIRST]
     if _PLAIN in ranked and _PLAIN not in best:
         best[-1] = _PLAIN
     return best or [r.estimator for r in ranking.rows][:_FIRST]
+
+
+def same_results(ranking: ScenarioRanking) -> list[list[str]]:
+    """Groups of rows that have the same error in every run, in order of rank."""
+    found: dict[tuple[Any, ...], list[str]] = {}
+    for row in ranking.rows:
+        key = tuple((run, short(value, 6)) for run, value in row.ratios.items())
+        if key and math.isfinite(row.score) and row.failed < row.runs:
+            found.setdefault(key, []).append(row.estimator)
+    return [names for names in found.values() if len(names) > 1]
 
 
 def scenario_data(
@@ -71,60 +80,86 @@ def scenario_data(
     ranking: ScenarioRanking,
     runs: Mapping[str, Runs],
     estimators: Mapping[str, EstimatorEntry],
-    runs_shown: int = RUNS_SHOWN,
+    seeds: Sequence[int],
+    around: Background,
+    gathered: Gathered,
+    sweeps: Sequence[SweepFile] = (),
 ) -> ScenarioData:
-    """Everything that the page of a scenario shows."""
+    """Everything that the page of a scenario shows.
+
+    Parameters
+    ----------
+    entry, ranking, runs, estimators
+        Of the scenario, and of its rows by label.
+    seeds : sequence of int
+        Of the runs that are shown one by one.
+    around : Background
+        Of the scenario.
+    gathered : Gathered
+        Of the series: curves of the runs that bands are made of, and the single runs.
+    sweeps : sequence of SweepFile
+        Over dials of the scenario.
+    """
     rows = [r.estimator for r in ranking.rows]
     first = shown_first(ranking)
-    seeds = _seeds_to_show(runs, first, entry.seeds, runs_shown)
-    recordings = {seed: found for seed in seeds if (found := _recording(entry.id, seed)) is not None}
-    recording = next(iter(recordings.values()), None)
-    made, files = _over_all_runs(entry, ranking, runs, rows, recording)
+    by = {n: [gathered.curves[r] for r in runs[n].good if r in gathered.curves] for n in rows}
+    made, inside, files = _over_all_runs(entry, ranking, runs, by, around)
+    kinds: dict[str, None] = {}
     for seed in seeds:
-        files[f"{entry.data}-run-{seed}"] = _one_run(seed, runs, rows, recordings.get(seed))
+        single = {
+            n: gathered.single[r] for n in rows for r in runs[n].results if r.seed == seed and r in gathered.single
+        }
+        for one in single.values():
+            kinds |= dict.fromkeys(k for k in one if k.partition(".")[0] in DIAGNOSTICS)
+        name = f"{entry.data}-run-{seed}"
+        files[name] = _one_run(seed, runs, rows, single, around)
+        files[f"{name}-inside"] = _inside(single, around, str(seed))
     page = {
         "kind": "scenario",
         "scenario": {"id": entry.id, "argument": entry.argument, "data": entry.data},
         "rows": {
-            n: {"reference": estimators[n].reference, "page": estimators[n].page, "data": estimators[n].data}
+            n: {"reference": estimators[n].reference, "page": estimators[n].page, "data": estimators[n].runs}
             for n in rows
         },
         "first": first,
         "table": _table(ranking, runs, estimators),
         "failures": _failures(ranking, runs),
-        "charts": [
-            c.to_dict() | {"data": None, "file": f"{entry.data}-{c.name}"} if c.byrow else c.to_dict() for c in made
-        ],
-        "runs": {"seeds": seeds, "all": list(entry.seeds), "charts": [c.to_dict() for c in _run_charts()]},
-        "instruments": [] if recording is None else datasheets(catalogued(entry.id), recording),
+        "charts": [_chart(c, entry) for c in made],
+        "inside": [_chart(c, entry) for c in inside],
+        "runs": {
+            "seeds": list(seeds),
+            "all": list(entry.seeds),
+            "charts": [c.to_dict() for c in _run_charts()],
+            "inside": [inside_chart(k, around).to_dict() for k in sorted(kinds, key=_by_instrument)],
+        },
+        "sweeps": [sweep.section(k) for k, sweep in enumerate(sweeps)],
+        "instruments": around.instruments,
         "unsuitable": [{"name": n, "why": why} for n, why in ranking.unsuitable.items()],
-        "remarks": list(ranking.remarks),
+        "remarks": [*ranking.remarks, *(_same(names) for names in same_results(ranking))],
         "reference": ranking.reference.text,
         "provisional": ranking.provisional,
     }
-    return ScenarioData(page, files, tuple(made), tuple(first))
+    return ScenarioData(page, files, (*made, *inside), tuple(first))
 
 
-def _recording(identity: str, seed: int) -> Recording | None:
-    """The run, made again; None where that is not possible any more."""
-    from simnav.source import record
-
-    scenario = catalogued(identity)
-    try:
-        return None if scenario is None else record(scenario, seed)
-    except (ValueError, OSError):
-        return None
+def _chart(chart: Chart, entry: ScenarioEntry) -> dict[str, Any]:
+    """A chart of the page; what depends on the rows that are shown stands in a file."""
+    return chart.to_dict() | ({"data": None, "file": f"{entry.data}-{chart.name}"} if chart.byrow else {})
 
 
-def _seeds_to_show(runs: Mapping[str, Runs], first: Sequence[str], seeds: Sequence[int], count: int) -> list[int]:
+def _same(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]} gave the same errors in every run."
+
+
+def seeds_to_show(ranking: ScenarioRanking, runs: Mapping[str, Runs], seeds: Sequence[int], count: int) -> list[int]:
     """The first seed, then those on which the rows that are shown at first did worst."""
-
-    def badness(seed: int) -> float:
-        values = [r.scores.get("horizontal_rmse", math.nan) for n in first for r in runs[n].results if r.seed == seed]
-        found = [math.log(v) for v in values if v > 0.0 and math.isfinite(v)]
-        return max(found, default=-math.inf)
-
-    rest = sorted(seeds[1:], key=lambda s: (-badness(s), s))
+    worst: dict[int, float] = {}
+    for n in shown_first(ranking):
+        for r in runs[n].results:
+            value = r.scores.get("horizontal_rmse", math.nan)
+            if value > 0.0 and math.isfinite(value):
+                worst[r.seed] = max(worst.get(r.seed, -math.inf), math.log(value))
+    rest = sorted(seeds[1:], key=lambda s: (-worst.get(s, -math.inf), s))
     return sorted([*seeds[:1], *rest[: max(count - 1, 0)]])
 
 
@@ -146,9 +181,10 @@ def _table(
         c.key: min((v for r in scored if not math.isnan(v := runs[r.estimator].score(c.key).value)), default=math.nan)
         for c, _ in shown
     }
+    same = {n: [m for m in names if m != n] for names in same_results(ranking) for n in names}
     rows = []
     for row in ranking.rows:
-        item = board_row(row, estimators[row.estimator], provisional=ranking.provisional)
+        item = board_row(row, estimators[row.estimator], same.get(row.estimator, ()), provisional=ranking.provisional)
         for column, factor in shown:
             found = runs[row.estimator].score(column.key)
             item[column.key] = {
@@ -193,70 +229,90 @@ def _over_all_runs(
     entry: ScenarioEntry,
     ranking: ScenarioRanking,
     runs: Mapping[str, Runs],
-    rows: Sequence[str],
-    recording: Recording | None,
-) -> tuple[list[Chart], dict[str, Any]]:
-    every = [r for n in rows for r in runs[n].results]
-    time = curves.axis(every)
-    happening = (
-        {key: [] for key in ("group", "name", "start", "end", "words")}
-        if recording is None
-        else events(catalogued(entry.id), recording)
-    )
-    faults = _faults(happening)
-    limit = _bound(entry)
+    by: Mapping[str, Sequence[Curves]],
+    around: Background,
+) -> tuple[list[Chart], list[Chart], dict[str, Any]]:
+    """Charts of errors, charts of weights, and the files of their data."""
+    time = curves.axis(c for found in by.values() for c in found)
+    first = next(iter(around.runs), "0")
+    faults = around.runs[first]["faults"] if around.runs else _NO_FAULTS
     made = []
-    if happening["name"]:
-        made.append(
-            charts.timeline("timeline", {"events": happening}, f"Of seed {recording.seed if recording else 0}.")
-        )
-    seeds = f"{len(entry.seeds)} seeds" if len(entry.seeds) > 1 else "one seed"
+    if around.happening["name"]:
+        made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}."))
+    count = min(len(entry.seeds), curves.BAND_RUNS)
+    seeds = "one seed" if len(entry.seeds) < 2 else f"{'the first ' * (count < len(entry.seeds))}{count} seeds"
+    words = f"Median over {seeds}, and the band from the 5th to the 95th percentile. Shaded: faults of seed {first}."
     for key, title, unit, factor in curves.QUANTITIES:
-        found = {n: b for n in rows if (b := curves.band(runs[n].results, key, factor, time)) is not None}
+        found = {n: b for n, c in by.items() if (b := curves.band(c, key, factor, time)) is not None}
         if not found:
             continue
-        bound = limit if key == "horizontal" else {"time": [], "bound": []}
-        data = {
-            "curves": {"axis": [short(t) for t in time], "name": "time", "rows": found},
-            "faults": faults,
-            "bound": bound,
-        }
-        caption = (
-            f"Median over {seeds}, and the band from the 5th to the 95th percentile. "
-            "Shaded: faults of the first run that is shown below."
+        bound = around.bound if key == "horizontal" else _NO_BOUND
+        caption = words + (
+            " Dashed: the posterior Cramer-Rao bound on the RMS error, faults known." if bound["time"] else ""
         )
-        if bound["time"]:
-            caption += " Dashed: the posterior Cramer-Rao bound on the RMS error, faults known."
-        made.append(charts.over_time(key, title, unit, data, caption))
-    cdf = {n: q for n in rows if (q := curves.quantiles(runs[n].good)) is not None}
+        made.append(charts.over_time(key, title, unit, _timed(time, found, faults, bound), caption))
+    cdf = {n: q for n, c in by.items() if (q := curves.quantiles(c)) is not None}
     if cdf:
-        made.append(
-            charts.distribution(
-                "cdf",
-                "Horizontal error",
-                "m",
-                {"curves": {"rows": cdf}},
-                "Over all epochs of all runs that ended well.",
+        caption = f"Over all epochs of {seeds}, of runs that ended well."
+        made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": {"rows": cdf}}, caption))
+    spreads = (
+        ("horizontal_rmse", "rmse", "Horizontal RMSE of every run", "Horizontal RMSE [m]", ()),
+        ("nees_horizontal", "nees", "Consistency of every run", "NEES by degree of freedom [-]", (0.7, 1.5)),
+    )
+    made += [c for words in spreads if (c := _spread(ranking, runs, *words))]
+    limit = ALERT_LIMITS[0]
+    cells = {n: q for n, c in by.items() if (q := curves.integrity(c, limit)) is not None}
+    if cells:
+        made.append(charts.stanford("stanford", {"curves": {"rows": cells}}, limit, f"Epochs of {seeds}."))
+    inside = []
+    for name in sorted({n for found in by.values() for c in found for n in c.diagnostics if n != "time"}):
+        axis = max((c.diagnostics["time"] for found in by.values() for c in found if name in c.diagnostics), key=len)
+        bands = {n: b for n, c in by.items() if (b := curves.band(c, name, 1.0, axis.astype(float))) is not None}
+        instrument = name.partition(".")[2]
+        inside.append(
+            charts.over_time(
+                f"weight-{instrument}", f"Weight of {instrument}", "-", _timed(axis, bands, faults, _NO_BOUND),
+                f"{_MEANING['weight']} {words}", log=False,
             )
-        )
-    made += [
-        c
-        for c in (
-            _spread(ranking, runs, "horizontal_rmse", "rmse", "Horizontal RMSE of every run", "Horizontal RMSE [m]"),
-            _spread(
-                ranking,
-                runs,
-                "nees_horizontal",
-                "nees",
-                "Consistency of every run",
-                "NEES by degree of freedom",
-                (0.7, 1.5),
-            ),
-        )
-        if c
-    ]
-    files = {f"{entry.data}-{c.name}": dict(c.data) for c in made if c.byrow}
-    return made, files
+        )  # fmt: skip
+    files = {f"{entry.data}-{c.name}": dict(c.data) for c in (*made, *inside) if c.byrow}
+    return made, inside, files
+
+
+def _timed(time: Any, rows: Mapping[str, Any], faults: Any, bound: Any) -> dict[str, Any]:
+    axis = {"axis": [short(t) for t in time], "name": "time", "rows": rows}
+    return {"curves": axis, "faults": faults, "bound": bound}
+
+
+_NO_FAULTS: dict[str, list[Any]] = {"start": [], "end": [], "name": []}
+_NO_BOUND: dict[str, list[Any]] = {"time": [], "bound": []}
+_MEANING = {
+    "weight": "1: the measurement counts in full. 0: it is rejected.",
+    "residual": "What remains between measurement and estimate after the adjustment, by its standard deviation.",
+    "innovation": "Length of the difference between the measurement and what was predicted.",
+    "nis": "Innovation squared, by its covariance; its mean is the number of components where the model is right.",
+}
+_TITLES = {
+    "weight": "Weight",
+    "residual": "Residual",
+    "innovation": "Innovation",
+    "nis": "Normalised innovation squared",
+}
+
+
+def _by_instrument(name: str) -> tuple[bool, str, int]:
+    kind, _, instrument = name.partition(".")
+    return instrument == "motion", instrument, DIAGNOSTICS.index(kind)
+
+
+def inside_chart(name: str, around: Background, data: Mapping[str, Any] | None = None) -> Chart:
+    """The chart of a diagnostic of one instrument, as ``weight.gnss``, in one run."""
+    kind, _, instrument = name.partition(".")
+    unit = around.units.get(instrument, ["SI"])[0] if kind == "innovation" else "sigma" if kind == "residual" else "-"
+    title = f"{_TITLES[kind]} of {'the motion model' if instrument == 'motion' else instrument}"
+    return charts.over_time(
+        f"run-{kind}-{instrument}", title, unit, data or {}, _MEANING[kind], spread=False, log=kind != "weight"
+    )
 
 
 def _spread(
@@ -300,32 +356,6 @@ def _run_name(result: Result) -> str:
     return f"seed {result.seed}" + (f", {result.note}" if result.note else "")
 
 
-def _faults(happening: Mapping[str, list[Any]]) -> dict[str, list[Any]]:
-    """Faults of a run, for shading."""
-    keep = [k for k, group in enumerate(happening["group"]) if group != "manoeuvres"]
-    names = [happening["group"][k] for k in keep]
-    return {
-        "start": [short(happening["start"][k]) for k in keep],
-        "end": [short(happening["end"][k]) for k in keep],
-        "name": names,
-    }
-
-
-def _bound(entry: ScenarioEntry) -> dict[str, list[Any]]:
-    """The posterior Cramer-Rao bound on the RMS horizontal error, faults known; empty where there is none."""
-    from simnav.estimators.bound import bound
-
-    scenario = catalogued(entry.id)
-    if scenario is None or scenario.log is not None:
-        return {"time": [], "bound": []}
-    try:
-        found = bound(scenario, range(BOUND_RUNS), "flags")
-    except (ValueError, OSError, ArithmeticError, np.linalg.LinAlgError):
-        return {"time": [], "bound": []}
-    keep = np.unique(np.linspace(0, len(found.time) - 1, 120).round().astype(int))
-    return {"time": [short(t) for t in found.time[keep]], "bound": [short(v) for v in found.horizontal[keep]]}
-
-
 # -- single runs -------------------------------------------------------------------------------------------
 
 
@@ -344,92 +374,48 @@ def _run_charts() -> list[Chart]:
     return made
 
 
-def _one_run(seed: int, runs: Mapping[str, Runs], rows: Sequence[str], recording: Recording | None) -> dict[str, Any]:
+def _one_run(
+    seed: int, runs: Mapping[str, Runs], rows: Sequence[str], single: Mapping[str, dict[str, Any]], around: Background
+) -> dict[str, Any]:
     """Data of the charts of one run, by the name of the chart."""
-    found = {}
-    for n in rows:
-        result = next((r for r in runs[n].results if r.seed == seed), None)
-        if result is not None and (one := curves.one_run(result)) is not None:
-            found[n] = one
-    faults = {"start": [], "end": [], "name": []} if recording is None else _faults(events(None, recording))
+    known = around.runs.get(str(seed), {})
+    faults = known.get("faults", _NO_FAULTS)
     data: dict[str, Any] = {}
     for key, *_ in curves.QUANTITIES:
-        data[f"run-{key}"] = {
-            "curves": {
-                "rows": {
-                    n: {"time": one[key]["time"], "middle": one[key]["middle"]}
-                    for n, one in found.items()
-                    if key in one
-                }
-            },
-            "faults": faults,
-            "bound": {"time": [], "bound": []},
-        }
-    data["track"] = {
-        "curves": {"rows": {n: one["track"] for n, one in found.items() if "track" in one}},
-        **chart_of(recording, [r for n in rows for r in runs[n].good if r.seed == seed]),
+        found = {n: {"time": one[key]["time"], "middle": one[key]["middle"]} for n, one in single.items() if key in one}
+        data[f"run-{key}"] = {"curves": {"rows": found}, "faults": faults, "bound": _NO_BOUND}
+    track = {n: one["track"] for n, one in single.items() if "track" in one}
+    data["track"] = {"curves": {"rows": track}, **(known.get("track") or track_from(single.values()))}
+    mine = [r for n in rows for r in runs[n].results if r.seed == seed]
+    drawn = next((r.draws for r in mine if r.draws), {})
+    return {
+        "seed": seed,
+        "note": next((r.note for r in mine if r.note), ""),
+        "draws": [[key, tables.number(v) if isinstance(v, (int, float)) else str(v)] for key, v in drawn.items()],
+        "charts": data,
     }
-    notes = [r.note for n in rows for r in runs[n].results if r.seed == seed and r.note]
-    drawn = next((r.draws for n in rows for r in runs[n].results if r.seed == seed and r.draws), {})
-    draws = ", ".join(
-        f"{key} {tables.number(value)}" for key, value in drawn.items() if isinstance(value, (int, float))
-    )
-    return {"seed": seed, "note": notes[0] if notes else "", "draws": draws, "charts": data}
 
 
-def chart_of(recording: Recording | None, results: Sequence[Result]) -> dict[str, Any]:
-    """Truth, fixes, ends and faulty parts of the track of a run; from its results where there is no recording."""
-    nothing: dict[str, list[Any]] = {"east": [], "north": [], "time": []}
-    faulty: dict[str, list[Any]] = {"east": [], "north": [], "time": [], "name": [], "part": []}
-    spots: dict[str, list[Any]] = {"east": [], "north": [], "time": [], "name": []}
-    if recording is None:
-        result = next((r for r in results if "truth_north" in r.series), None)
-        if result is None:
-            return {
-                "truth": nothing,
-                "faulty": faulty,
-                "fixes": spots,
-                "ends": spots,
-                "frame": {"x": [0.0, 1.0], "y": [0.0, 1.0]},
-            }
-        east, north, time = (
-            np.asarray(result.series[k], dtype=np.float64) for k in ("truth_east", "truth_north", "time")
-        )
-    else:
-        track = true_track(recording)
-        east, north = track.east, track.north
-        time = np.linspace(0.0, recording.duration, len(east))
-        for name, fix in fixes(recording, most=300).items():
-            for k in range(len(fix.east)):
-                for key, x in (
-                    ("east", short(fix.east[k])),
-                    ("north", short(fix.north[k])),
-                    ("time", None),
-                    ("name", name),
-                ):
-                    spots[key].append(x)
-        for part, fault in enumerate(recording.faults):
-            inside = np.flatnonzero((time >= fault.start) & (time <= fault.end))
-            for k in inside[:: max(1, len(inside) // 40)]:
-                for key, x in (
-                    ("east", short(east[k])),
-                    ("north", short(north[k])),
-                    ("time", short(time[k])),
-                    ("name", f"{fault.kind.replace('_', ' ')} ({', '.join(fault.instruments)})"),
-                    ("part", part),
-                ):
-                    faulty[key].append(x)
-    keep = np.unique(np.linspace(0, len(east) - 1, 300).round().astype(int))
-    truth = {
-        "east": [short(x) for x in east[keep]],
-        "north": [short(x) for x in north[keep]],
-        "time": [short(x) for x in time[keep]],
-    }
-    ends = {
-        "east": [truth["east"][0], truth["east"][-1]],
-        "north": [truth["north"][0], truth["north"][-1]],
-        "name": ["start", "end"],
-        "time": [0, short(time[-1])],
-    }
-    frame = {"x": [float(east.min()), float(east.max())], "y": [float(north.min()), float(north.max())]}
-    return {"truth": truth, "faulty": faulty, "fixes": spots, "ends": ends, "frame": frame}
+def _inside(single: Mapping[str, dict[str, Any]], around: Background, seed: str) -> dict[str, Any]:
+    """Data of the charts of innovations, residuals and weights of one run, by the name of the chart."""
+    faults = around.runs.get(seed, {}).get("faults", _NO_FAULTS)
+    found: dict[str, Any] = {}
+    for n, one in single.items():
+        for name, values in one.items():
+            kind, _, instrument = name.partition(".")
+            if kind not in DIAGNOSTICS:
+                continue
+            factor = around.units.get(instrument, ["", 1.0])[1] if kind == "innovation" else 1.0
+            data = found.setdefault(
+                f"run-{kind}-{instrument}", {"curves": {"rows": {}}, "faults": faults, "bound": _NO_BOUND}
+            )
+            middle = [short(factor * v) for v in values["middle"]] if factor != 1.0 else values["middle"]
+            data["curves"]["rows"][n] = {"time": values["time"], "middle": middle}
+    return found
+
+
+def track_from(single: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """Truth and frame of a track from the series of a run, where there is no recording."""
+    truth: Sequence[Any] = next((one["truth"] for one in single if "truth" in one), ([], [], []))
+    nothing: dict[str, list[Any]] = {"east": [], "north": [], "time": [], "name": [], "part": []}
+    return {"faulty": nothing, "fixes": {k: nothing[k] for k in ("east", "north", "name")}, **truth_of(*truth)}

@@ -12,26 +12,31 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.figures.plots import save
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import Runs, group
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
+from simnav.leaderboard.site.background import backgrounds
 from simnav.leaderboard.site.columns import glossary
 from simnav.leaderboard.site.content import EstimatorEntry, ExtraPage, Fact, ScenarioEntry, SiteFacts, slug
-from simnav.leaderboard.site.estimator_page import estimator_data, facts_of, runs_data
+from simnav.leaderboard.site.curves import BAND_RUNS, Gathered, gather
+from simnav.leaderboard.site.estimator_page import errors_data, estimator_data, facts_of, runs_data, worst_run
 from simnav.leaderboard.site.facts import catalogued, estimator_facts, name_of, toml_of
 from simnav.leaderboard.site.library import bundle
 from simnav.leaderboard.site.overview import BOARD_COLUMNS, overview
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
-from simnav.leaderboard.site.scenario_page import RUNS_SHOWN, ScenarioData, scenario_data
+from simnav.leaderboard.site.scenario_page import RUNS_SHOWN, ScenarioData, scenario_data, seeds_to_show
+from simnav.leaderboard.site.sweeps import SweepFile
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking
@@ -39,7 +44,6 @@ if TYPE_CHECKING:
 
 __all__ = ["build"]
 
-_WORTH_PROCESSES = 3  # scenarios
 _STALE = 3600.0  # a build of this age runs no more [s]
 _STATIC = (*STATIC, "core.js", "table.js", "charts.js", "compare.js", "page.js", "results.schema.json")
 
@@ -56,6 +60,7 @@ def build(
     editions: Sequence[ExtraPage] = (),
     runs_shown: int = RUNS_SHOWN,
     figures: bool = False,
+    sweeps: Sequence[SweepFile] = (),
 ) -> Path:
     """Write the site.
 
@@ -81,6 +86,8 @@ def build(
         Runs of each scenario of which track and errors are on the site.
     figures : bool
         Write the charts as SVG and PNG, too, for print.
+    sweeps : sequence of SweepFile
+        Over dials of the scenarios (`simnav.leaderboard.site.sweeps.find`).
 
     Returns
     -------
@@ -104,7 +111,7 @@ def build(
         draft.chmod(0o755)
         report = progress or (lambda *_, **__: None)
         site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions)
-        site.write(runs_shown, figures)
+        site.write(runs_shown, figures, sweeps)
         _swap(draft, output)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -195,8 +202,9 @@ class _Site:
         for label in labels:
             stem = slug(label, taken)
             self.estimators[label] = EstimatorEntry(
-                label, f"estimator-{stem}.html", f"row-{stem}", label in references, estimator_facts(label)
-            )
+                label, f"estimator-{stem}.html", f"row-{stem}", f"runs-{stem}", label in references,
+                estimator_facts(label),
+            )  # fmt: skip
         described = [_describe(s, by, f"{slug(s, taken)}.html") for s, by in self.runs.items()]
         self.scenarios = {s.id: s for s in described}
         provenances = [r.provenance for r in self.results]
@@ -214,13 +222,24 @@ class _Site:
             citation=citation(provenances),
         )
 
-    def write(self, runs_shown: int, figures: bool) -> None:
+    def write(self, runs_shown: int, figures: bool, sweeps: Sequence[SweepFile]) -> None:
         """Write all pages and data."""
         pages = environment()
         (self.folder / "data").mkdir()
+        seeds = {
+            s: seeds_to_show(self.ranking.scenario(s), self.runs[s], entry.seeds, runs_shown)
+            for s, entry in self.scenarios.items()
+        }
+        around = backgrounds(list(seeds.items()), self.workers)  # other processes begin to work
+        worst = {label: worst_run(label, self.ranking, self.runs) for label in self.estimators}
+        gathered = self._gathered(seeds, [found[0] for found in worst.values() if found is not None])
         steps = len(self.scenarios) + 1
         self.progress(0, steps)
-        for k, (scenario, found) in enumerate(zip(self.scenarios.values(), self._prepared(runs_shown), strict=True)):
+        for k, (scenario, behind) in enumerate(zip(self.scenarios.values(), around, strict=True)):
+            mine = {n: self.estimators[n] for n in self.runs[scenario.id]}
+            found = scenario_data(scenario, self.ranking.scenario(scenario.id), self.runs[scenario.id], mine,
+                                  seeds[scenario.id], behind, gathered,
+                                  [s for s in sweeps if s.scenario == scenario.id])  # fmt: skip
             for name, content in found.files.items():
                 self._data(name, content)
             if figures:
@@ -228,12 +247,18 @@ class _Site:
             self._page(pages, "scenario.html", scenario.page, found.page, scenario=scenario)
             self.progress(k + 1, steps, note=scenario.name)
         for label, entry in self.estimators.items():
-            self._data(entry.data, runs_data(label, self.ranking, self.runs, self.scenarios))
-            data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators)
+            self._data(entry.data, errors_data(label, self.ranking, self.scenarios))
+            self._data(entry.runs, runs_data(label, self.ranking, self.runs))
+            last = worst[label]
+            single = None if last is None else gathered.single.get(last[0])
+            data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, single)
             parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
             self._page(pages, "estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
                        data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
         tracks = overview(self.ranking, self.estimators, self.scenarios, self.runs)
+        if figures:
+            for track in self.ranking.tracks:
+                save(ranking_figure(track), self.folder / "figures" / f"board-{track.track}", formats=("svg", "png"))
         self._page(
             pages, "index.html", "index.html", {"kind": "index", "tracks": tracks}, tracks=tracks, facts=self._counts()
         )
@@ -248,25 +273,14 @@ class _Site:
         self._export()
         self.progress(steps, steps)
 
-    def _prepared(self, runs_shown: int) -> Iterator[ScenarioData]:
-        """The data of one scenario after the other; several processes where it is worth their start."""
-        tasks = []
-        for identity, entry in self.scenarios.items():
-            table, runs = self.ranking.scenario(identity), self.runs[identity]
-            mine = {n: self.estimators[n] for n in runs}
-            tasks.append((entry, table, runs, mine, runs_shown))
-        if self.workers < 2 or len(tasks) < _WORTH_PROCESSES:
-            yield from (scenario_data(*task) for task in tasks)
-            return
-        from joblib import Parallel, delayed
-
-        before = os.environ.get("PYTHONSAFEPATH")
-        os.environ["PYTHONSAFEPATH"] = "1"  # a folder of ours where the user stands must not be imported
-        try:
-            parallel = Parallel(n_jobs=min(self.workers, len(tasks)), return_as="generator", pre_dispatch="2*n_jobs")
-            yield from parallel(delayed(scenario_data)(*task) for task in tasks)
-        finally:
-            os.environ.pop("PYTHONSAFEPATH") if before is None else os.environ.update(PYTHONSAFEPATH=before)
+    def _gathered(self, seeds: Mapping[str, Sequence[int]], worst: Sequence[Result]) -> Gathered:
+        """What charts need of the series, each part of a file read once."""
+        single, over_all = list(worst), []
+        for scenario, by in self.runs.items():
+            for runs in by.values():
+                over_all += runs.good[:BAND_RUNS]
+                single += [r for r in runs.good if r.seed in seeds[scenario]]
+        return gather(over_all, single)
 
     def _counts(self) -> list[Fact]:
         tried = [r for r in self.results if r.tried]

@@ -20,7 +20,7 @@ from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.standard import shipped
 from simnav.leaderboard.standard.currency import outdated
 from simnav.leaderboard.standard.history import append
-from simnav.leaderboard.standard.readme import replaced, tables
+from simnav.leaderboard.standard.readme import PICTURE, draw, replaced, tables
 from simnav.scenario import load
 
 __all__ = ["Published", "begin", "missing", "publish"]
@@ -130,5 +130,6 @@ def publish(working: Path, profile: Profile, folder: Path, history: Path, readme
     edition = append(history, ranking, results)
     if readme is not None:
         write_whole(readme, text)
+        draw(ranking, readme.parent / PICTURE)
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
     return Published(folder, edition, results, ranking, size, readme)

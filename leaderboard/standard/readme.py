@@ -12,11 +12,15 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
 
-__all__ = ["BEGIN", "END", "marked", "replaced", "tables"]
+__all__ = ["BEGIN", "END", "PICTURE", "draw", "marked", "replaced", "tables"]
+
+#: Picture of the board, from the folder of the README.
+PICTURE = "docs/figures/board.png"
 
 BEGIN, END = "<!-- standard result: begin -->", "<!-- standard result: end -->"
 _MAIN = "aided-ins"
 _ROWS = 12  # of the table of the main track
+_DRAWN = 24  # of the picture
 _BEST = 4  # rows that a cell names
 
 
@@ -37,8 +41,9 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
             "| track | scenarios | runs of a row | rows | first by score | may be the best (95 %) | `ekf` |",
             "|---|---|---|---|---|---|---|", *map(_track, tracks),
         ]))  # fmt: skip
-    main = next((t for t in tracks if t.track == _MAIN), tracks[0] if tracks else None)
+    main = _main(ranking)
     if main is not None:
+        parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
         parts.append(f"The first {min(_ROWS, sum(r.ranked for r in main.rows))} rows of the track *{main.title}*:")
         parts.append("\n".join([
             "| rank | estimator | score, 95 % interval | worst run | failed runs |", "|---|---|---|---|---|",
@@ -46,6 +51,24 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
               f"| {r.failed} of {r.runs} |" for r in [r for r in main.rows if r.ranked][:_ROWS]),
         ]))  # fmt: skip
     return "\n\n".join(parts)
+
+
+def _main(ranking: Ranking) -> TrackRanking | None:
+    """The track whose rows are shown: aided INS, or else the first that has ranks."""
+    tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
+    return next((t for t in tracks if t.track == _MAIN), tracks[0] if tracks else None)
+
+
+def draw(ranking: Ranking, path: Path) -> Path | None:
+    """Draw the picture of the README: the best rows of the main track, and the oracles; None without a ranked row."""
+    from simnav.leaderboard.figures.plots import save
+    from simnav.leaderboard.ranking.ranking_figure import ranking_figure
+
+    main = _main(ranking)
+    if main is None:
+        return None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return save(ranking_figure(main, most=_DRAWN), path, formats=("png",))[0]
 
 
 def _interval(row: TrackRow) -> str:

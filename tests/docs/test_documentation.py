@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import runpy
@@ -9,6 +10,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -59,6 +61,8 @@ def test_the_site_builds_without_warnings(tmp_path):
     assert "not ranked" in rows
     assert "horizontal_rmse" in (tmp_path / "reference" / "scores.html").read_text()
     assert "multipath" in (tmp_path / "reference" / "instruments.html").read_text()
+    assert (tmp_path / "tutorials" / "first-estimator.ipynb").is_file()
+    assert "first-estimator.ipynb" in (tmp_path / "tutorials" / "first-estimator.html").read_text()
     assert "until_decided" in (tmp_path / "reference" / "python.html").read_text()
 
 
@@ -87,19 +91,47 @@ def test_the_first_estimator_is_that_of_the_readme():
     assert blocks("tutorials/first-estimator.md", "python")[0] == shown[0]
 
 
-def test_the_first_estimator(tmp_path):
-    estimator, call = blocks("tutorials/first-estimator.md", "python")
-    (tmp_path / "alpha_beta.py").write_text(estimator)
-    lines = [
-        b.strip() for b in re.findall(r"^```\n(simnav .*?)^```", text("tutorials/first-estimator.md"), re.S | re.M)
+def notebook(name: str) -> Any:
+    """The notebook of a tutorial, as the documentation has it."""
+    pytest.importorskip("jupytext")
+    spec = importlib.util.spec_from_file_location("notebooks", DOCS / "notebooks.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.notebook(text(f"tutorials/{name}.md"))
+
+
+@pytest.mark.parametrize("name", sorted(p.stem for p in (DOCS / "tutorials").glob("*.md") if p.stem != "index"))
+def test_every_tutorial_is_a_notebook(name):
+    """All Python and all commands of the page are cells, in order, and the rest is text."""
+    cells = [c.source for c in notebook(name).cells if c.cell_type == "code"]
+    page = f"tutorials/{name}.md"
+    shown = [line for cell in cells for line in cell.splitlines() if line.startswith("!simnav")]
+    assert shown == [f"!{line}" for block in commands(page) for line in block.splitlines() if line.startswith("simnav")]
+    python = [c for c in cells if not c.startswith(("!", "%%writefile"))]
+    for cell in python:
+        compile(cell, name, "exec")
+    assert len(cells) >= len(blocks(page, "python")) + len(commands(page))
+
+
+def test_the_first_estimator_as_a_notebook(tmp_path, monkeypatch):
+    """All cells run in order, with fewer seeds than the page asks for."""
+    nbclient = pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("COLUMNS", "200")
+    found = notebook("first-estimator")
+    for cell in found.cells:
+        cell.source = cell.source.replace("--runs 20", "--runs 2 --against gnss-only").replace("runs=3", "runs=2")
+    client = nbclient.NotebookClient(found, timeout=300, resources={"metadata": {"path": str(tmp_path)}})
+    client.execute()
+    _, checked, ran, evaluated, called = [
+        "".join(o.get("text", "") for o in c.outputs) for c in found.cells if c.cell_type == "code"
     ]
-    assert [line.split()[1] for line in lines] == ["check", "run", "evaluate"]
-    assert "alpha-beta passes" in simnav(tmp_path, lines[0])
-    assert "ship-ekf" in simnav(tmp_path, lines[1])
+    assert "alpha-beta passes" in checked
+    assert "ship-ekf" in ran
     assert (tmp_path / "run.png").stat().st_size > 10_000
-    done = subprocess.run([sys.executable, "-c", call], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert re.fullmatch(r"[12] of 2", done.stdout.strip())
+    assert "alpha_beta" in evaluated
+    assert re.fullmatch(r"[12] of 2", called.strip().splitlines()[-1])
 
 
 def test_a_log_becomes_a_scenario(tmp_path, monkeypatch):

@@ -33,9 +33,9 @@
   };
   simnav.shown = shown;
 
-  const style = (row) => {
-    const ranked = shown.rows.filter((r) => !simnav.page.rows?.[r]?.reference), place = ranked.indexOf(row);
-    if (place < 0) return { colour: inks[theme()].grey, dash: dashes[1 + (shown.rows.filter((r) => !ranked.includes(r)).indexOf(row) % 3)] };
+  const style = (row, rows = shown.rows) => {
+    const ranked = rows.filter((r) => !simnav.page.rows?.[r]?.reference), place = ranked.indexOf(row);
+    if (place < 0) return { colour: inks[theme()].grey, dash: dashes[1 + (rows.filter((r) => !ranked.includes(r)).indexOf(row) % 3)] };
     return { colour: palettes[theme()][place % 8], dash: dashes[Math.floor(place / 8) % 4] };
   };
 
@@ -61,17 +61,21 @@
     return found;
   };
 
-  /** Put what depends on the theme and on the rows into a specification. */
-  const fill = (item) => {
+  /** Put what depends on the theme and on the rows into a specification; a legend where no switches name the rows. */
+  const fill = (item, rows, legend) => {
     const { ink, grey, shade } = inks[theme()];
-    const words = { $ink: ink, $grey: grey, $shade: shade, $strong: palettes[theme()][0], $second: palettes[theme()][1] };
+    const words = { $ink: ink, $grey: grey, $shade: shade, $strong: palettes[theme()][0], $second: palettes[theme()][1], $scheme: theme() === "dark" ? "tealblues" : "blues" };
     const scales = {
-      $colours: () => ({ domain: shown.rows, range: shown.rows.map((r) => style(r).colour) }),
-      $dashes: () => ({ domain: shown.rows, range: shown.rows.map((r) => style(r).dash) }),
+      $colours: () => ({ domain: rows, range: rows.map((r) => style(r, rows).colour) }),
+      $dashes: () => ({ domain: rows, range: rows.map((r) => style(r, rows).dash) }),
     };
     if (typeof item === "string") return item in words ? words[item] : item in scales ? scales[item]() : item;
-    if (Array.isArray(item)) return item.map(fill);
-    if (item && typeof item === "object") return Object.fromEntries(Object.entries(item).map(([k, v]) => [k, fill(v)]));
+    if (Array.isArray(item)) return item.map((v) => fill(v, rows, legend));
+    if (item && typeof item === "object") {
+      const found = Object.fromEntries(Object.entries(item).map(([k, v]) => [k, fill(v, rows, legend)]));
+      if (legend && typeof item.scale === "string") found.legend = { title: null, orient: "bottom", columns: 3 };
+      return found;
+    }
     return item;
   };
 
@@ -91,7 +95,7 @@
     constructor(host, given) {
       Object.assign(this, { host, given });
       this.place = make("div", { class: "vega", role: "group", "aria-label": given.title });
-      host.append(make("figure", { class: "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
+      host.append(make("figure", { class: given.spec.facet ? "chart wide" : "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
       this.drawn = false;
       new IntersectionObserver((entries, observer) => {
         if (!entries.some((e) => e.isIntersecting)) return;
@@ -109,11 +113,17 @@
       const { given } = this;
       const data = given.file ? await simnav.read(given.file) : given.data;
       if (!data) return;
-      const spec = fill(given.spec);
+      const rows = given.always ?? shown.rows ?? [];
+      const spec = fill(given.spec, rows, Boolean(given.always));
       const width = Math.max(180, this.place.clientWidth - 75);
       spec.$schema = "https://vega.github.io/schema/vega-lite/v6.json";
-      spec.width ??= width;
-      spec.datasets = Object.fromEntries(Object.entries(data).map(([name, d]) => [name, expand(d, shown.rows ?? [])]));
+      if (spec.facet) { // panels side by side, as many as fit
+        const fit = Math.max(1, Math.min(spec.columns, Math.floor((width + 75) / 230))), count = Math.max(1, rows.length);
+        spec.columns = Math.ceil(count / Math.ceil(count / fit));
+        const side = Math.min(300, Math.floor((width + 30) / spec.columns) - 30);
+        Object.assign(spec.spec, { width: side, height: side });
+      } else spec.width ??= width;
+      spec.datasets = Object.fromEntries(Object.entries(data).map(([name, d]) => [name, expand(d, rows)]));
       // A layer without data would only spoil the scales.
       if (spec.layer) spec.layer = spec.layer.filter((l) => !l.data?.name || spec.datasets[l.data.name]?.length);
       if (spec.layer && !spec.layer.length) return this.place.replaceChildren("There is nothing to show.");

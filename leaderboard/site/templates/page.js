@@ -96,6 +96,15 @@
     simnav.table(at("table"), page.table);
     const host = at("charts");
     for (const chart of page.charts) simnav.chart(host, chart);
+    if (page.inside.length) {
+      const charts = make("div", { class: "charts" });
+      host.after(make("details", {}, make("summary", {}, "Weights of the measurements"), charts));
+      for (const chart of page.inside) simnav.chart(charts, chart);
+    }
+    document.querySelectorAll("[data-sweep]").forEach((place, k) => {
+      // Rows of a sweep that have no result here cannot be switched: they are shown always.
+      for (const chart of page.sweeps[k].charts) simnav.chart(place, { ...chart, always: page.sweeps[k].rows });
+    });
     oneRun(at("run"));
   };
 
@@ -107,8 +116,17 @@
     const choice = make("select", { "aria-label": "Estimator" }, rows.map((r) => make("option", { value: r, selected: r === row }, r)));
     const runs = make("select", { "aria-label": "Run" }, page.runs.all.map((s) => make("option", { value: s, selected: s === seed }, `seed ${s}${page.runs.seeds.includes(s) ? " (with track and errors)" : ""}`)));
     const facts = make("p", { class: "note", role: "status" }), command = make("code"), list = make("div"), charts = make("div", { class: "charts" });
-    host.append(make("div", { class: "tools" }, make("label", {}, "Estimator ", choice), make("label", {}, "Run ", runs)), facts, make("pre", { tabindex: "0" }, command), charts, make("details", {}, make("summary", {}, "All runs of this estimator"), list));
-    let made = null;
+    const drawn = make("details", { class: "drawn" }), inner = make("div", { class: "charts" });
+    const inside = make("details", { class: "inside" }, make("summary", {}, "Innovations, residuals and weights of this run"), inner);
+    host.append(make("div", { class: "tools" }, make("label", {}, "Estimator ", choice), make("label", {}, "Run ", runs)), facts, make("pre", { tabindex: "0" }, command), drawn, charts, inside, make("details", {}, make("summary", {}, "All runs of this estimator"), list));
+    let made = null, within = null;
+    const showInside = async () => {
+      if (!inside.open || !page.runs.seeds.includes(seed)) return;
+      const read = await simnav.read(`${data}-run-${seed}-inside`);
+      if (!within) within = page.runs.inside.map((chart) => simnav.chart(inner, { ...chart, data: read[chart.name] ?? {} }));
+      else for (const chart of within) chart.show({ data: read[chart.given.name] ?? {} });
+    };
+    inside.addEventListener("toggle", showInside);
     const show = async () => {
       state.set("row", row);
       state.set("seed", String(seed));
@@ -117,20 +135,24 @@
       const all = (await simnav.read(page.rows[row].data)).scenarios[page.scenario.id];
       drawRuns(list, all);
       const k = all.seed.indexOf(seed);
-      facts.textContent = k < 0 ? `${row} did not run with seed ${seed}.` : `${row}, seed ${seed}${all.note?.[k] ? `, ${all.note[k]}` : ""}: ${all.status[k]}${all.reason?.[k] ? ` (${all.reason[k]})` : ""}, horizontal RMSE ${write.number(all.scores.horizontal_rmse?.[k])} m, ${write.duration(all.seconds[k])}.`;
-      charts.hidden = !page.runs.seeds.includes(seed);
+      facts.textContent = k < 0 ? `${row} did not run with seed ${seed}.` : `${row}, seed ${seed}${all.note?.[k] ? `, ${all.note[k]}` : ""}: ${all.status?.[k] ?? "ok"}${all.reason?.[k] ? ` (${all.reason[k]})` : ""}, horizontal RMSE ${write.number(all.scores.horizontal_rmse?.[k])} m, ${write.duration(all.seconds[k])}.`;
+      charts.hidden = drawn.hidden = !page.runs.seeds.includes(seed);
+      inside.hidden = charts.hidden || !page.runs.inside.length;
       if (charts.hidden) return;
       const name = `${data}-run-${seed}`, read = await simnav.read(name);
-      if (read.draws) facts.textContent += ` Drawn for this run: ${read.draws}.`;
+      drawn.hidden = !read.draws.length;
+      const values = read.draws.map(([key, value]) => make("tr", {}, make("th", { scope: "row" }, key), make("td", { class: "wrap" }, value)));
+      drawn.replaceChildren(make("summary", {}, `Drawn for this run: ${read.draws.length} values`), make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Drawn for this run" }, make("table", {}, make("tbody", {}, values))));
       if (!made) made = page.runs.charts.map((chart) => simnav.chart(charts, { ...chart, data: read.charts[chart.name] }));
       else for (const chart of made) chart.show({ data: read.charts[chart.given.name] });
+      await showInside();
     };
     const drawRuns = (target, all) => {
       const columns = page.table.columns.filter((c) => all.scores[c.key]).map((c) => ({ ...c, hidden: false }));
       simnav.table(target, {
         name: "runs", title: `Runs of ${row}`, sort: "seed",
         columns: [{ key: "seed", title: "Seed", help: "Choose a run to see it above.", kind: "name", fixed: true }, { key: "status", title: "Status", help: "How the run ended.", kind: "text", filter: true }, ...columns],
-        rows: all.seed.map((s, k) => ({ seed: { text: String(s), value: s, sort: s }, run: s, status: all.status[k], ...Object.fromEntries(columns.map((c) => [c.key, all.scores[c.key][k]])) })),
+        rows: all.seed.map((s, k) => ({ seed: { text: String(s), value: s, sort: s }, run: s, status: all.status?.[k] ?? "ok", ...Object.fromEntries(columns.map((c) => [c.key, all.scores[c.key][k]])) })),
         onrow: (line, item) => {
           const cell = line.querySelector("th");
           cell.replaceChildren(make("button", { type: "button", class: "link", onclick: () => { seed = item.run; show(); host.scrollIntoView(); } }, String(item.run)));

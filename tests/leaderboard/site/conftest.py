@@ -11,7 +11,8 @@ import pytest
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.site import scenario_page, site
+from simnav.leaderboard.site import background, site
+from simnav.leaderboard.site.sweeps import SweepFile
 from simnav.scenario import load
 from simnav.scoring import SCORES
 
@@ -49,6 +50,8 @@ def made_up(scenario: str, seed: int, estimator: str, status: str = "ok") -> Res
         track |= {"estimate_north": time + error, "estimate_east": 0.5 * time}
         series = {"time": time, "horizontal": error, "heading": error, "three_sigma": 3.0 * np.ones(60)}
         series |= {"quantiles": np.quantile(error, np.linspace(0.0, 1.0, 101)), **track}
+        if estimator == "sw-fgo":
+            series |= {"diagnostics_time": time[::3], "weight.gnss": rng.uniform(size=20)}
         series = {k: v.astype(np.float32) for k, v in series.items()}
     reason = "" if status == "ok" else f"<b>{status}</b> of {estimator}"
     parameters = {"gate": 3.5} if estimator == "ekf" else {}
@@ -67,6 +70,7 @@ def made_up(scenario: str, seed: int, estimator: str, status: str = "ok") -> Res
         2**20,
         scenario_digest="5ce",
         provenance=MADE,
+        draws={} if scenario in MADE_UP else {"faults.0.size_m": 3.5, "faults.0.instruments": "dvl"},
     )
 
 
@@ -93,12 +97,39 @@ def results(catalogued: str) -> list[Result]:
     return [made_up(s, k, e, status(s, k, e)) for s in scenarios for e in SIZES for k in SEEDS]
 
 
+def made_up_sweep(scenario: str) -> SweepFile:
+    """Of two rows, of which one breaks at 3 m."""
+
+    def error(value: float) -> dict[str, float]:
+        return {"value": value, "low": 0.9 * value, "high": 1.1 * value, "runs": 30}
+
+    points = [
+        {"estimator": e, "values": [v], "failed": 0, "error": error(1.0 + v * slope)}
+        for e, slope in (("ekf", 1.0 / 3.0), ("sw-fgo", 0.1))
+        for v in (0.0, 2.0, 4.0)
+    ]
+    broken = {"criterion": "twice-clean", "threshold": 2.0, "at": None}
+    return SweepFile(
+        Path("sweep-jump.json"),
+        {
+            "scenario": scenario,
+            "score": {"name": "horizontal_rmse", "title": "Horizontal RMSE", "unit": "m"},
+            "dials": [{"name": "jump", "key": "k", "unit": "m", "title": "Jump", "values": [0.0, 2.0, 4.0]}],
+            "points": points,
+            "breaking_points": [
+                {"estimator": "ekf", **broken, "value": {"value": 3.0, "low": 2.5, "high": 3.5, "runs": 30}},
+                {"estimator": "sw-fgo", **broken, "value": {"value": None, "low": None, "high": None, "runs": 30}},
+            ],
+        },
+    )
+
+
 @pytest.fixture(scope="session")
-def folder(results: list[Result], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(results: list[Result], catalogued: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site."""
     output = tmp_path_factory.mktemp("board") / "site"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenario_page, "BOUND_RUNS", 1)
-        index = site.build(results, rank(results), output)
+        patch.setattr(background, "BOUND_RUNS", 1)
+        index = site.build(results, rank(results), output, sweeps=[made_up_sweep(catalogued)])
     assert index == output / "index.html"
     return output

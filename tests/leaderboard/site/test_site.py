@@ -31,7 +31,7 @@ def no_charts(monkeypatch):
 
     def nothing(entry, ranking, *_):
         page = {"kind": "scenario", "reference": "", "remarks": [], "unsuitable": [], "failures": [], "instruments": [],
-                "provisional": False}  # fmt: skip
+                "provisional": False, "sweeps": []}  # fmt: skip
         return ScenarioData(page, {}, (), ())
 
     monkeypatch.setattr(site, "scenario_data", nothing)
@@ -162,11 +162,22 @@ def test_a_scenario_of_the_catalogue_says_what_happens_with_which_instruments(fo
     assert f'name = "{catalogued.rpartition("-v")[0]}"' in page.text  # the TOML file
     names = [c["name"] for c in data["charts"]]
     assert names[:2] == ["timeline", "horizontal"]
-    assert {"cdf", "rmse", "nees"} <= set(names)
+    assert {"cdf", "rmse", "nees", "stanford"} <= set(names)
+    assert [c["name"] for c in data["inside"]] == ["weight-gnss"]
+    assert "oracle and oracle-mixture gave the same errors in every run." in data["remarks"]
     horizontal = (folder / "data" / f"{catalogued}-horizontal.js").read_text()
     assert '"bound":[' in horizontal
     assert data["runs"]["seeds"][0] == 0
     assert (folder / "data" / f"{catalogued}-run-0.js").is_file()
+
+
+def test_a_scenario_shows_its_sweeps_with_breaking_points(folder, catalogued):
+    page, data = Page(folder / f"{catalogued}.html"), data_of(folder / f"{catalogued}.html")
+    assert "How large a fault may be: Jump [m]" in page.text
+    assert "beyond 4.0" in page.text  # the one that does not break
+    (chart,) = data["sweeps"][0]["charts"]
+    assert chart["data"]["curves"]["rows"]["ekf"]["value"] == [0.0, 2.0, 4.0]
+    assert chart["data"]["marks"]["rows"] == {"ekf": {"at": [3.0], "threshold": [2.0]}}
 
 
 def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):
@@ -185,14 +196,15 @@ def test_the_page_of_an_estimator_says_what_it_is(folder):
     assert {p["name"] for p in data["parameters"]} >= {"window", "iterations"}
     assert data["plain"]["label"] == "ekf"
     assert data["worst"]["command"].startswith("simnav run ")
-    assert len(data["worst"]["charts"]) == 3
+    assert [c["name"] for c in data["worst"]["charts"]][-1] == "run-weight-gnss"
+    assert len(data["worst"]["charts"]) == 4
 
 
 def test_every_chart_is_drawn_for_print(folder, results, tmp_path, catalogued):
     """By the library itself, without a browser."""
     from simnav.leaderboard.site.print_figures import filled, write_figure
 
-    some = ("timeline", "horizontal", "cdf", "rmse")
+    some = ("timeline", "horizontal", "rmse", "stanford")
     for chart in (c for c in data_of(folder / f"{catalogued}.html")["charts"] if c["name"] in some):
         if chart["data"] is None:
             text = (folder / "data" / f"{chart.pop('file')}.js").read_text()

@@ -87,6 +87,8 @@ def test_the_readme_has_its_tables_and_the_rest_of_it_stays(home: Path) -> None:
     assert text.startswith("# A board\n")
     assert text.endswith("The end.\n")
     assert readme.marked(home / "README.md") == readme.tables(rank(results), results)
+    assert f"({readme.PICTURE})" in text
+    assert (home / readme.PICTURE).stat().st_size > 5000
     assert re.search(r"\| Generalisation \| 1 \| 2 \| 2 \| `\S+` [\d.]+ \|", text)
     assert "| `dead-reckoning` |" in text
     with pytest.raises(RequestError, match=r"lacks the marks of the standard result"):

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import simnav
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.site.sweeps import find
 from simnav.leaderboard.sweep.breaking import breaking_point, crossing
 from simnav.leaderboard.sweep.settings import chosen_dials, parse_dials, settings
 from simnav.scenario import Scenario, load
@@ -135,6 +136,9 @@ def test_a_whole_sweep(sweep, scenario: Scenario):
     assert len(table) == 3
     assert json.loads(json.dumps(sweep.to_dict()))["scenario"] == scenario.id
     assert len(sweep.plot().axes) == 1
+    (left,) = find(sweep.summary.folder.parent)  # for the site
+    assert left.scenario == scenario.id
+    assert left.section(0)["breaking"][1]["value"] == pytest.approx(limit.value.value, rel=1e-3)
 
 
 def test_a_sweep_is_resumed_and_extended(sweep, scenario: Scenario):
@@ -171,7 +175,9 @@ def test_the_command_and_a_map(path: Path, tmp_path: Path):
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
     assert "Breaking points" in done.output
-    assert "bias to the north [m]" in done.output
+    lines = done.output.splitlines()
+    assert any("bias to" in line for line in lines)  # a long heading is folded
+    assert sum("gnss-only" in line for line in lines) == 6 + 2 * 2  # settings; twice the clean error and the limit
     assert (tmp_path / "map.png").stat().st_size > 5000
     bad = CliRunner().invoke(app, ["sweep", str(path), "--dial", "bias=1", "-e", "gnss-only", "--plot", "x.txt"])
     assert bad.exit_code == 2

@@ -1,0 +1,240 @@
+"""What a scenario page shows besides results: the recordings of some runs, what happens in them, and the bound.
+
+It follows from the scenario and the code alone, and takes longer than all else, so that it is kept in the user's cache:
+a file for each scenario and choice of seeds, named after a digest of all that decides it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.leaderboard.figures.run_figure import fixes, true_track
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.site.charts import short
+from simnav.leaderboard.site.facts import catalogued, datasheets, events
+from simnav.leaderboard.site.library import cache
+
+if TYPE_CHECKING:
+    from simnav.recording import Recording
+
+__all__ = ["BOUND_RUNS", "Background", "background", "backgrounds", "track_of"]
+
+#: Seeds over which the bound is averaged.
+BOUND_RUNS = 2
+
+_WORTH_PROCESSES = 3  # scenarios
+_MOST_KEPT = 400  # files in the cache
+_TRACK_POINTS = 300
+_UNITS = {"m_s": ("m/s", 1.0), "deg": ("°", float(np.degrees(1.0)))}
+
+
+@dataclass(frozen=True)
+class Background:
+    """Of one scenario; empty where it is not in the catalogue.
+
+    Attributes
+    ----------
+    happening : dict
+        Faults and manoeuvres of the first run that is shown, as columns.
+    instruments : list of dict
+        Datasheets.
+    units : dict of str to list
+        By instrument: unit of the length of its innovation, and factor from SI, where its components share them.
+    bound : dict
+        Columns ``time`` [s] and ``bound`` [m]: the posterior Cramer-Rao bound on the RMS horizontal error, with the
+        faults known.
+    runs : dict of str to dict
+        By seed: ``faults`` as columns, and ``track`` as from `track_of`.
+    """
+
+    happening: dict[str, list[Any]] = field(
+        default_factory=lambda: {key: [] for key in ("group", "name", "start", "end", "words")}
+    )
+    instruments: list[dict[str, str]] = field(default_factory=list)
+    units: dict[str, list[Any]] = field(default_factory=dict)
+    bound: dict[str, list[Any]] = field(default_factory=lambda: {"time": [], "bound": []})
+    runs: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+def backgrounds(tasks: Sequence[tuple[str, Sequence[int]]], workers: int = 1) -> Iterator[Background]:
+    """Of several scenarios, in order: from the cache, or made by other processes while this one goes on.
+
+    Parameters
+    ----------
+    tasks : sequence of (str, sequence of int)
+        Versioned ids of scenarios, with the seeds whose recordings are wanted.
+    workers : int
+    """
+    kept = [_kept(*task) for task in tasks]
+    missing = [task for task, found in zip(tasks, kept, strict=True) if found is None]
+    made = _made(missing, workers)
+    for task, found in zip(tasks, kept, strict=True):
+        yield found if found is not None else _keep(*task, next(made))
+
+
+def _made(tasks: Sequence[tuple[str, Sequence[int]]], workers: int) -> Iterator[Background]:
+    if workers < 2 or len(tasks) < _WORTH_PROCESSES:
+        return (background(*task) for task in tasks)
+    from joblib import Parallel, delayed
+
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"  # a folder of ours where the user stands must not be imported
+    try:
+        parallel = Parallel(n_jobs=min(workers, len(tasks)), return_as="generator")
+        return iter(parallel(delayed(background)(*task) for task in tasks))
+    finally:
+        os.environ.pop("PYTHONSAFEPATH") if before is None else os.environ.update(PYTHONSAFEPATH=before)
+
+
+def background(identity: str, seeds: Iterable[int]) -> Background:
+    """Make the recordings of a scenario again, and its bound."""
+    from simnav.kinds import KINDS
+
+    scenario = catalogued(identity)
+    recordings = {seed: found for seed in seeds if (found := _recording(identity, seed)) is not None}
+    first = next(iter(recordings.values()), None)
+    if first is None:
+        return Background()
+    units = {}
+    for name, stream in first.data.aids.items():
+        shared = {c.error_unit for c in KINDS[stream.kind].components}
+        if len(shared) == 1:
+            unit = shared.pop()
+            units[name] = list(_UNITS.get(unit, (unit, 1.0)))
+    return Background(
+        happening=events(scenario, first),
+        instruments=datasheets(scenario, first),
+        units=units,
+        bound=_bound(identity),
+        runs={
+            str(seed): {"faults": _faults(events(None, recording)), "track": track_of(recording)}
+            for seed, recording in recordings.items()
+        },
+    )
+
+
+def _recording(identity: str, seed: int) -> Recording | None:
+    """The run, made again; None where that is not possible any more."""
+    from simnav.source import record
+
+    scenario = catalogued(identity)
+    try:
+        return None if scenario is None else record(scenario, seed)
+    except (ValueError, OSError):
+        return None
+
+
+def _faults(happening: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    """Faults of a run, for shading."""
+    keep = [k for k, group in enumerate(happening["group"]) if group != "manoeuvres"]
+    return {
+        "start": [short(happening["start"][k]) for k in keep],
+        "end": [short(happening["end"][k]) for k in keep],
+        "name": [happening["group"][k] for k in keep],
+    }
+
+
+def _bound(identity: str) -> dict[str, list[Any]]:
+    from simnav.estimators.bound import bound
+
+    scenario = catalogued(identity)
+    if scenario is None or scenario.recorded:
+        return {"time": [], "bound": []}
+    try:
+        found = bound(scenario, range(BOUND_RUNS), "flags")
+    except (ValueError, OSError, ArithmeticError, np.linalg.LinAlgError):
+        return {"time": [], "bound": []}
+    keep = np.unique(np.linspace(0, len(found.time) - 1, 120).round().astype(int))
+    return {"time": [short(t) for t in found.time[keep]], "bound": [short(v) for v in found.horizontal[keep]]}
+
+
+def track_of(recording: Recording) -> dict[str, Any]:
+    """True track of a run with its ends, fixes, and the parts on which faults act, as columns; and its frame."""
+    faulty: dict[str, list[Any]] = {"east": [], "north": [], "time": [], "name": [], "part": []}
+    spots: dict[str, list[Any]] = {"east": [], "north": [], "name": []}
+    track = true_track(recording)
+    time = np.linspace(0.0, recording.duration, len(track.east))
+    for name, fix in fixes(recording, most=_TRACK_POINTS).items():
+        for east, north in zip(fix.east, fix.north, strict=True):
+            for key, x in (("east", short(east)), ("north", short(north)), ("name", name)):
+                spots[key].append(x)
+    for part, fault in enumerate(recording.faults):
+        inside = np.flatnonzero((time >= fault.start) & (time <= fault.end))
+        for k in inside[:: max(1, len(inside) // 40)]:
+            for key, x in (
+                ("east", short(track.east[k])),
+                ("north", short(track.north[k])),
+                ("time", short(time[k])),
+                ("name", f"{fault.kind.replace('_', ' ')} ({', '.join(fault.instruments)})"),
+                ("part", part),
+            ):
+                faulty[key].append(x)
+    return {"faulty": faulty, "fixes": spots, **truth_of(track.east, track.north, time)}
+
+
+def truth_of(east: Any, north: Any, time: Any) -> dict[str, Any]:
+    """A true track, thinned, with its ends and its frame."""
+    if not len(east):
+        nothing: dict[str, list[Any]] = {"east": [], "north": [], "time": []}
+        return {"truth": nothing, "ends": nothing | {"name": []}, "frame": {"x": [0.0, 1.0], "y": [0.0, 1.0]}}
+    keep = np.unique(np.linspace(0, len(east) - 1, _TRACK_POINTS).round().astype(int))
+    truth = {"east": [short(x) for x in east[keep]], "north": [short(x) for x in north[keep]],
+             "time": [short(x) for x in time[keep]]}  # fmt: skip
+    ends = {name: [values[0], values[-1]] for name, values in truth.items()} | {"name": ["start", "end"]}
+    frame = {"x": [float(np.nanmin(east)), float(np.nanmax(east))],
+             "y": [float(np.nanmin(north)), float(np.nanmax(north))]}  # fmt: skip
+    return {"truth": truth, "ends": ends, "frame": frame}
+
+
+# -- the cache ---------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=1)
+def _code() -> str:
+    """Digest of the code that makes a background, besides the simulator."""
+    from simnav.leaderboard.campaign.sources import digest, followed
+
+    found = followed([__name__, "simnav.estimators.bound"])
+    return digest(*(part for item in found.items() for part in item))
+
+
+def _file(identity: str, seeds: Sequence[int]) -> Path | None:
+    """Where it is kept; None for what is not in the catalogue, or plays a log, whose files may change."""
+    from simnav.leaderboard.campaign.fingerprint import digest, recording_digest, simulator_version
+
+    scenario = catalogued(identity)
+    if scenario is None or scenario.recorded:
+        return None
+    words = scenario.model_dump_json() + str(BOUND_RUNS) + ",".join(map(str, seeds))
+    return cache() / "site" / f"{digest(recording_digest(scenario, simulator_version()), _code(), words)}.json"
+
+
+def _kept(identity: str, seeds: Sequence[int]) -> Background | None:
+    path = _file(identity, seeds)
+    if path is None:
+        return None
+    try:
+        return Background(**json.loads(path.read_bytes()))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def _keep(identity: str, seeds: Sequence[int], made: Background) -> Background:
+    path = _file(identity, seeds)
+    if path is not None:
+        with contextlib.suppress(OSError):  # a cache that cannot be written costs time only
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, json.dumps(asdict(made), separators=(",", ":")))
+            every = sorted(path.parent.glob("*.json"), key=lambda p: p.stat().st_mtime)
+            for old in every[:-_MOST_KEPT]:
+                old.unlink(missing_ok=True)
+    return made

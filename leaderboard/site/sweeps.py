@@ -1,0 +1,123 @@
+"""Sweeps on the site: error against a dial of a scenario, and where each estimator breaks.
+
+``simnav sweep`` leaves what it found as ``sweep-DIAL.json`` in the folder of its results; the page of the scenario
+shows it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.site.charts import Chart, dial, short
+from simnav.leaderboard.sweep.report import Sweep
+
+__all__ = ["SweepFile", "find", "write"]
+
+
+@dataclass(frozen=True)
+class SweepFile:
+    """What one sweep found.
+
+    Attributes
+    ----------
+    path : Path
+        Of the file.
+    content : dict
+        As from `Sweep.to_dict`.
+    """
+
+    path: Path
+    content: dict[str, Any]
+
+    @property
+    def scenario(self) -> str:
+        """Versioned id."""
+        return str(self.content["scenario"])
+
+    @property
+    def rows(self) -> list[str]:
+        """Labels of the estimators."""
+        return list(dict.fromkeys(str(p["estimator"]) for p in self.content["points"]))
+
+    def section(self, number: int) -> dict[str, Any]:
+        """What the page shows of it: a chart where one dial was turned, and the breaking points."""
+        dials, score = self.content["dials"], self.content["score"]
+        titles = [_title(d) for d in dials]
+        breaking = list(self.content["breaking_points"])
+        return {
+            "title": " and ".join(titles),
+            "charts": [self._chart(f"dial-{number}", titles[0], breaking).to_dict()] if len(dials) == 1 else [],
+            "rows": self.rows,
+            "second": titles[1] if len(dials) == 2 else "",
+            "unit": score["unit"],
+            "breaking": [
+                {
+                    "name": b["estimator"],
+                    "at": b["at"],
+                    "passes": "twice its clean error" if b["criterion"] == "twice-clean" else "the limit",
+                    "threshold": short(b["threshold"]),
+                    "value": short(b["value"]["value"]),
+                    "low": short(b["value"]["low"]),
+                    "high": short(b["value"]["high"]),
+                    "beyond": dials[0]["values"][-1],
+                }
+                for b in breaking
+            ],
+        }
+
+    def _chart(self, name: str, across: str, breaking: Sequence[Mapping[str, Any]]) -> Chart:
+        score = self.content["score"]
+        curves: dict[str, dict[str, list[Any]]] = {}
+        for p in self.content["points"]:
+            mine = curves.setdefault(p["estimator"], {key: [] for key in ("value", "middle", "low", "high", "failed")})
+            mine["value"].append(p["values"][0])
+            for key, x in (("middle", "value"), ("low", "low"), ("high", "high")):
+                mine[key].append(short(p["error"][x]))
+            mine["failed"].append(p["failed"])
+        marks = {
+            b["estimator"]: {"at": [short(b["value"]["value"])], "threshold": [short(b["threshold"])]}
+            for b in breaking
+            if b["criterion"] == "twice-clean" and b["value"]["value"] is not None
+        }
+        unit = "" if score["unit"] == "-" else f" [{score['unit']}]"
+        runs = max((p["error"]["runs"] for p in self.content["points"]), default=0)
+        data = {"curves": {"rows": curves}, "marks": {"rows": marks}}
+        return dial(name, across, f"{score['title']}{unit}", data, f"Median of {runs} runs with its 95 % interval.")
+
+
+def _title(values: Mapping[str, Any]) -> str:
+    return f"{values['title']} [{values['unit']}]" if values["unit"] else str(values["title"])
+
+
+def write(sweep: Sweep) -> Path:
+    """Leave what a sweep found in the folder of its results."""
+    name = "-".join(d.name if d.name != "value" else d.key for d in sweep.dials)
+    safe = "".join(c if c.isalnum() or c in "-_" else "-" for c in name)
+    content = json.dumps(plain(sweep.to_dict()), indent=1, allow_nan=False)
+    return write_whole(sweep.summary.folder / f"sweep-{safe}.json", content + "\n")
+
+
+def find(folder: Path) -> list[SweepFile]:
+    """What sweeps left in the folders inside a folder.
+
+    Raises
+    ------
+    RequestError
+        If a file is damaged.
+    """
+    found = []
+    for path in sorted(folder.glob("*/sweep-*.json")):
+        try:
+            one = SweepFile(path, json.loads(path.read_bytes()))
+            one.section(0)
+        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+            raise RequestError(f"{path} is not what 'simnav sweep' writes; run the sweep again ({error!r})") from None
+        found.append(one)
+    return found
