@@ -29,7 +29,7 @@ from simnav.estimators.learning.policy import Policy, record_of_training
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
 FAMILY = "training-gnss-faults"
-STEPS = 100 * 64 * 240  # a hundred updates
+STEPS = 30 * 64 * 240  # thirty updates
 LIBRARIES = ("simnav", "stable-baselines3", "torch", "numpy")
 
 

@@ -121,7 +121,7 @@ def submit(
             raise RequestError(f"{target.parent} is no folder")
         report = campaign(
             estimators=list(source.requests), output=folder, profile=profile, workers=workers, minutes=minutes,
-            confinement=confinement, progress=progress,
+            confinement=confinement, oracle=False, progress=progress,
         )  # fmt: skip
         if report.summary.left:
             raise RequestError(
@@ -247,7 +247,7 @@ def run_standard(
     folder = absolute(results)
     with mistakes(StoreError):
         begin(folder, standard.RESULTS if shipped is None else absolute(shipped))
-    return campaign(output=folder, profile=profile, workers=workers, minutes=minutes, progress=progress)
+    return campaign(output=folder, profile=profile, workers=workers, minutes=minutes, oracle=False, progress=progress)
 
 
 def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:

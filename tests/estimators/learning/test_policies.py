@@ -146,4 +146,7 @@ def test_the_policy_that_comes_along_says_what_it_learned_from():
     assert load(told["scenario"]).training
     assert told["first_seed"] == FIRST_TRAINING_SEED
     estimator.policy.require_unseen(range(1000))
-    assert told["scenario"].rpartition("-v")[0] in type(estimator).__doc__
+    words = " ".join(type(estimator).__doc__.split())
+    assert f"on {told['voyages']} training voyages of ``{told['scenario'].rpartition('-v')[0]}``" in words
+    assert f"{told['steps']:,} steps".replace(",", " ") in words
+    assert "simnav" in told["versions"]
