@@ -14,7 +14,7 @@ from simnav.leaderboard.results.result import Series, decoded_series
 
 __all__ = ["StoredSeries", "read_ahead"]
 
-_KEPT = 24  # row groups in memory, of a few hundred results each
+_KEPT = 8  # row groups in memory, of a few hundred results each
 
 
 class StoredSeries(Mapping[str, Series]):
