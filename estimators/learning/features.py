@@ -34,6 +34,7 @@ from simnav.types import Array, Estimate, InitialState
 
 __all__ = [
     "CONTEXT",
+    "GUIDANCE",
     "LARGEST_SCALE",
     "LIMIT",
     "MEMORY",
@@ -61,6 +62,12 @@ WHITE, SPEED, TURN_RATE = 3.0, 10.0, 0.05
 LARGEST_SCALE = 30.0
 
 PER_INSTRUMENT, PER_MEASUREMENT, CONTEXT = 8, 4, 12
+
+#: Names of what an agent of Guidance sees instead (`simnav.estimators.learning.guidance` explains them).
+GUIDANCE = (
+    "aside", "sin_course", "cos_course", "turn_10_s", "turn_30_s", "turn_60_s", "speed", "planned_speed", "turn_rate",
+    "sigma_position", "sigma_heading", "age", "left", "half_width", "start_sigma_position", "start_sigma_heading",
+)  # fmt: skip
 
 
 def observation_size(instruments: int, most: int) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import atan2, cos, exp, hypot, inf, log1p, log10, pi, radians, sin
 
 from simnav.compiled import kernel
-from simnav.estimators.learning.features import LIMIT, SPEED, TURN_RATE
+from simnav.estimators.learning.features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 from simnav.geometry.rotation import wrap_scalar
 
 __all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "judge", "look", "steer"]
@@ -19,7 +19,7 @@ ASIDE, LARGEST_TURN = 20.0, radians(60.0)
 #: Weights of the reward.
 FUEL, AGROUND, BERTH = 0.2, 100.0, 100.0
 #: Numbers of an observation.
-SIZE = 16
+SIZE = len(GUIDANCE)
 #: Points of the track that are looked at before and after the last one.
 BEHIND, AHEAD = 20, 120
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from simnav.environment.seeds import FIRST_TRAINING_SEED, require_disjoint, training_seed
-from simnav.estimators.learning.features import Numbers, observation_size
+from simnav.estimators.learning.features import GUIDANCE, Numbers, observation_size
 from simnav.estimators.learning.filters import Layout
 from simnav.estimators.learning.tasks import CORRECTIONS, TASKS
 from simnav.scenario import Scenario, load
@@ -26,6 +26,13 @@ __all__ = ["FORMAT", "Policy", "PolicyError", "record_of_training"]
 
 #: Of the files; raised when they change.
 FORMAT = 2
+#: Numbers of an action, for k instruments of at most K measurements a step.
+_ACTIONS: dict[str, Callable[[int, int], int]] = {
+    "Tuning": lambda k, most: k + 1,
+    "Detection": lambda k, most: k * most,
+    "Correction": lambda k, most: len(CORRECTIONS),
+    "Guidance": lambda k, most: 2,
+}
 
 
 def record_of_training(scenario: Scenario | str, voyages: int, **more: Any) -> dict[str, Any]:
@@ -62,9 +69,9 @@ class Policy:
     layers : sequence of (weight, bias)
         ``(m, n)`` and ``(m,)`` arrays; the first takes the observation, the last gives the action.
     task : str
-        One of `simnav.estimators.learning.tasks.TASKS`.
+        One of `simnav.estimators.learning.tasks.TASKS`, or ``"Guidance"``.
     kinds : sequence of str
-        Kinds of the instruments that the agent is asked about, in order.
+        Kinds of the instruments that the agent is asked about, in order; empty for Guidance.
     most : int
         Measurements a step that have room in the observation.
     instruments : str
@@ -96,9 +103,9 @@ class Policy:
         version: int | None = None,
         source: str = "the policy",
     ):
-        if task not in TASKS:
-            raise PolicyError(f"{source}: it is for the task {task!r}; there are: {', '.join(TASKS)}")
-        now = TASKS[task].version
+        if task not in _ACTIONS:
+            raise PolicyError(f"{source}: it is for the task {task!r}; there are: {', '.join(_ACTIONS)}")
+        now = TASKS[task].version if task in TASKS else 1
         self.version = now if version is None else version
         if self.version != now:
             raise PolicyError(
@@ -121,17 +128,13 @@ class Policy:
                     f"take {size} numbers"
                 )
             size = w.shape[0]
-        wanted = observation_size(len(self.kinds), self.most)
-        actions = {
-            "Tuning": len(self.kinds) + 1,
-            "Correction": len(CORRECTIONS),
-            "Detection": len(self.kinds) * self.most,
-        }
+        wanted = len(GUIDANCE) if task == "Guidance" else observation_size(len(self.kinds), self.most)
+        actions = _ACTIONS[task](len(self.kinds), self.most)
         shape = self.layers[0][0].shape[1], size
-        if shape != (wanted, actions[task]):
+        if shape != (wanted, actions):
+            told = f"{task} with {', '.join(self.kinds)}" if self.kinds else task
             raise PolicyError(
-                f"{source}: it takes {shape[0]} numbers and gives {shape[1]}; {task} with {', '.join(self.kinds)} has "
-                f"{wanted} and {actions[task]}"
+                f"{source}: it takes {shape[0]} numbers and gives {shape[1]}; {told} has {wanted} and {actions}"
             )
         arrays = [self.mean, self.deviation, *(a for layer in self.layers for a in layer)]
         if self.mean.shape != self.deviation.shape or self.mean.shape != (self.layers[0][0].shape[1],):

@@ -11,7 +11,7 @@ from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.estimator.needs import Needs
 from simnav.estimators.learning.features import Context
 from simnav.estimators.learning.filters import Filters, Layout
-from simnav.estimators.learning.policy import Policy
+from simnav.estimators.learning.policy import Policy, PolicyError
 from simnav.estimators.learning.reference import ReferenceFilter
 from simnav.estimators.learning.tasks import TASKS
 from simnav.estimators.models.suitable import Suitable
@@ -38,6 +38,8 @@ class PolicyEstimator(Estimator):
 
     def __init__(self, file: str):
         self.policy = Policy.load(Path(file).expanduser())
+        if self.policy.task not in TASKS:
+            raise PolicyError(f"{file}: a policy of {self.policy.task} steers a vessel and estimates nothing")
 
     @property
     def needs(self) -> Needs:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from simnav.environment.seeds import FIRST_TRAINING_SEED
-from simnav.estimators.learning.policy import Policy
+from simnav.estimators.learning.policy import Policy, PolicyError
 from simnav.estimators.learning.policy_estimator import PolicyEstimator
 from simnav.scenario import load
 from simnav.source import record
@@ -51,15 +51,38 @@ def test_the_cross_entropy_method_learns(example, tmp_path):
     assert len([line for line in (EXAMPLES / "cross_entropy.py").read_text().splitlines() if line.strip()]) < 100
 
 
+@pytest.mark.parametrize(
+    ("task", "length", "rise"), [("Detection", 160, 10.0), ("Correction", 160, -np.inf), ("Guidance", 80, 50.0)]
+)  # of the return on voyages that are not seen; a good correction takes longer to find
+def test_the_cross_entropy_method_on_other_tasks(example, tmp_path, task, length, rise):
+    curve, agent = example("learning_curve"), example("cross_entropy")
+    options = {"generations": 5, "population": 16, "repeats": 1, "voyages": 5, "length": length}
+    steps, found = curve.curves(agent, [1], [1, 2, 3], tmp_path, task, **options)
+    assert steps.tolist() == [0, 5 * 16 * length]
+    assert found[0, 1] > found[0, 0] + rise
+    assert found[0, 0] != found[0, 1]
+    policy = Policy.load(tmp_path / f"cross_entropy-{task}-1.npz")
+    assert policy.task == task
+    assert policy.trained_on["first_seed"] == FIRST_TRAINING_SEED
+    with pytest.raises(ValueError, match="for training, not for scoring"):
+        curve.curves(agent, [2], [FIRST_TRAINING_SEED + 9], tmp_path, task, **(options | {"length": 5}))
+    if task == "Guidance":
+        with pytest.raises(PolicyError, match=r"a policy of Guidance steers a vessel and estimates nothing"):
+            PolicyEstimator(str(tmp_path / "cross_entropy-Guidance-1.npz"))
+    else:
+        runs_as_an_estimator(policy, tmp_path / "policy.npz")
+
+
 def test_learning_curves_over_training_seeds(example, tmp_path):
     curve, agent = example("learning_curve"), example("cross_entropy")
     options = {"generations": 5, "population": 8, "repeats": 1, "voyages": 1, "length": 20}
     steps, found = curve.curves(agent, range(2), [1, 2], tmp_path / "kept", **options)
-    assert steps.tolist() == [5 * 8 * 20]
-    assert found.shape == (2, 1)
+    assert steps.tolist() == [0, 5 * 8 * 20]
+    assert found.shape == (2, 2)
+    assert (found[:, 0] == 0.0).all()
     agent.train = None  # what is there is not trained again
     np.testing.assert_array_equal(curve.curves(agent, range(2), [1, 2], tmp_path / "kept")[1], found)
-    assert Policy.load(tmp_path / "kept" / "cross_entropy-1.npz").trained_on["seed"] == 1
+    assert Policy.load(tmp_path / "kept" / "cross_entropy-Tuning-1.npz").trained_on["seed"] == 1
     two = np.array([1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 3.0]])
     curve.draw({"one": two, "other": two}, "two seeds", tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 1000

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import pickle
+from importlib.util import find_spec
 
 import gymnasium
+import matplotlib.axis
+import matplotlib.figure
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
@@ -35,13 +38,20 @@ def test_every_scenario_has_every_task():
     assert not any(name.startswith("simnav/CarKitti-Guidance") for name in IDS)
 
 
+@pytest.fixture
+def small_pictures(monkeypatch):
+    """A seventh as wide, without ticks: they take most of the time of a frame, and do not depend on the id."""
+    monkeypatch.setattr(matplotlib.axis.Axis, "draw", lambda self, renderer: None)
+    monkeypatch.setattr(matplotlib.figure.Figure, "set_dpi", lambda self, dpi: setattr(self, "dpi", dpi / 7.2))
+
+
 @pytest.mark.filterwarnings("ignore::simnav.log.LogWarning")
 @pytest.mark.filterwarnings("ignore:.*not within:UserWarning")
 @pytest.mark.parametrize("name", IDS)
-def test_every_id(name):
-    """The checker, a spec that makes the same environment again, statistics, the vector form."""
+def test_every_id(name, tmp_path, small_pictures):
+    """The checker, a spec that makes the same environment again, statistics, a film, the vector form."""
     try:
-        env = made(name)
+        env = made(name, render_mode="rgb_array")
         check_env(env.unwrapped, skip_render_check=True, skip_close_check=True)  # these: below, once a task
     except LogError as error:
         pytest.skip(str(error))
@@ -49,6 +59,8 @@ def test_every_id(name):
     assert pickle.loads(pickle.dumps(EnvSpec.from_json(env.spec.to_json()))).kwargs == env.spec.kwargs
     scenario = env.unwrapped.options.scenario  # to read it again takes as long as all the rest
     env = RecordEpisodeStatistics(env)
+    if films := find_spec("moviepy"):  # Gymnasium makes films with it
+        env = RecordVideo(env, str(tmp_path), video_length=1, disable_logger=True)
     first, _ = env.reset(seed=1)
     envs = gymnasium.make_vec(name, 1, vectorization_mode="vector_entry_point", steps=3, scenario=scenario)
     np.testing.assert_array_equal(envs.reset(seed=1)[0][0], first)
@@ -59,6 +71,8 @@ def test_every_id(name):
         assert observation in env.observation_space
         rewards.append(reward)
         over = terminated or truncated
+    env.close()
+    assert not films or (tmp_path / "rl-video-episode-0.mp4").stat().st_size > 1000
     assert info["episode"]["r"] == pytest.approx(sum(rewards))
     assert np.isfinite(rewards).all()
     assert len(rewards) == 3
