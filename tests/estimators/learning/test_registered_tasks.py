@@ -8,6 +8,7 @@ from importlib.util import find_spec
 import gymnasium
 import matplotlib.axis
 import matplotlib.figure
+import matplotlib.legend
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
@@ -40,8 +41,9 @@ def test_every_scenario_has_every_task():
 
 @pytest.fixture
 def small_pictures(monkeypatch):
-    """A seventh as wide, without ticks: they take most of the time of a frame, and do not depend on the id."""
-    monkeypatch.setattr(matplotlib.axis.Axis, "draw", lambda self, renderer: None)
+    """A seventh as wide, without ticks and legend: they take most of the time, and do not depend on the id."""
+    for artist in (matplotlib.axis.Axis, matplotlib.legend.Legend):
+        monkeypatch.setattr(artist, "draw", lambda self, renderer: None)
     monkeypatch.setattr(matplotlib.figure.Figure, "set_dpi", lambda self, dpi: setattr(self, "dpi", dpi / 7.2))
 
 
@@ -60,7 +62,7 @@ def test_every_id(name, tmp_path, small_pictures):
     scenario = env.unwrapped.options.scenario  # to read it again takes as long as all the rest
     env = RecordEpisodeStatistics(env)
     if films := find_spec("moviepy"):  # Gymnasium makes films with it
-        env = RecordVideo(env, str(tmp_path), video_length=1, disable_logger=True)
+        env = RecordVideo(env, str(tmp_path / "films"), video_length=1, gc_trigger=None, disable_logger=True)
     first, _ = env.reset(seed=1)
     envs = gymnasium.make_vec(name, 1, vectorization_mode="vector_entry_point", steps=3, scenario=scenario)
     np.testing.assert_array_equal(envs.reset(seed=1)[0][0], first)
@@ -72,7 +74,7 @@ def test_every_id(name, tmp_path, small_pictures):
         rewards.append(reward)
         over = terminated or truncated
     env.close()
-    assert not films or (tmp_path / "rl-video-episode-0.mp4").stat().st_size > 1000
+    assert not films or (tmp_path / "films" / "rl-video-episode-0.mp4").stat().st_size > 1000
     assert info["episode"]["r"] == pytest.approx(sum(rewards))
     assert np.isfinite(rewards).all()
     assert len(rewards) == 3
