@@ -7,7 +7,6 @@ from importlib.util import find_spec
 
 import gymnasium
 import matplotlib.axis
-import matplotlib.figure
 import matplotlib.legend
 import numpy as np
 import pytest
@@ -17,6 +16,8 @@ from gymnasium.wrappers import FrameStackObservation, RecordEpisodeStatistics, R
 
 import simnav  # noqa: F401 (it registers)
 from simnav.catalogue import headers
+from simnav.environment import charted
+from simnav.environment.rendering import Chart
 from simnav.estimators.learning.environment import FilterTaskEnv
 from simnav.log import LogError
 
@@ -39,12 +40,21 @@ def test_every_scenario_has_every_task():
     assert not any(name.startswith("simnav/CarKitti-Guidance") for name in IDS)
 
 
+@pytest.fixture(scope="module")
+def chart():
+    """A seventh as wide as usual."""
+    chart = Chart("every id", 60.0)
+    chart._figure.set_dpi(14)
+    return chart
+
+
 @pytest.fixture
-def small_pictures(monkeypatch):
-    """A seventh as wide, without ticks and legend: they take most of the time, and do not depend on the id."""
+def small_pictures(monkeypatch, chart):
+    """One chart without ticks and legend for all: most of the time goes into what does not depend on the id."""
+    monkeypatch.setattr(charted, "Chart", lambda title, duration, human: chart)
+    monkeypatch.setattr(chart, "close", lambda: None)
     for artist in (matplotlib.axis.Axis, matplotlib.legend.Legend):
         monkeypatch.setattr(artist, "draw", lambda self, renderer: None)
-    monkeypatch.setattr(matplotlib.figure.Figure, "set_dpi", lambda self, dpi: setattr(self, "dpi", dpi / 7.2))
 
 
 @pytest.mark.filterwarnings("ignore::simnav.log.LogWarning")
