@@ -167,6 +167,7 @@ def test_a_command_and_its_call_say_the_same(here: Path, name: str) -> None:
         assert texts[0] == texts[1]
     assert {k: said[k] for k in called} == called
     more = {"file", "figure", "csv", "scenario", "duration", "imu_samples", "failed", "confinement"}
+    more |= {"correlations"}
     assert set(said) - set(called) <= more
 
 

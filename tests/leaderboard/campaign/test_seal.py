@@ -78,7 +78,7 @@ def test_a_changed_score_is_found(tmp_path: Path, key: Path) -> None:
     scenario = load("harbour-multipath").model_copy(update={"duration": 20.0})
     run_campaign([scenario], [EstimatorRequest("gnss-only")], [3], tmp_path / "out", workers=1, seal=read_seal(key))
     (result,) = store.load(tmp_path / "out")
-    store.rescore(tmp_path / "out", {result.key: result.scores | {"horizontal_rmse": 0.1}}, result.scoring)
+    store.rescore(tmp_path / "out", {result.key: {**result.scores, "horizontal_rmse": 0.1}}, result.scoring)
     report = verify_results(tmp_path / "out", read_seal(key), scenarios=[scenario])
     assert (report.passed, len(report.different)) == (False, 1)
     assert simnav.verify(tmp_path / "out", key=key).to_dict()["not_repeatable"]  # the catalogue's is longer
