@@ -16,6 +16,7 @@ from simnav.leaderboard.cli.options import (
     FirstSeed,
     Json,
     MemoryLimit,
+    Minutes,
     Scenarios,
     Set,
     TimeLimit,
@@ -85,9 +86,7 @@ def command(
     oracle: Annotated[
         bool, typer.Option(help="Run the oracles on simulated scenarios, too: the reference of a board, not ranked.")
     ] = True,
-    minutes: Annotated[
-        float | None, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
-    ] = None,
+    minutes: Minutes = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:

@@ -22,6 +22,7 @@ __all__ = [
     "FirstSeed",
     "Json",
     "MemoryLimit",
+    "Minutes",
     "ScenarioName",
     "Scenarios",
     "Seed",
@@ -47,6 +48,9 @@ Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", he
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the run.")]
 FirstSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the first run; the others count up.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes.")]
+Minutes = Annotated[
+    float | None, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
+]
 TimeLimit = Annotated[
     float | None,
     typer.Option(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from simnav.leaderboard.cli.console import FAILED, session
-from simnav.leaderboard.cli.options import Debug, Json, Workers, campaign_progress
+from simnav.leaderboard.cli.options import Debug, Json, Minutes, Workers, campaign_progress
 
 __all__ = ["register"]
 
@@ -26,9 +26,7 @@ def register(app: typer.Typer) -> None:
 
 @_app.command()
 def run(
-    minutes: Annotated[
-        float, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
-    ] = 110.0,
+    minutes: Minutes = 110.0,
     results: _Results = _WORKING,
     profile: _Profile = "standard",
     shipped: _Shipped = None,

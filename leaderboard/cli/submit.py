@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json, Set, Workers, campaign_progress, parameters
+from simnav.leaderboard.cli.options import Debug, Json, Minutes, Set, Workers, campaign_progress, parameters
 
 __all__ = ["command"]
 
@@ -25,9 +25,7 @@ def command(
     ] = None,
     set_: Set = None,
     workers: Workers = 2,
-    minutes: Annotated[
-        float | None, typer.Option(min=0.0, help="Start no run after so many minutes. The same command continues.")
-    ] = None,
+    minutes: Minutes = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
