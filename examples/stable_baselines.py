@@ -20,6 +20,7 @@ from importlib.metadata import version
 
 import numpy as np
 import torch
+from gymnasium.spaces import Box
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
@@ -37,14 +38,16 @@ class BankOfFilters(VecEnv):
     """The vector form as Stable-Baselines3 wants it: a voyage that is over begins anew within the step.
 
     Groups of ``same`` filters sail the same voyages. The reward is less the mean of the group, which does not depend on
-    what a filter does itself, but for its own share.
+    what a filter does itself, but for its own share. The agent sets the noise of the receivers, and the process noise
+    stays as it is.
     """
 
     def __init__(self, envs: FilterTaskVectorEnv, same: int):
         assert envs.autoreset_mode.name == "SAME_STEP"
         assert envs.num_envs % same == 0
         self.envs, self.same = envs, same
-        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+        asked = len(envs.options.layout.kinds)
+        super().__init__(envs.num_envs, envs.single_observation_space, Box(-1.0, 1.0, (asked,), np.float32))
 
     def reset(self):
         groups = np.random.default_rng(self._seeds[0]).integers(2**31, size=self.num_envs // self.same)
@@ -52,7 +55,7 @@ class BankOfFilters(VecEnv):
         return self.envs.reset(seed=np.repeat(groups, self.same).tolist())[0]
 
     def step_async(self, actions):
-        self._actions = actions
+        self._actions = np.pad(actions, ((0, 0), (0, 1)))
 
     def step_wait(self):
         observation, reward, _, over, info = self.envs.step(self._actions)
@@ -120,6 +123,8 @@ def policy_of(model: PPO, envs: FilterTaskVectorEnv, trained_on: dict) -> Policy
     """The mean of a policy of PPO, as plain arrays, with the normalisation of its observations."""
     net = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
     layers = [(m.weight.detach().numpy(), m.bias.detach().numpy()) for m in net if hasattr(m, "weight")]
+    weight, bias = layers[-1]
+    layers[-1] = np.pad(weight, ((0, 1), (0, 0))), np.pad(bias, (0, 1))  # 0 for the process noise
     seen, layout = model.get_vec_normalize_env(), envs.options.layout
     return Policy(
         layers, task=envs.options.task.name, kinds=layout.kinds, most=layout.most, instruments="fixes",
