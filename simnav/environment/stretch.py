@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import Integers, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS
 from simnav.types import KINDS, Array
 
@@ -60,7 +60,10 @@ class Stretch:
 
 
 @kernel("i8(i8, i8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], i8, f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])")
-def _place(count, who, when, value, place, most, row, time, valid, values):  # type: ignore[no-untyped-def]
+def _place(
+    count: int, who: Integers, when: Array, value: Array, place: Integers, most: Integers, row: int, time: Array,
+    valid: NDArray[np.int8], values: Array,
+) -> int:  # fmt: skip
     """Put the measurements of one step into a row of padded arrays; -1, or the instrument that has too many.
 
     Parameters
@@ -73,7 +76,7 @@ def _place(count, who, when, value, place, most, row, time, valid, values):  # t
     time, valid, values : (S, A, K), (S, A, K), (S, A, K, 3) arrays
     """
     for j in range(count):
-        i = who[j]
+        i: int = who[j]
         a = place[i]
         k = 0
         while k < most[i] and valid[row, a, k]:
@@ -193,7 +196,7 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
 
 
 @kernel("void(f8[:, :], f8[:, :], f8[:, ::1])")
-def _rows(position, attitude, out):  # type: ignore[no-untyped-def]
+def _rows(position: Array, attitude: Array, out: Array) -> None:
     for i in range(out.shape[0]):
         s, height = np.sin(position[i, 0]), position[i, 2]
         if height != height:  # a log may have no reference of it
