@@ -24,7 +24,7 @@ from simnav.scenario import Scenario
 from simnav.scoring import errors
 from simnav.scoring.consistency import nees
 from simnav.scoring.navigation_error import smoothed_errors
-from simnav.simulator import simulate
+from simnav.simulation.simulator import simulate
 from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import Array

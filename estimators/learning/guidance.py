@@ -51,8 +51,8 @@ from simnav.estimators.learning.guidance_kernels import ASIDE, LARGEST_TURN, SIZ
 from simnav.estimators.learning.navigators import Navigators
 from simnav.estimators.learning.routes import Routes
 from simnav.scenario import Scenario, load
-from simnav.simulator import Simulator
-from simnav.steps import SteppedRuns
+from simnav.simulation.simulator import Simulator
+from simnav.simulation.steps import SteppedRuns
 from simnav.types import KINDS, Array
 from simnav.world import Vessel, motion
 

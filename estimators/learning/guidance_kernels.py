@@ -181,7 +181,7 @@ def look(
     begun : (b,) int array
         0 at the start of a voyage, when there is no step to look back at.
     count, who, when
-        As of `simnav.steps.SteppedRuns`.
+        As of `simnav.simulation.steps.SteppedRuns`.
     fix : (b, i) bool array
         Which instruments give a position.
     half_width : float

@@ -26,7 +26,7 @@ from simnav.estimators.models.propagation import (
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.admission import LATE
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.steps import SteppedRuns
+from simnav.simulation.steps import SteppedRuns
 from simnav.types import Array, Estimate, InitialState, Instruments
 
 __all__ = ["Navigators", "navigate"]
@@ -157,7 +157,7 @@ def navigate(
     until : (b,) array
         End of each step [s].
     count, who, when, value, samples, imu_time, imu_interval, rate, force
-        As of `simnav.steps.SteppedRuns`.
+        As of `simnav.simulation.steps.SteppedRuns`.
     size : (b,) int array
         States of each.
     codes, arms, noises, limits : (b, i, ...) arrays

@@ -153,14 +153,14 @@ def prepare(
     faulty, edges, ends, contexts, errors, oracles = [], [0], [], [], [], []
     while voyage.advance():
         count = voyage.filter.count
-        parts.append(Linear(*(array[:count].copy() for array in voyage.filter.linear)))
+        parts.append(Linear._make(array[:count].copy() for array in voyage.filter.linear))
         faulty.append(voyage.faulty)
         edges.append(edges[-1] + count)
         ends.append(voyage.estimate.time)
         contexts.append(voyage.context)
         errors.append(voyage.error)
         oracles.append(voyage.oracle)
-    linear = Linear(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    linear = Linear._make(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     assert linear.transition.shape[1] == n
     return Prepared(
         linear, np.array(edges), np.array(ends), np.stack(contexts), np.stack(errors), np.stack(oracles),

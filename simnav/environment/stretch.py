@@ -16,7 +16,7 @@ from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
     from simnav.recording import AidStream, Block
-    from simnav.steps import SteppedRuns
+    from simnav.simulation.steps import SteppedRuns
 
 __all__ = ["LiveStretch", "Stretch", "horizontal", "pack", "rows_of"]
 
@@ -69,7 +69,7 @@ def _place(
     Parameters
     ----------
     count, who, when, value
-        As of `simnav.steps.SteppedRuns`, of one run.
+        As of `simnav.simulation.steps.SteppedRuns`, of one run.
     place, most : (i,) int arrays
         Of each of its instruments: its number in the padded arrays, and room for so many a step.
     row : int

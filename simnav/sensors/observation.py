@@ -1,7 +1,7 @@
 """What the instruments that come with simnav read before bias and noise, as one kernel.
 
-The block form (`Instrument.sense`) and the form that goes step by step (`simnav.steps`) call the same code, so that
-they agree bit for bit.
+The block form (`Instrument.sense`) and the form that goes step by step (`simnav.simulation.steps`) call the same code,
+so that they agree bit for bit.
 """
 
 from __future__ import annotations

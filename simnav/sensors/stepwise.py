@@ -1,4 +1,4 @@
-"""One step of the instruments and faults of many runs: the kernels of `simnav.steps`."""
+"""One step of the instruments and faults of many runs: the kernels of `simnav.simulation.steps`."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def sense(
     held : (b, i, k, 8) array
         State of layers that repeat values.
     count, who, when, value, faults : (b, ...) arrays
-        What is delivered: as of `simnav.steps.SteppedRuns`; overwritten.
+        What is delivered: as of `simnav.simulation.steps.SteppedRuns`; overwritten.
     truth : (b, 9) array
         Likewise.
     """

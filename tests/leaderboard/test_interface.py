@@ -72,7 +72,7 @@ def command(*words: str) -> Any:
 
 
 def call_list() -> Any:
-    from simnav.catalogue import headers
+    from simnav.scenario.catalogue import headers
 
     return {"estimators": simnav.names(), "scenarios": sorted(h.id for h in headers())}
 

@@ -441,7 +441,8 @@ class FaultLayer:
         When it acts.
     """
 
-    #: One of `ADDS`, ..., for runs that go step by step (`simnav.steps`); None: `apply` alone knows what it does.
+    #: One of `ADDS`, ..., for runs that go step by step (`simnav.simulation.steps`); None: `apply` alone knows what it
+    #: does.
     operation: ClassVar[int | None] = None
 
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
