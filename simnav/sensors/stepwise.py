@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.kinds import add_error_scalar
-from simnav.sensors.faults.fault import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
+from simnav.sensors.faults.layer import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
 from simnav.sensors.imu import triad_errors
 from simnav.sensors.observation import noise_scalar, observe_one
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import packets
-from simnav.sensors.faults.fault import DISTURBS_IMU, STEPS_NOISE, FaultLayer
+from simnav.sensors.faults.layer import DISTURBS_IMU, STEPS_NOISE, FaultLayer
 from simnav.sensors.observation import CompiledInstrument
 from simnav.sensors.stepwise import HELD, UNTOUCHED, sense, sense_imu
 from simnav.simulation.simulator import TIME_TOLERANCE, Simulator
