@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.plots import GREY, Array, Style, figure, legend_below, plain_log_ticks, styled
+from simnav.leaderboard.figures.plots import Array
+from simnav.leaderboard.figures.style import GREY, Style, figure, legend_below, plain_log_ticks, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.figures.plots import Dot, Style, dots
+from simnav.leaderboard.figures.plots import Dot, dots
+from simnav.leaderboard.figures.style import Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
