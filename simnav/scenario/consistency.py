@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from simnav.catalogue import NAME
 from simnav.log.spec import RecordedSpec
+from simnav.scenario.catalogue import NAME
 from simnav.sensors import ImuSpec
 from simnav.spec import SpecError, closest
 from simnav.types import KINDS

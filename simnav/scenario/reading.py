@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from simnav.catalogue import Header, headers
 from simnav.plugins import PluginError, load_plugin
+from simnav.scenario.catalogue import Header, headers
 from simnav.scenario.scenario import Scenario
 from simnav.spec import SpecError, closest
 

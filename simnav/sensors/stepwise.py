@@ -118,7 +118,7 @@ def sense(
     layers : (b,) int array
         How many layers of faults.
     operations : (b, k, 3) int array
-        What each does (`simnav.sensors.faults.fault.ADDS`, ...), its first bit, and whether each interval has its own.
+        What each does (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and whether each interval has its own.
     sizes : (b, i, k, 4) array
         Of layers that step the noise: the new sigma of an instrument, or the factor on its sigma where that is not 0.
     held : (b, i, k, 8) array
