@@ -34,6 +34,7 @@ def set_scales(actions: Array, largest: float, setting: Array, scale: Array, pro
     setting : (b, p) array
         Overwritten with the logarithms of the instruments.
     scale : (b, p, k) array
+        Overwritten with the factors on the sigmas of the k components of each instrument.
     process_scale : (b,) array
         Overwritten.
     """

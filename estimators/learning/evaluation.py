@@ -62,7 +62,9 @@ def worth(envs: FilterTaskVectorEnv, seeds: Sequence[int], agent: Agent) -> Wort
     envs : FilterTaskVectorEnv
         Of `scoring_envs`.
     seeds : sequence of int
+        Seed of each voyage, one for each environment.
     agent : callable
+        From the observations to the actions of all environments.
     """
     observation, _ = envs.reset(seed=list(seeds))
     n = envs.num_envs

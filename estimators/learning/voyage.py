@@ -42,7 +42,9 @@ class Voyage:
     Parameters
     ----------
     scenario : Scenario
+        What is sailed.
     seed : int
+        Seed of the run.
     names : list of str
         The instruments, as the events are to number them (`ReferenceFilter`).
     steps : int, optional
@@ -53,6 +55,7 @@ class Voyage:
     Attributes
     ----------
     recording : Recording
+        The whole run.
     filter : ReferenceFilter
         As of the end of the step; ``filter.linear`` are the events in it.
     step : int

@@ -93,6 +93,7 @@ def add_motion_noise(
     row : (M,) int array
         Of each aid among the folds; -1 for those that are not folded.
     components : (M,) int array
+        Number of components of each measurement.
     jacobian : (M, 3, n) array
         H, with respect to the state at the fold.
     motion_noise : (K, n, n) array

@@ -50,7 +50,7 @@ class Band:
     label : str
         Estimator.
     time : (n,) array
-        [s].
+        Times of the columns of ``values`` [s].
     values : (runs, n) array
         NaN where a run has none.
     """

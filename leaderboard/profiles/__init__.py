@@ -69,6 +69,7 @@ class Profile:
     Attributes
     ----------
     name, title : str
+        Name of its file, and one line for tables.
     parts : tuple of Part
         In the order in which they are run.
     """

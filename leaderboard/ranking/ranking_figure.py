@@ -22,6 +22,7 @@ def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | 
     Parameters
     ----------
     track : TrackRanking
+        The ranking that is drawn.
     style : Style, optional
         Colours of the rows.
     most : int, optional

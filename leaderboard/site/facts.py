@@ -56,6 +56,7 @@ class EstimatorFacts:
     code : str
         Its declaration.
     parameters : tuple of (name, default, annotation)
+        Parameters of the constructor, as text.
     """
 
     family: str = "Other"

@@ -73,7 +73,10 @@ def _place(
     place, most : (i,) int arrays
         Of each of its instruments: its number in the padded arrays, and room for so many a step.
     row : int
+        Number of the step.
     time, valid, values : (S, A, K), (S, A, K), (S, A, K, 3) arrays
+        Of S steps, A instruments and at most K measurements: times [s], which are there, and values;
+        overwritten.
     """
     for j in range(count):
         i: int = who[j]

@@ -36,6 +36,7 @@ class SteppedRuns:
     Parameters
     ----------
     n : int
+        Number of runs.
 
     Attributes
     ----------
