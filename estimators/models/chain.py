@@ -481,10 +481,10 @@ class Chain(ABC):
         """
 
     def turned(self, covariance: Array, shift: Array) -> Array:
-        """A covariance about a state, about another that is away by a (n,) shift; a hook, as `less`."""
+        """A covariance about a state, about another that is away by a (n,) shift; a hook, as `relative_shift`."""
         return covariance
 
-    def less(self, shift: Array, step: Array) -> Array:
+    def relative_shift(self, shift: Array, step: Array) -> Array:
         """A (n,) shift as seen from where a step leads; a hook for those whose errors do not simply subtract."""
         return shift - step
 
