@@ -1,4 +1,4 @@
-"""What an agent is worth on voyages that it has not seen, beside the plain filter, chance and the oracle."""
+"""What an agent is worth on voyages that it has not seen, beside the plain filter and the oracle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from simnav.estimators.learning.vector import FilterTaskVectorEnv
 from simnav.scenario import Scenario
 from simnav.types import Array
 
-__all__ = ["Agent", "Worth", "by_chance", "interval", "plain", "scoring_envs", "worth"]
+__all__ = ["Agent", "Worth", "interval", "plain", "scoring_envs", "worth"]
 
 #: From (b, o) observations to (b, ...) actions.
 Agent = Callable[[Numbers], Numbers]
@@ -35,12 +35,6 @@ def plain(envs: FilterTaskVectorEnv) -> Agent:
     """The agent that leaves the filter as it is."""
     shape, dtype = envs.action_space.shape, envs.single_action_space.dtype
     return lambda observation: np.zeros(shape or (), dtype)
-
-
-def by_chance(envs: FilterTaskVectorEnv, seed: int = 0) -> Agent:
-    """The agent that draws its actions."""
-    envs.action_space.seed(seed)
-    return lambda observation: np.asarray(envs.action_space.sample())
 
 
 def scoring_envs(

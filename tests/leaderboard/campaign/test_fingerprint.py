@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from simnav import estimator
 from simnav.estimator import find
 from simnav.leaderboard.campaign import sources
 from simnav.leaderboard.campaign.fingerprint import (
@@ -44,12 +43,8 @@ def write(path: Path, name: str = "Mine", base: str = "Estimator", imports: str 
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(tmp_path: Path, clean_registry: None) -> Iterator[Path]:
     """A place for estimator files; what they import from it is forgotten afterwards."""
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    estimator.names()  # the installed ones are known before
-    monkeypatch.setattr(estimator.registry, "_classes", dict(estimator.registry._classes))
-    monkeypatch.setattr(estimator.registry, "_aliases", dict(estimator.registry._aliases))
     before = set(sys.modules)
     yield tmp_path
     for name in set(sys.modules) - before:
