@@ -10,7 +10,7 @@ arms, sea and latitude. ::
     python -m tests.agreement.voyages table RESULTS.jsonl
 
 With ``--family`` voyage k is run k of a family of scenarios, such as ``scenarios/families/clean-voyages.toml``. A
-second call of ``run`` goes on where the first one was stopped. The table gives, for each estimator, the horizontal
+second call of ``run`` goes on where the first one was stopped, and adds estimators that are missing. The table gives, for each estimator, the horizontal
 RMSE over the best of the estimators in `BEST_OF` on the same voyage: median, 90th percentile and maximum; how often
 the mean horizontal NEES by degree of freedom is above 5, and in how many of these the estimator never reports that it
 is inconsistent; and the processor time of an epoch.
@@ -194,11 +194,24 @@ def run(recording: Recording, estimator: str) -> dict[str, Any]:
     return found
 
 
+def _stored(paths: list[Path]) -> dict[int, dict[str, Any]]:
+    """The voyages of files of results by number; what several lines hold of one voyage is joined."""
+    voyages: dict[int, dict[str, Any]] = {}
+    for path in paths:
+        for line in path.read_text().splitlines() if path.exists() else ():
+            row = json.loads(line)
+            kept = voyages.setdefault(row["number"], row)
+            kept["errors"] |= row["errors"]
+    return voyages
+
+
 def _run_all(arguments: argparse.Namespace) -> None:
     path: Path = arguments.results
-    done = {json.loads(line)["number"] for line in path.read_text().splitlines()} if path.exists() else set()
+    stored = _stored([path])
     for number in range(arguments.first, arguments.first + arguments.count):
-        if number in done:
+        done = stored[number]["errors"] if number in stored else {}
+        missing = [e for e in arguments.estimators.split(",") if e not in done]
+        if not missing:
             continue
         if arguments.family:
             recording, row = voyage_of(arguments.family, number, arguments.heading, arguments.duration)
@@ -208,13 +221,13 @@ def _run_all(arguments: argparse.Namespace) -> None:
         row["heading_off_deg"] = arguments.heading_off
         if arguments.heading_off:
             recording = turned(recording, arguments.heading_off)
-        row["errors"] = {e: run(recording, e) for e in arguments.estimators.split(",")}
+        row["errors"] = {e: run(recording, e) for e in missing}
         with path.open("a") as file:
             file.write(json.dumps(row) + "\n")
 
 
 def _table(arguments: argparse.Namespace) -> None:
-    rows = [json.loads(line) for path in arguments.results for line in path.read_text().splitlines()]
+    rows = list(_stored(arguments.results).values())
     for low, high in ((0.0, 2.0), (2.0, 10.0), (10.0, 180.0), (0.0, 180.0)):
         some = [r for r in rows if low <= r["heading_deg"] < high]
         if not some:
