@@ -94,8 +94,10 @@ class AdaptiveFactor(NoiseAdaptation):
     ``target="P"`` is eq. 28: P/a, for each measurement. ``target="R"`` is what the text does in the end ("the adaptive
     factor can be used to inflate the measurement noise"): R/a by instrument; with the residual statistic and the
     three-segment function these are IGG-III weights. By default it also doubts the prediction, when a fix and a log
-    have failed ``together`` times running: then R stands and P is inflated (`PredictionTest`, which also limits every
-    inflation: eq. 28 with ten gross errors in a row would multiply by 1e30 what nothing observes). The covariance is
+    have failed ``together`` times running: then R stands and the covariance of the motion is inflated, that of position,
+    velocity and attitude (`ErrorModel.loosen`), and not that of the instruments' errors, which do not change because
+    the vessel moves otherwise (`PredictionTest`, which also limits every inflation: eq. 28 with ten gross errors in a
+    row would multiply by 1e30 what nothing observes). The covariance is
     Joseph's with the noise and P in use (eq. 29's first line lacks the factor).
 
     Parameters
@@ -142,6 +144,7 @@ class AdaptiveFactor(NoiseAdaptation):
         self.factor = FACTORS[factor]
         self.together = 0 if self.printed or target == "P" else together
         self.inflates = target == "P" or self.together > 0
+        self.inflates_motion = target == "R"
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

@@ -50,8 +50,10 @@ class Adaptation:
     Attributes
     ----------
     inflation : float
-        What the solver multiplies P by before it uses the measurement that `adapt` has just seen; for those who
-        doubt the prediction rather than the measurement.
+        What the solver inflates the prediction by before it uses the measurement that `adapt` has just seen; for those
+        who doubt the prediction rather than the measurement.
+    inflates_motion : bool
+        Whether the motion is inflated (`ErrorModel.loosen`), or all of P.
     inflates : bool
         Whether ``inflation`` is ever other than 1. A window keeps no covariance of a prediction to multiply, and
         refuses an adaptation that inflates it.
@@ -59,6 +61,7 @@ class Adaptation:
 
     inflation: float = 1.0
     inflates: bool = False
+    inflates_motion: bool = False
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

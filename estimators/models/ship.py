@@ -88,6 +88,7 @@ class ShipModel(ErrorModel):
     """
 
     state = ("position", "x")
+    moving = (slice(N, PSI), slice(PSI, PSI + 1))
 
     def __init__(
         self,

@@ -10,10 +10,10 @@ arms, sea and latitude. ::
     python -m tests.agreement.voyages table RESULTS.jsonl
 
 With ``--family`` voyage k is run k of a family of scenarios, such as ``scenarios/families/clean-voyages.toml``. A
-second call of ``run`` goes on where the first one was stopped, and adds estimators that are missing. The table gives, for each estimator, the horizontal
-RMSE over the best of the estimators in `BEST_OF` on the same voyage: median, 90th percentile and maximum; how often
-the mean horizontal NEES by degree of freedom is above 5, and in how many of these the estimator never reports that it
-is inconsistent; and the processor time of an epoch.
+second call of ``run`` goes on where the first one was stopped, and adds estimators that are missing. The table gives,
+for each estimator, the horizontal RMSE over the best of the estimators in `BEST_OF` on the same voyage: median, 90th
+percentile and maximum; how often the mean horizontal NEES by degree of freedom is above 5, and in how many of these the
+estimator never reports that it is inconsistent; and the processor time of an epoch.
 """
 
 from __future__ import annotations
