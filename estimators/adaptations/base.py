@@ -52,11 +52,12 @@ class Adaptation:
     inflation : float
         What the solver inflates the prediction by before it uses the measurement that `adapt` has just seen; for those
         who doubt the prediction rather than the measurement.
-    inflates_motion : bool
-        Whether the motion is inflated (`ErrorModel.loosen`), or all of P.
     inflates : bool
-        Whether ``inflation`` is ever other than 1. A window keeps no covariance of a prediction to multiply, and
-        refuses an adaptation that inflates it.
+        Whether all of P is multiplied by ``inflation``. A window keeps no covariance of a prediction to multiply, and
+        refuses such an adaptation.
+    inflates_motion : bool
+        Whether the covariance of the motion is inflated, and no other (`ErrorModel.loosen`). A window weighs motion by
+        its own residuals, and leaves this out.
     """
 
     inflation: float = 1.0

@@ -132,18 +132,16 @@ class NoiseAdaptation(Adaptation):
 
     Before an instrument's first measurement its datasheet's sigma stands. Where the prediction is at fault
     (`PredictionTest`), the nominal noise is used, and the adaptation does not see the innovation: the filter is then
-    the plain one.
+    the plain one. Its motion is inflated, so that it comes back soon (`ErrorModel.loosen`).
 
     Attributes
     ----------
     together : int
         See `PredictionTest`; 0: the prediction is never at fault.
-    inflates : bool
-        Whether P is inflated besides, where the prediction is at fault. Only `AdaptiveFactor` does: it helps where an
-        IMU is disturbed, and does harm to the attitude where it was the instruments after all.
     """
 
     together = 3
+    inflates_motion = True
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -173,7 +171,7 @@ class NoiseAdaptation(Adaptation):
             self._noisy[name] = innovation.noise
         if self._prediction.fails(innovation):
             noise: Array | None = innovation.noise
-            if self.inflates:
+            if self.inflates or self.inflates_motion:
                 self.inflation = self._prediction.inflation(innovation)
         else:
             noise = self.choose(innovation)

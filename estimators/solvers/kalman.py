@@ -193,7 +193,7 @@ class KalmanEstimator(Solver):
                 flagged.append((m.instrument, m.time))
                 return
             noise, inflation = chosen, self.adaptation.inflation
-            if inflation != 1.0 and self.adaptation.inflates_motion:
+            if inflation != 1.0 and not self.adaptation.inflates:
                 self.model.loosen(self.covariance, inflation, self._first_variances)
                 residual, cross, predicted, _ = self._observe(m) or observation
             elif inflation != 1.0:
