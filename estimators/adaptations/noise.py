@@ -132,16 +132,18 @@ class NoiseAdaptation(Adaptation):
 
     Before an instrument's first measurement its datasheet's sigma stands. Where the prediction is at fault
     (`PredictionTest`), the nominal noise is used, and the adaptation does not see the innovation: the filter is then
-    the plain one. Its motion is inflated, so that it comes back soon (`ErrorModel.loosen`).
+    the plain one.
 
     Attributes
     ----------
     together : int
         See `PredictionTest`; 0: the prediction is never at fault.
+    inflates_motion : bool
+        Whether the motion is inflated besides, where the prediction is at fault. Only `AdaptiveFactor` does: it helps
+        where an IMU is disturbed, and does harm where it was two instruments after all.
     """
 
     together = 3
-    inflates_motion = True
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

@@ -143,7 +143,7 @@ class ImmEstimator(KalmanEstimator):
     measurement (the first-order generalised pseudo-Bayesian form of the algorithm; the same as IMM where the chain
     forgets its level from one measurement to the next). One propagation, whatever J.
 
-    Where the prediction is at fault (`PredictionTest`), its motion is inflated and the plain filter's update is used.
+    Where the prediction is at fault (`PredictionTest`), the plain filter's update is used.
 
     Diagnostics: ``sigma_<component>.<instrument>`` is the root of the expected variance; ``quiet.<instrument>`` the
     probability of the lowest level.
@@ -224,11 +224,7 @@ class ImmEstimator(KalmanEstimator):
             self._admission.skipped += 1
             return
         residual, cross, predicted, noise = observation
-        innovation = Innovation(m, residual, predicted, noise, self.covariance)
-        if self._prediction.fails(innovation):
-            inflation = self._prediction.inflation(innovation)
-            if inflation != 1.0:
-                self.model.loosen(self.covariance, inflation, self._first_variances)
+        if self._prediction.fails(Innovation(m, residual, predicted, noise)):
             super()._take(m, diagnostics, flagged)
             return
         probability = self._probability[m.instrument]

@@ -44,7 +44,8 @@ BEST_OF = ("ekf", "iekf", "ukf", "inekf", "sw-fgo", "gnc-fgo", "huber-fgo")
 #: A mean NEES by degree of freedom above this is a divergence.
 LARGEST_NEES = 5.0
 _KEPT = (
-    "horizontal_rmse", "heading_rmse", "nees_horizontal", "nees_attitude", "smoothed_horizontal_rmse", "inconsistent"
+    "horizontal_rmse", "heading_rmse", "nees_horizontal", "nees_attitude", "smoothed_horizontal_rmse", "inconsistent",
+    "inconsistent_end",
 )  # fmt: skip
 SPEEDS = {"ship": (3.0, 10.0), "auv": (1.0, 2.5), "rov": (0.2, 1.0), "boat": (5.0, 20.0)}
 
