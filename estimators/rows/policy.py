@@ -10,11 +10,12 @@ __all__ = ["PolicyEkf"]
 
 @register("policy-ekf")
 class PolicyEkf(PolicyEstimator):
-    """EKF whose GNSS noise and process noise a trained policy sets, from the innovations.
+    """EKF whose GNSS noise a trained policy sets, from the innovations.
 
     The policy that comes with it was trained by the cross-entropy method (``examples/cross_entropy.py``, 1 152 000
-    steps) on 64 training voyages of ``training-gnss-faults``, a family with an IMU and a GNSS receiver, noise steps and
-    multipath. They are never scored. On other voyages it does what it can. It is asked about the first receiver.
+    steps) on 64 training voyages of ``training-gnss-faults``: an IMU, a GNSS receiver and in half of them a DVL, with
+    noise steps and multipath. They are never scored. It is asked about the first receiver, and does not see faults of
+    other instruments.
     ``file`` names another policy (docs/how-to/learn-to-navigate.md). Source: ours; R. Y. Rubinstein, *The cross-entropy
     method for combinatorial and continuous optimization*, Methodology and Computing in Applied Probability 1, 1999.
 
