@@ -13,7 +13,7 @@ import numpy as np
 
 from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
 from simnav.kinds import INSTRUMENTS
-from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, command_of, read_message, write_all
+from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, read_message, write_all
 from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.campaign.training_runs import told_of
 from simnav.plugins import load_plugin
@@ -43,10 +43,10 @@ def live(down: int, up: int) -> None:
     """
     session = _Session()
     while True:
-        message = read_message(down)
-        if message is None:
+        found = read_message(down)
+        if found is None:
             return
-        kind = command_of(message)
+        kind, message = found
         if not kind:
             reply = session.step(message)
         elif kind == Down.MAKE:
