@@ -70,7 +70,7 @@ class _Session:
         self._estimator: Any = None
         self._encode = EstimateEncoder()
         self._decode = PacketDecoder(())
-        self._before = set(sys.modules)
+        self._before = _loaded_libraries()
 
     def make(self, body: bytes) -> bytes:
         """Import and construct the estimator; of a file or a session that is the first time that its code runs."""
@@ -141,7 +141,7 @@ class _Session:
 
     def end(self) -> bytes:
         """What should be imported before the next one is forked."""
-        new = (set(sys.modules) - self._before) & LIBRARIES
+        new = _loaded_libraries() - self._before
         return answer(Up.DONE, json.dumps({"libraries": sorted(new)}).encode())
 
     def _raised(self, error: BaseException) -> bytes:
@@ -152,6 +152,10 @@ class _Session:
         status = "out-of-memory" if isinstance(error, MemoryError) else "error"
         estimator: Estimator = self._estimator
         return _failure(status, describe_failure(error, estimator, skip=1))
+
+
+def _loaded_libraries() -> set[str]:
+    return {name for name in LIBRARIES if name in sys.modules}  # a look at each name of a module would copy its page
 
 
 def _failure(status: str, reason: str) -> bytes:

@@ -37,6 +37,7 @@ from simnav.leaderboard.campaign.confinement.limits import (
     limit,
     out_of_memory_kills,
     resident,
+    use_huge_pages,
 )
 
 __all__ = ["COPY_FROM", "main"]
@@ -97,6 +98,7 @@ def _load() -> None:
         shutil.rmtree(target, ignore_errors=True)
     gc.collect()
     gc.freeze()  # so that a collection in a forked process does not copy all of this
+    use_huge_pages()
 
 
 def _receive(control: socket.socket) -> tuple[dict[str, Any] | None, list[int]]:
