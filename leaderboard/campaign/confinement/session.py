@@ -311,7 +311,7 @@ class RemoteSession:
         self.limits = limits
         self.libraries: list[str] = []
         self.peak_memory = 0
-        self._lost = False
+        self._silent = False  # it is gone, or has not answered all that it was sent
         self._write, self._read = write, read
         self._deadline = time.monotonic() + limits.timeout
         os.set_blocking(write, False)
@@ -367,12 +367,12 @@ class RemoteSession:
                     sent = 0
                 except OSError:
                     raise self._gone() from None
-                if sent != len(packet):
+                if sent != len(packet) or not ready(_STALL):
+                    self._silent = True
                     log.settle()
                     self._send_rest(packet[sent:])
-                if not ready(_STALL):
-                    log.settle()
                     self._wait(self._readable)
+                    self._silent = False
                 reply = read(self._read, _PIECE)
                 if len(reply) < header or len(reply) != header + size_of(reply)[0]:
                     reply = self._rest(reply, LARGEST)
@@ -403,8 +403,8 @@ class RemoteSession:
         return f"{type(error).__name__}: {error}"[:500]
 
     def end(self) -> None:
-        """Say that this was all, if it is still there."""
-        if self._lost:
+        """Say that this was all, if it listens."""
+        if self._silent:
             return
         try:
             names = _told(self._ask(Down.END, None)).get("libraries", [])
@@ -481,11 +481,11 @@ class RemoteSession:
 
     def _check_time(self) -> None:
         if time.monotonic() > self._deadline:
-            self._lost = True
+            self._silent = True
             raise StoppedError("timeout", f"stopped after {self.limits.timeout:g} s")
 
     def _gone(self) -> _GoneError:
-        self._lost = True
+        self._silent = True
         return _GoneError()
 
 
