@@ -111,8 +111,8 @@ def _numbers(result: Any) -> dict[str, str]:
 
 def _tell(what: str, without: list[float], confined: list[float]) -> None:
     price, wall = (100.0 * (c / w - 1.0) for c, w in zip(confined, without, strict=True))
-    print(f"  {what:<18} {without[0]:7.2f} s ({without[1]:7.2f} s) without, {confined[0]:7.2f} s ({confined[1]:7.2f} s) "
-          f"confined: {price:+5.1f} % ({wall:+5.1f} %)", flush=True)  # fmt: skip
+    times = [f"{seconds:7.2f} s ({passed:7.2f} s)" for seconds, passed in (without, confined)]
+    print(f"  {what:<18} {times[0]} without, {times[1]} confined: {price:+5.1f} % ({wall:+5.1f} %)", flush=True)
 
 
 def epochs(rows: list[str], scenario: str, rounds: int, confinement: str) -> None:
