@@ -46,9 +46,7 @@ _START = 900.0  # for a server to be ready; on a slow and busy machine compiling
 _END = 20.0  # for a server to look after what is left of an estimator process [s]
 _PIECE = 1 << 16
 _TICK = 1000.0  # the longest wait between two looks at the clock [ms]
-_STALL = (
-    50.0  # an estimator that takes longer for a step, or for all since, has its answers judged before the next [ms]
-)
+_STALL = 50.0  # of a step, or of all since answers were last judged: then they are judged before the next [ms]
 _STEPS = 64  # whose answers are judged together at most
 _BYTES = 1 << 20  # of answers that are judged together
 _SIZE = struct.Struct("<8xI")  # of an answer: bytes after the header
