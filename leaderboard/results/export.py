@@ -23,6 +23,7 @@ from simnav.leaderboard.results.files import whole
 from simnav.leaderboard.results.formats import writes
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.results.provenance import Provenance, benchmark_of, distinct
+from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
@@ -205,8 +206,7 @@ def table(results: Sequence[Result]) -> pa.Table:
             known = {key: json.dumps(plain(dict(v)), sort_keys=True) for key, v in texts.items()}
             values = [known[id(v)] for v in values]
         columns[name] = pa.array(values, kinds.get(name, text))
-    for name in SCORES:
-        scores = np.array([r.scores.get(name, math.nan) for r in results], dtype=np.float64)
+    for name, scores in zip(SCORES, score_matrix([r.scores for r in results], list(SCORES)).T, strict=True):
         columns[name] = pa.array(scores, real, mask=np.isnan(scores))
     for column, name in _ORIGIN.items():
         columns[column] = pa.array([getattr(r, name) for r in results], kinds.get(column, text))
