@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,11 +102,10 @@ class Document:
             "ranking": plain(self.ranking),
         }
 
-    @cached_property
-    def tables(self) -> list[pa.Table]:
+    def tables(self) -> Iterator[pa.Table]:
         """The results as tables of some thousand rows each; one without a row where there are none."""
-        starts = range(0, max(len(self.results), 1), _CHUNK)
-        return [table(self.results[k : k + _CHUNK]) for k in starts]
+        for k in range(0, max(len(self.results), 1), _CHUNK):
+            yield table(self.results[k : k + _CHUNK])
 
 
 def _run(result: Result) -> dict[str, Any]:
@@ -145,7 +143,7 @@ def write_csv(document: Document, path: Path) -> list[Path]:
     with whole(path) as partial:
         writer = None
         try:
-            for chunk in document.tables:
+            for chunk in document.tables():
                 rows = _with_units(chunk)
                 writer = writer or csv.CSVWriter(partial, rows.schema)
                 writer.write_table(rows)
@@ -182,7 +180,7 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
     with whole(path) as partial:
         writer = None
         try:
-            for chunk in document.tables:
+            for chunk in document.tables():
                 writer = writer or pq.ParquetWriter(partial, chunk.schema, compression="zstd")
                 writer.write_table(chunk)
         finally:

@@ -239,7 +239,9 @@ def _over_all_runs(
     faults = around.runs[first]["faults"] if around.runs else _NO_FAULTS
     made = []
     if around.happening["name"]:
-        made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}."))
+        ends = [t for t in around.happening["end"] if t is not None]
+        duration = max([float(time[-1]) if len(time) else 0.0, *ends])
+        made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}.", duration))
     count = min(len(entry.seeds), curves.BAND_RUNS)
     seeds = "one seed" if len(entry.seeds) < 2 else f"{'the first ' * (count < len(entry.seeds))}{count} seeds"
     words = f"Median over {seeds}, and the band from the 5th to the 95th percentile. Shaded: faults of seed {first}."
@@ -332,7 +334,8 @@ def _spread(
         found = cell.score(score)
         if not found.value > 0.0:
             continue
-        for value, result in _marked([(v, r) for r in cell.good if (v := r.scores.get(score, math.nan)) > 0.0]):
+        values = zip(cell.scores(score).tolist(), cell.good, strict=True)
+        for value, result in _marked([(v, r) for v, r in values if v > 0.0]):
             for key, x in (("row", row.estimator), ("value", short(value)), ("run", _run_name(result))):
                 ticks[key].append(x)
         low, high = (found.low, found.high) if math.isfinite(found.low) else (found.value, found.value)

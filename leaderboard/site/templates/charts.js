@@ -96,7 +96,7 @@
     constructor(host, given) {
       Object.assign(this, { host, given });
       this.place = make("div", { class: "vega", role: "group", "aria-label": given.title });
-      host.append(make("figure", { class: given.spec.facet ? "chart wide" : "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
+      host.append(make("figure", { class: given.wide ? "chart wide" : "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
       this.drawn = false;
       simnav.drawings.add(this);
       new IntersectionObserver((entries, observer) => {
