@@ -228,7 +228,7 @@ class Row(Estimator):
 def _equip(cls: type[Row]) -> None:
     """Give a row its constructor, and the documentation of its parameters."""
     recipe = cls.recipe
-    order = [name for name in ("adaptation", "weighting") if name in recipe]
+    order = [name for name in ("adaptation", "weighting", "isolation") if name in recipe]
     order += [name for name in recipe if name not in (*order, "solver")]
     parameters: dict[str, inspect.Parameter] = {}
     owner: dict[str, str] = {}

@@ -1,4 +1,7 @@
-"""Robust rows of the sliding window: each is ``sw-fgo`` or, without an IMU, ``ship-fgo``, with one weighting."""
+"""Robust rows of the sliding window: each is ``sw-fgo`` or, without an IMU, ``ship-fgo``, with one weighting.
+
+All but the gradient-adaptive ones also isolate faults (`simnav.estimators.weightings.fault_isolation`).
+"""
 
 from simnav.estimator import register
 from simnav.estimators.composition import Row, piece
@@ -6,6 +9,7 @@ from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.rows.windows import SwFgoPaper
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling
+from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.gradient_adaptive import GradientAdaptive
 from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
 from simnav.estimators.weightings.m_estimators import TunedMEstimator, cauchy, geman_mcclure, huber, tukey
@@ -16,8 +20,12 @@ __all__ = ["CauchyFgo", "DcsFgo", "GaFgo", "GaFgoPaper", "GmFgo", "GncFgo", "Hub
 __all__ += ["SwitchableFgo", "TukeyFgo"]
 
 
-class _Robust(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, every_sample=False), model=Suitable):
+class _Window(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, every_sample=False), model=Suitable):
     """The window without its weighting."""
+
+
+class _Robust(_Window, isolation=FaultIsolation):
+    """The window that isolates faults, without its weighting."""
 
 
 @register("huber-fgo")
@@ -91,7 +99,7 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
 
 
 @register("ga-fgo")
-class GaFgo(_Robust, weighting=piece(GradientAdaptive, fewest=5)):
+class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
     """Gradient-adaptive factor graph, its residuals whitened and its scales consistent.
 
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on

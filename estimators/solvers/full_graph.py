@@ -13,7 +13,7 @@ from simnav.estimators.models.chains import Chain
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.smoother import smoother_gains
 from simnav.estimators.solvers.window import WindowEstimator
-from simnav.estimators.weightings.base import Weighting
+from simnav.estimators.weightings.base import Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 __all__ = ["FullGraph"]
@@ -24,7 +24,7 @@ class FullGraph(WindowEstimator):
 
     Parameters
     ----------
-    model, adaptation, weighting, tolerance, iterations, spacing
+    model, adaptation, weighting, isolation, tolerance, iterations, spacing
         As for `WindowEstimator`.
 
     Attributes
@@ -41,14 +41,16 @@ class FullGraph(WindowEstimator):
         model: ModelChoice | Chain,
         adaptation: Adaptation | None = None,
         weighting: Weighting | None = None,
+        isolation: Isolation | None = None,
         *,
         tolerance: float = 1e-3,
         iterations: int = 10,
         spacing: float = 0.5,
     ):
         super().__init__(
-            model, adaptation, weighting, window=None, tolerance=tolerance, iterations=iterations, spacing=spacing
-        )
+            model, adaptation, weighting, isolation,
+            window=None, tolerance=tolerance, iterations=iterations, spacing=spacing,
+        )  # fmt: skip
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""

@@ -68,7 +68,8 @@ class GtsamEstimator(Solver):
 
     slow = True
     refuses: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("model", "adaptation", "weighting"), "GTSAM's graph is made from our inertial model, to be compared with it"
+        ("model", "adaptation", "weighting", "isolation"),
+        "GTSAM's graph is made from our inertial model, to be compared with it",
     )
     #: Whether every end of a step is a node.
     every_step = False

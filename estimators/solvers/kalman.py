@@ -57,7 +57,10 @@ class KalmanEstimator(Solver):
     """
 
     pieces: ClassVar[tuple[str, ...]] = ("model", "adaptation", "iteration", "smoother")
-    refuses: ClassVar[Mapping[str, str]] = {"weighting": "WeightedKalmanEstimator is the filter that takes one"}
+    refuses: ClassVar[Mapping[str, str]] = {
+        "weighting": "WeightedKalmanEstimator is the filter that takes one",
+        "isolation": "a filter sees one measurement at a time, so that none can agree with another",
+    }
     #: Whether the model may do in one go what `_observe` and `_absorb` do (`ErrorModel.assimilate`), where the noise is
     #: the nominal one. A solver that does one of the two in a way of its own says False.
     assimilates: ClassVar[bool] = True

@@ -6,8 +6,7 @@ A `simnav.estimators.weightings.base.Weighting` weighs both as it does in a wind
 measurement, P by that of the prediction, and the measurement is linearised again, as in
 `simnav.estimators.solvers.iterated`, until the correction stands still and the weights have settled.
 
-A measurement of half its weight or less is flagged. Unlike a window the filter cannot take back later what it believed:
-a weighting that asks several measurements whether they agree sees one at a time.
+A measurement of half its weight or less is flagged. Unlike a window the filter cannot take back later what it believed.
 
 Source: B. M. Bell and F. W. Cathey, *The iterated Kalman filter update as a Gauss-Newton method*, IEEE TAC 38(2), 1993;
 for weights at each iteration, P. W. Holland and R. E. Welsch, *Robust regression using iteratively reweighted
@@ -55,6 +54,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
     refuses: ClassVar[Mapping[str, str]] = {
         "adaptation": "the weighting decides how much a measurement counts",
         "iteration": "it always iterates",
+        "isolation": KalmanEstimator.refuses["isolation"],
         "smoother": "the weight of a prediction is not in the transition that a smoother goes back over",
     }
     assimilates = False

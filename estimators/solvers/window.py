@@ -53,7 +53,7 @@ from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.admission import Admission
 from simnav.estimators.solvers.cost_consistency import CostTest
-from simnav.estimators.weightings.base import Factors, Weighting
+from simnav.estimators.weightings.base import Factors, Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["WindowEstimator"]
@@ -77,6 +77,8 @@ class WindowEstimator(Solver):
         None: every measurement counts with its nominal noise. Not one that ``inflates``.
     weighting : Weighting, optional
         None: every factor counts in full.
+    isolation : Isolation, optional
+        Changes the weights where it finds out which factors are at fault; it needs a weighting.
     window : int or None
         Epochs (steps that bring measurements) in the window; None: all of them.
     tolerance : float
@@ -100,7 +102,7 @@ class WindowEstimator(Solver):
         Of the newest node.
     """
 
-    pieces = ("model", "adaptation", "weighting")
+    pieces = ("model", "adaptation", "weighting", "isolation")
     refuses: ClassVar[Mapping[str, str]] = {
         "iteration": "it linearises anew until the nodes have converged",
         "smoother": "the full graph is the window that smooths",
@@ -113,6 +115,7 @@ class WindowEstimator(Solver):
         model: ModelChoice | Chain,
         adaptation: Adaptation | None = None,
         weighting: Weighting | None = None,
+        isolation: Isolation | None = None,
         *,
         window: int | None = 20,
         tolerance: float = 1e-3,
@@ -128,6 +131,8 @@ class WindowEstimator(Solver):
             raise ValueError(f"iterations is {iterations}; at least 1 is needed")
         if not 0.0 <= spacing < np.inf:
             raise ValueError(f"spacing is {spacing}; it is a time in seconds, 0 or more")
+        if isolation is not None and weighting is None:
+            raise ValueError(f"{type(isolation).__name__} changes weights, and there is no weighting")
         if adaptation is not None and adaptation.inflates:
             raise ValueError(
                 f"{type(adaptation).__name__}, as it is set, inflates the covariance of the prediction; a window keeps "
@@ -137,7 +142,7 @@ class WindowEstimator(Solver):
         if isinstance(model, (Chain, ErrorModel)):
             self.chain = chain_of(model)
         self.adaptation = adaptation
-        self.weighting = weighting
+        self.weighting, self.isolation = weighting, isolation
         self.window, self.tolerance, self.iterations, self.spacing = window, tolerance, iterations, spacing
         self.every_sample = every_sample
 
@@ -147,7 +152,7 @@ class WindowEstimator(Solver):
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
         self._admission = Admission(instruments, observed)
-        for what in (self.adaptation, self.weighting):
+        for what in (self.adaptation, self.weighting, self.isolation):
             if what is not None:
                 what.reset(instruments)
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
@@ -401,7 +406,10 @@ class WindowEstimator(Solver):
         assert self.weighting is not None
         motions, aids = self.chain.motions, self.chain.aids
         before = motions["weight"].copy(), aids["weight"].copy()
-        settled = self.weighting.weigh(self._factors(iteration))
+        factors = self._factors(iteration)
+        settled = self.weighting.weigh(factors)
+        if self.isolation is not None:
+            settled = self.isolation.judge(factors) and settled
         first = keep_weights(
             before[0], motions["norm"], motions["weight"], aids["node"], self.chain.base, before[1], aids["norm"],
             aids["weight"], self.tolerance,

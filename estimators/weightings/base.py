@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.types import Array, Instruments
 
-__all__ = ["Factors", "Weighting"]
+__all__ = ["Factors", "Isolation", "Weighting"]
 
 
 @dataclass(slots=True)
@@ -97,3 +98,13 @@ class Weighting:
     def diagnostics(self) -> dict[str, float | Array]:
         """Named values of the last step, recorded by epoch."""
         return {}
+
+
+class Isolation(Protocol):
+    """Decides, after a weighting, which factors are at fault (`simnav.estimators.weightings.fault_isolation`)."""
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+
+    def judge(self, factors: Factors) -> bool:
+        """Change the weights that the weighting has set, in place; as `Weighting.weigh`."""

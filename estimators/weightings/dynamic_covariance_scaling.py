@@ -40,11 +40,8 @@ class DynamicCovarianceScaling(MEstimator):
         On Gaussian noise.
     """
 
-    def __init__(
-        self, phi: float = 0.0, efficiency: float = 0.98, smallest: float = 1e-3,
-        together: int = 3, recent: float = 5.0, sound: float = 0.999,
-    ):  # fmt: skip
+    def __init__(self, phi: float = 0.0, efficiency: float = 0.98, smallest: float = 1e-3):
         if not phi >= 0.0:
             raise ValueError(f"phi = {phi:g}: it must be above 0, or 0 for that of the efficiency")
         tuned = (phi**0.5,) * 3 if phi > 0.0 else constants(covariance_scaling, efficiency)
-        super().__init__(covariance_scaling, tuned, smallest, together, recent, sound)
+        super().__init__(covariance_scaling, tuned, smallest)

@@ -20,7 +20,7 @@ from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.weightings.base import Factors
 from simnav.types import Array, Instruments, Integers
 
-__all__ = ["MotionTest"]
+__all__ = ["FaultIsolation"]
 
 #: Weight of motion while the measurements are asked.
 LOOSE = 1e-6
@@ -36,22 +36,33 @@ def _failing(time: Array, tested: float, norm: Array, components: Integers, limi
     return first, failing
 
 
-class MotionTest:
-    """The test of the module.
+class FaultIsolation:
+    """The test of the module. It changes what a weighting has chosen, and is asked after it at every iteration.
 
     Parameters
     ----------
-    instruments : Instruments
-        Datasheets of the run's instruments.
-    together, recent, sound
-        As of `simnav.estimators.weightings.robust_weighting.RobustWeighting`.
+    together : int
+        Fault isolation: how many times running a fix and a log have to fail before the motion is suspected; 0: never.
+    recent : float
+        Fault isolation: a failure of the other instrument that is older than this [s] does not count.
+    sound : float
+        Fault isolation: probability of a sound measurement to pass its test.
     """
 
-    def __init__(self, instruments: Instruments, together: int = 3, recent: float = 5.0, sound: float = 0.999):
+    def __init__(self, together: int = 3, recent: float = 5.0, sound: float = 0.999):
+        if together < 0:
+            raise ValueError(f"together = {together}: it must be 0 or more")
+        if not recent >= 0.0:
+            raise ValueError(f"recent = {recent:g}: it must be 0 or more seconds")
+        if not 0.5 < sound < 1.0:
+            raise ValueError(f"sound = {sound:g}: it must lie between 0.5 and 1")
         self.together, self.recent, self.sound = together, recent, sound
         self._limits = np.array(chi_square_limits(sound))
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
         self._is_fix = fixes_and_logs(instruments)
-        if len(set(self._is_fix.values())) < 2 or not together:
+        if len(set(self._is_fix.values())) < 2 or not self.together:
             self._is_fix = {}  # the test needs instruments of both groups
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
@@ -60,20 +71,20 @@ class MotionTest:
         self._weight = self._motion_weight = np.empty(0)
         self._fresh = True
 
-    def begin(self, factors: Factors) -> None:
-        """An epoch begins."""
-        if self._asking is not None:  # the last one ended before the answer
-            factors.motion_weight[:] = 1.0
-        self._fresh, self._asking = True, None
-
     def judge(self, factors: Factors) -> bool:
         """Let measurements count in full where it is the motion that is at fault, or to find out.
 
         Returns
         -------
         bool
-            False in the iteration in which they are asked: the weights are then not those that are wanted.
+            False at the first iteration of an epoch, and in that in which they are asked: the weights are then not
+            those that are wanted.
         """
+        if factors.iteration == 0:
+            if self._asking is not None:  # the last epoch ended before the answer
+                factors.motion_weight[:] = 1.0
+            self._fresh, self._asking = True, None
+            return False
         if not self._is_fix:
             return True
         asked, self._asking = self._asking, None

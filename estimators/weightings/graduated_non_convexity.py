@@ -63,15 +63,12 @@ class GraduatedNonConvexity(RobustWeighting):
         growth: float = 3.0,
         efficiency: float = 0.95,
         smallest: float = 1e-3,
-        together: int = 3,
-        recent: float = 5.0,
-        sound: float = 0.999,
     ):
         if cost not in ("tls", "gm"):
             raise ValueError(f"cost = {cost!r}: it must be 'tls' or 'gm'")
         if not growth > 1.0:
             raise ValueError(f"growth = {growth:g}: it must be above 1")
-        super().__init__(smallest, together, recent, sound)
+        super().__init__(smallest)
         self.cost, self.growth = cost, growth
         tuned = constants(truncated if cost == "tls" else geman_mcclure, efficiency)
         self._scale = np.array([1.0, *tuned]) ** -2.0
@@ -79,7 +76,6 @@ class GraduatedNonConvexity(RobustWeighting):
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        super().reset(instruments)
         self._mu = self._hard = HARD if self.cost == "tls" else 1.0
         self._seen = self._newest = -np.inf
         self._fresh = True

@@ -141,13 +141,10 @@ class MEstimator(RobustWeighting):
         c of measurements of 1, 2 and 3 components.
     """
 
-    def __init__(
-        self, weight: WeightFunction, constants: tuple[float, float, float], smallest: float = 1e-3,
-        together: int = 3, recent: float = 5.0, sound: float = 0.999,
-    ):  # fmt: skip
+    def __init__(self, weight: WeightFunction, constants: tuple[float, float, float], smallest: float = 1e-3):
         if not min(constants) > 0.0:
             raise ValueError(f"constants = {constants}: they must be above 0")
-        super().__init__(smallest, together, recent, sound)
+        super().__init__(smallest)
         self.weight = weight
         self._scale = 1.0 / np.array([1.0, *constants])
 
@@ -170,8 +167,5 @@ class TunedMEstimator(MEstimator):
         (``docs/explanation/windows.md``).
     """
 
-    def __init__(
-        self, weight: WeightFunction, efficiency: float = 0.98, smallest: float = 1e-3,
-        together: int = 3, recent: float = 5.0, sound: float = 0.999,
-    ):  # fmt: skip
-        super().__init__(weight, constants(weight, efficiency), smallest, together, recent, sound)
+    def __init__(self, weight: WeightFunction, efficiency: float = 0.98, smallest: float = 1e-3):
+        super().__init__(weight, constants(weight, efficiency), smallest)

@@ -40,14 +40,7 @@ class MaxMixture(MEstimator):
         p, that a measurement is of the wide component.
     """
 
-    def __init__(
-        self,
-        spread: float = 10.0,
-        probability: float = 0.05,
-        together: int = 3,
-        recent: float = 5.0,
-        sound: float = 0.999,
-    ):
+    def __init__(self, spread: float = 10.0, probability: float = 0.05):
         if not spread > 1.0:
             raise ValueError(f"spread = {spread:g}: it must be above 1")
         if not 0.0 < probability < 1.0:
@@ -60,4 +53,4 @@ class MaxMixture(MEstimator):
                 "at any residual"
             )
         a, b, c = (x**0.5 for x in limits)
-        super().__init__(partial(_component, wide=spread**-2), (a, b, c), 0.0, together, recent, sound)
+        super().__init__(partial(_component, wide=spread**-2), (a, b, c), 0.0)

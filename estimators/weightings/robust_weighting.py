@@ -2,8 +2,8 @@
 
 With measurements alone being weighed, a motion that is wrong (a disturbed IMU) is not seen as such: no measurement
 fits, none is believed, and the window follows the IMU to wherever it goes. In a graph, motion is a factor like any
-other, and is weighed too, as in Guo et al. (2026) (`weigh_motion`). And where fixes and logs contradict the motion
-together, they are asked whether they agree with each other (`simnav.estimators.weightings.fault_isolation`).
+other, and is weighed too, as in Guo et al. (2026) (`weigh_motion`). Where fixes and logs contradict the motion
+together, `simnav.estimators.weightings.fault_isolation` finds out which of them is wrong.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.weightings.base import Factors, Weighting
-from simnav.estimators.weightings.fault_isolation import MotionTest
-from simnav.types import Array, Instruments
+from simnav.types import Array
 
 __all__ = ["RobustWeighting", "weigh_motion"]
 
@@ -56,39 +55,22 @@ class RobustWeighting(Weighting):
         Least weight. A redescending function can lock a window out that is wrong itself: the good measurements then
         have no weight, and nothing pulls it back. With 0.001, an error of 30 sigma pulls by 0.03 sigma, and many
         good measurements together bring the window back, if slowly. 0 is the literature's form.
-    together : int
-        Fault isolation: how many times running a fix and a log have to fail before the motion is suspected; 0: never.
-    recent : float
-        Fault isolation: a failure of the other instrument that is older than this [s] does not count.
-    sound : float
-        Fault isolation: probability of a sound measurement to pass its test.
     """
 
-    def __init__(self, smallest: float = 1e-3, together: int = 3, recent: float = 5.0, sound: float = 0.999):
+    def __init__(self, smallest: float = 1e-3):
         if not 0.0 <= smallest <= 1.0:
             raise ValueError(f"smallest = {smallest:g}: it must lie in [0, 1]")
-        if together < 0:
-            raise ValueError(f"together = {together}: it must be 0 or more")
-        if not recent >= 0.0:
-            raise ValueError(f"recent = {recent:g}: it must be 0 or more seconds")
-        if not 0.5 < sound < 1.0:
-            raise ValueError(f"sound = {sound:g}: it must lie between 0.5 and 1")
-        self.smallest, self.together, self.recent, self.sound = smallest, together, recent, sound
-
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        self._test = MotionTest(instruments, self.together, self.recent, self.sound)
+        self.smallest = smallest
 
     def weigh(self, factors: Factors) -> bool:
         """Set the weights of the measurements and of motion."""
         if factors.iteration == 0:
-            self._test.begin(factors)
             self.begin()
             return False
         settled = self.choose(factors)
         np.maximum(factors.weight, self.smallest, out=factors.weight)
         weigh_motion(factors)
-        return self._test.judge(factors) and settled
+        return settled
 
     def begin(self) -> None:
         """An epoch begins; a hook."""

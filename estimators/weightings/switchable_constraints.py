@@ -34,10 +34,8 @@ class SwitchableConstraints(MEstimator):
         Gaussian noise is 44 to 66 %; at 0.3 it is 93 to 98 %.
     """
 
-    def __init__(
-        self, sigma: float = 0.3, smallest: float = 1e-3, together: int = 3, recent: float = 5.0, sound: float = 0.999
-    ):
+    def __init__(self, sigma: float = 0.3, smallest: float = 1e-3):
         if not sigma > 0.0:
             raise ValueError(f"sigma = {sigma:g}: it must be above 0")
         c = 1.0 / sigma
-        super().__init__(geman_mcclure, (c, c * 2.0**0.5, c * 3.0**0.5), smallest, together, recent, sound)
+        super().__init__(geman_mcclure, (c, c * 2.0**0.5, c * 3.0**0.5), smallest)

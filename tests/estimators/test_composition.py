@@ -34,6 +34,8 @@ from simnav.estimators.solvers.linear import LinearKalmanEstimator
 from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.estimators.solvers.window import WindowEstimator
+from simnav.estimators.weightings.fault_isolation import FaultIsolation
+from simnav.estimators.weightings.gradient_adaptive import GradientAdaptive
 from simnav.scenario import load
 from simnav.source import record
 from simnav.trial import run_trial
@@ -170,6 +172,21 @@ def test_a_window_refuses_what_inflates_a_prediction(adaptation):
     with pytest.raises(ValueError, match="inflates the covariance of the prediction"):
         WindowEstimator(InertialModel(), adaptation)
     WindowEstimator(InertialModel(), AdaptiveFactor(together=0))
+
+
+def test_isolation_is_a_piece_of_windows_with_a_weighting():
+    class Isolated(
+        Row, solver=WindowEstimator, model=InertialModel, weighting=GradientAdaptive, isolation=FaultIsolation
+    ):
+        """Gradient-adaptive weights with the isolation of faults, which has parameters of its own."""
+
+    row = Isolated(together=5)
+    assert (row.isolation.together, row.isolation.recent) == (5, 5.0)
+    assert "times running" in documented(Isolated)["together"][1]
+    with pytest.raises(TypeError, match="takes no isolation: a filter sees one measurement at a time"):
+        type(Row)("Filter", (Row,), {}, solver=KalmanEstimator, model=InertialModel, isolation=FaultIsolation)
+    with pytest.raises(ValueError, match="FaultIsolation changes weights, and there is no weighting"):
+        WindowEstimator(InertialModel(), isolation=FaultIsolation())
 
 
 def test_a_model_without_a_chain_makes_no_graph():

@@ -15,6 +15,7 @@ from scipy.stats import chi, multivariate_normal
 
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling, covariance_scaling
+from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.gradient_adaptive import GradientAdaptive, medians
 from simnav.estimators.weightings.graduated_non_convexity import (
     GraduatedNonConvexity,
@@ -499,6 +500,9 @@ def test_a_clean_regression_loses_little(name: str):
         (lambda: GraduatedNonConvexity("l1"), "cost = 'l1'"),
         (lambda: GraduatedNonConvexity(growth=1.0), "growth = 1"),
         (lambda: GraduatedNonConvexity(smallest=-1.0), "smallest = -1"),
+        (lambda: FaultIsolation(together=-1), "together = -1"),
+        (lambda: FaultIsolation(recent=-1.0), "recent = -1"),
+        (lambda: FaultIsolation(sound=1.0), "sound = 1"),
         (lambda: GradientAdaptive("print"), "preset = 'print'"),
         (lambda: GradientAdaptive(gnss=(1.0, 0.0, 0.5)), "gnss ="),
         (lambda: GradientAdaptive(epsilon=0.0), "epsilon = 0"),
@@ -512,10 +516,22 @@ def test_settings_that_cannot_be(make, message: str):
 # Whose fault it is
 
 
-def asked(agree: bool) -> tuple[MEstimator, list[Factors]]:
+class Isolated(Weighting):
+    """A weighting and the isolation after it, as a window asks them."""
+
+    def __init__(self, sheets: Instruments):
+        self.weighting, self.isolation = MEstimator(tukey, constants(tukey)), FaultIsolation()
+        self.weighting.reset(sheets)
+        self.isolation.reset(sheets)
+
+    def weigh(self, factors: Factors) -> bool:
+        settled = self.weighting.weigh(factors)
+        return self.isolation.judge(factors) and settled
+
+
+def asked(agree: bool) -> list[Factors]:
     """Three epochs in which fix and DVL fail, and what follows at the third when motion has been loosened."""
-    weighting = MEstimator(tukey, constants(tukey))
-    weighting.reset(SHEETS)
+    weighting = Isolated(SHEETS)
     seen = []
     for epoch in (1, 2, 3):
         instrument = np.tile([0, 1], epoch)
@@ -532,12 +548,11 @@ def asked(agree: bool) -> tuple[MEstimator, list[Factors]]:
             if settled:
                 break
         seen.append(f)
-    return weighting, seen
+    return seen
 
 
 def test_fixes_and_logs_that_fail_together_are_asked():
-    _, seen = asked(agree=True)
-    first, second, asking, _ = seen
+    first, second, asking, _ = asked(agree=True)
     for f in (first, second):
         assert f.weight.max() == 1e-3
         assert f.motion_weight.min() == 1.0
@@ -546,20 +561,19 @@ def test_fixes_and_logs_that_fail_together_are_asked():
 
 
 def test_the_motion_is_blamed_where_they_agree():
-    blamed = asked(agree=True)[1][-1]
+    blamed = asked(agree=True)[-1]
     assert blamed.weight.min() == 1.0
     assert blamed.motion_weight.max() == pytest.approx((chi.ppf(0.999, 15) / 1e3) ** 2, rel=0.02)
 
 
 def test_the_measurements_are_blamed_where_they_do_not():
-    denied = asked(agree=False)[1][-1]
+    denied = asked(agree=False)[-1]
     assert denied.iteration == 3  # one to ask, one back
     assert denied.weight.max() == 1e-3
 
 
 def test_nobody_is_asked_where_there_is_no_log():
-    weighting = MEstimator(tukey, constants(tukey))
-    weighting.reset(Instruments([SHEETS["gnss"]]))
+    weighting = Isolated(Instruments([SHEETS["gnss"]]))
     for epoch in range(1, 8):
         f = factors(along(np.full(epoch, 40.0)), iteration=0)
         weighting.weigh(f)
