@@ -40,6 +40,6 @@ def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | 
 
 
 def _note(row: TrackRow) -> str:
-    words = [] if row.ranked else [row.standing]
+    words: list[str] = [] if row.ranked else [row.standing]
     words += [f"{row.failed} failed"] if row.failed else []
     return f"({', '.join(words)})" if words else ""

@@ -112,8 +112,8 @@ def _scores(results: Sequence[Result]) -> dict[str, list[float | None]]:
     """Columns of the scores that any of the runs has."""
     factors = np.array([factor for _, factor in SCORES_SHOWN])
     matrix = factors * score_matrix([r.scores for r in results], [c.key for c, _ in SCORES_SHOWN])
-    known = np.isfinite(matrix).any(axis=0)
-    return {c.key: shorts(matrix[:, k]) for k, (c, _) in enumerate(SCORES_SHOWN) if known[k]}
+    found = {c.key: matrix[:, k] for k, (c, _) in enumerate(SCORES_SHOWN)}
+    return {key: shorts(values) for key, values in found.items() if np.isfinite(values).any()}
 
 
 def estimator_data(

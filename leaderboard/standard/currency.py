@@ -103,7 +103,8 @@ def outdated(folder: str | os.PathLike[str], without: Collection[tuple[str, str]
     now, scores = scoring_code(), set[str]()
     for text in {r.scoring for r in results if r.scores or r.scoring != "{}"}:
         scores |= _changed(text, now)
-    return Outdated(*(tuple(sorted(names)) for names in (found["row"], found["scenario"], scores, found["gone"])))
+    rows, scenarios, gone = (tuple(sorted(found[change])) for change in ("row", "scenario", "gone"))
+    return Outdated(rows, scenarios, tuple(sorted(scores)), gone)
 
 
 def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:

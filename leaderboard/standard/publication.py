@@ -151,7 +151,7 @@ def _remarks(results: Sequence[Result], without: Collection[tuple[str, str]]) ->
         for scenario, label in sorted(without)
     ]
     tried = [r for r in results if r.tried]
-    if dirty := sum(r.provenance.dirty for r in tried):
+    if dirty := sum(bool(r.provenance.dirty) for r in tried):
         said.append(f"{dirty} runs were computed with changes that no commit holds, so others cannot repeat them")
     if free := sum(r.provenance.confinement in ("", "none") for r in tried):
         said.append(f"{free} runs were computed without confinement")

@@ -28,7 +28,7 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
     """A table of the tracks, and one of the best rows of the main track, as Markdown."""
     known = distinct(r.provenance for r in results)
     commits = (
-        ", ".join(sorted({f"`{p.commit[:12]}`{' with changes' * p.dirty}" for p in known if p.commit}))
+        ", ".join(sorted({f"`{p.commit[:12]}`{' with changes' if p.dirty else ''}" for p in known if p.commit}))
         or "a version without a commit"
     )
     days = sorted({p.date for p in known if p.date})
