@@ -5,7 +5,7 @@ For a state that moves with Phi and Q and is measured with H and R, Jacobians at
     J+ = (Phi J^-1 Phi' + Q)^-1 + H' R^-1 H
 
 which is what a Kalman filter's covariance does on inputs without noise. So the oracle's own filter runs over
-`simnav.simulator.ideal`, which gives it the truth as measured, and its covariance is read.
+`simnav.simulation.simulator.ideal`, which gives it the truth as measured, and its covariance is read.
 
 Kinds, and the oracle that each belongs to:
 
@@ -45,7 +45,7 @@ from simnav.estimators.solvers.oracle import OracleEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.recording import Recording
 from simnav.scenario import Scenario
-from simnav.simulator import ideal
+from simnav.simulation.simulator import ideal
 from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import COMPONENTS, Array
@@ -128,7 +128,7 @@ def bound_of_run(recording: Recording, kind: Kind = "flags", smoothed: bool = Fa
     Parameters
     ----------
     recording : Recording
-        From `simnav.simulator.ideal`.
+        From `simnav.simulation.simulator.ideal`.
     kind : str
         Which bound is computed.
     smoothed : bool

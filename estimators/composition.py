@@ -233,7 +233,7 @@ def _equip(cls: type[Row]) -> None:
     parameters: dict[str, inspect.Parameter] = {}
     owner: dict[str, str] = {}
     hints: dict[str, Any] = {}
-    told: list[tuple[str, str, str]] = []
+    documentation: list[tuple[str, str, str]] = []
     for each in [recipe[name] for name in (*order, "solver")]:
         types, meanings = _hints(each.make), documented(each.make)
         for inner, parameter in each.parameters().items():
@@ -247,10 +247,10 @@ def _equip(cls: type[Row]) -> None:
             if inner in types:
                 hints[name] = types[inner]
             sort, meaning = meanings.get(inner, ("", ""))
-            if told and told[-1][1:] == (sort, meaning):  # documented together
-                told[-1] = f"{told[-1][0]}, {name}", sort, meaning
+            if documentation and documentation[-1][1:] == (sort, meaning):  # documented together
+                documentation[-1] = f"{documentation[-1][0]}, {name}", sort, meaning
             else:
-                told.append((name, sort, meaning))
+                documentation.append((name, sort, meaning))
 
     def __init__(self: Row, **values: Any) -> None:  # noqa: N807 (it becomes the class's)
         for name in values:
@@ -267,9 +267,9 @@ def _equip(cls: type[Row]) -> None:
     __init__.__signature__ = inspect.Signature([own, *parameters.values()])  # type: ignore[attr-defined]
     cls.__init__ = __init__  # type: ignore[assignment]
     text = inspect.cleandoc(vars(cls).get("__doc__") or "")
-    if told:
+    if documentation:
         text += "\n\nParameters\n----------"
-    for names, sort, meaning in told:
+    for names, sort, meaning in documentation:
         text += f"\n{names} : {sort}" if sort else f"\n{names}"
         text += "".join(f"\n    {line}" for line in meaning.splitlines())
     cls.__doc__ = text

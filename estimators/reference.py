@@ -24,7 +24,7 @@ from simnav.scenario import Scenario
 from simnav.scoring import errors
 from simnav.scoring.consistency import nees
 from simnav.scoring.navigation_error import smoothed_errors
-from simnav.simulator import simulate
+from simnav.simulation.simulator import simulate
 from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import Array
@@ -41,6 +41,7 @@ class OracleRun:
     Attributes
     ----------
     seed : int
+        Seed of the run.
     rms, smoothed_rms : float
         Root of the mean over the epochs of the squared horizontal error, in real time and smoothed [m].
     bound, smoothed_bound : float
@@ -66,6 +67,7 @@ def oracle_run(scenario: Scenario, seed: int) -> OracleRun:
     scenario : Scenario
         A simulated one.
     seed : int
+        Seed of the run.
 
     Raises
     ------
@@ -103,6 +105,7 @@ class ReferenceFigure:
     scenario : str
         Its id.
     runs : int
+        Number of runs.
     horizontal_rms : float
         Root of the mean over runs and epochs of the squared horizontal error [m].
     bound : float
@@ -146,6 +149,7 @@ def reference_figure(scenario: Scenario, seeds: Iterable[int]) -> ReferenceFigur
     Parameters
     ----------
     scenario : Scenario
+        A simulated one.
     seeds : iterable of int
         Of the runs; 200 give a standard error of a few per cent.
 

@@ -85,6 +85,7 @@ def results_of(
     Parameters
     ----------
     folder : path
+        Folder that a campaign wrote.
     series : bool
         With the series that charts need; they stay on disk until they are asked for.
     scores : collection of str, optional

@@ -38,6 +38,7 @@ class Submission:
     estimators : tuple of str
         Labels.
     profile : str
+        Name of the profile that was run.
     results, failed : int
         Results in it, and how many of them are failures.
     remarks : tuple of str

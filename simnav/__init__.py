@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from gymnasium.envs.registration import register as _register_env
 from gymnasium.envs.registration import registry as _registry
 
-from simnav.catalogue import headers as _headers
+from simnav.scenario.catalogue import headers as _headers
 
 if TYPE_CHECKING:
     from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv

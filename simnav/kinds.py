@@ -97,7 +97,7 @@ class NavigationPoint(NamedTuple):
 
 
 @kernel()
-def add_error_scalar(positions, cyclic, value, error):  # type: ignore[no-untyped-def]
+def add_error_scalar(positions: int, cyclic: int, value: Array, error: Array) -> None:
     """Add an error to one measurement, in place; as `Kind.add_error`.
 
     Parameters
@@ -119,7 +119,7 @@ def add_error_scalar(positions, cyclic, value, error):  # type: ignore[no-untype
 
 
 @kernel("void(i8, i8, f8[:, ::1], f8[:, ::1])")
-def _add_errors(positions, cyclic, values, errors):  # type: ignore[no-untyped-def]
+def _add_errors(positions: int, cyclic: int, values: Array, errors: Array) -> None:
     """`add_error_scalar` for n measurements."""
     for i in range(values.shape[0]):
         add_error_scalar(positions, cyclic, values[i], errors[i])

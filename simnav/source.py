@@ -68,7 +68,7 @@ def open_source(scenario: Scenario, seed: int) -> Source:
         from simnav.log.source import LogSource
 
         return LogSource(scenario, seed)
-    from simnav.simulator import Simulator
+    from simnav.simulation.simulator import Simulator
 
     return Simulator(scenario, seed)
 

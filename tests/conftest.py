@@ -30,12 +30,10 @@ os.environ.pop("COLUMNS", None)
 def clean_registry():
     """Names that a test registers, and what it does to the import path, are gone for the others of the process."""
     names()
-    before, path = (dict(registry._classes), dict(registry._aliases)), list(sys.path)
+    before, path = registry.snapshot(), list(sys.path)
     yield
     sys.path[:] = path
-    for now, then in zip((registry._classes, registry._aliases), before, strict=True):
-        now.clear()
-        now.update(then)
+    registry.restore(before)
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ def test_a_folder_of_the_users_own_with_one_of_our_names(tmp_path: Path, name: s
     code = (
         f"import {name}, simnav.{name}\n"
         f"assert {name}.MINE and not hasattr(simnav.{name}, 'MINE')\n"
-        "from simnav.catalogue import headers\n"
+        "from simnav.scenario.catalogue import headers\n"
         "from simnav.estimator import names\n"
         "assert 'ekf' in names() and 'open-sea-v1' in {h.id for h in headers()}\n"
         "from simnav.leaderboard.cli import main\n"

@@ -9,8 +9,9 @@ from __future__ import annotations
 from math import exp, log, log1p, log10, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
 
@@ -21,7 +22,7 @@ MEMORY_COLUMNS = 6
 
 
 @kernel("void(f8[:, ::1], f8, f8[:, ::1], f8[:, :, ::1], f8[::1])")
-def set_scales(actions, largest, setting, scale, process_scale):  # type: ignore[no-untyped-def]
+def set_scales(actions: Array, largest: float, setting: Array, scale: Array, process_scale: Array) -> None:
     """Factors on the sigmas from logarithms in [-1, 1], in units of that of the largest factor; clipped.
 
     Parameters
@@ -33,6 +34,7 @@ def set_scales(actions, largest, setting, scale, process_scale):  # type: ignore
     setting : (b, p) array
         Overwritten with the logarithms of the instruments.
     scale : (b, p, k) array
+        Overwritten with the factors on the sigmas of the k components of each instrument.
     process_scale : (b,) array
         Overwritten.
     """
@@ -48,7 +50,7 @@ def set_scales(actions, largest, setting, scale, process_scale):  # type: ignore
 
 
 @kernel()
-def _clipped(value):  # type: ignore[no-untyped-def]
+def _clipped(value: float) -> float:
     return min(max(value, -LIMIT), LIMIT)
 
 
@@ -57,10 +59,12 @@ def _clipped(value):  # type: ignore[no-untyped-def]
     "i8[::1], i8[::1], f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, b1[::1], "
     "f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f4[:, ::1])"
 )
-def observe(  # type: ignore[no-untyped-def]
-    transition, moves, instrument, time, size, innovation, jacobian, noise, correction,
-    first, last, end, context, place, period, most, active, covariance, delta, memory, observation,
-):  # fmt: skip
+def observe(
+    transition: Array, moves: Flags, instrument: Integers, time: Array, size: Integers, innovation: Array,
+    jacobian: Array, noise: Array, correction: Array, first: Integers, last: Integers, end: Array, context: Array,
+    place: Integers, period: Array, most: int, active: Flags, covariance: Array, delta: Array, memory: Array,
+    observation: NDArray[np.float32],
+) -> None:  # fmt: skip
     """What an agent sees before it decides on the step that lies ahead (`simnav.estimators.learning.features`).
 
     The innovations are those that the filter would see if it used none of the step's measurements.
@@ -183,7 +187,9 @@ def observe(  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _propagate(P, delta, transition, process_noise, factor, A, B, T):  # type: ignore[no-untyped-def]
+def _propagate(
+    P: Array, delta: Array, transition: Array, process_noise: Array, factor: float, A: Array, B: Array, T: Array
+) -> None:
     """``delta = Phi delta``, ``P = Phi P Phi' + factor Q`` in place; A, B, T are (n, n) work space."""
     n = delta.size
     for i in range(n):
@@ -219,10 +225,11 @@ def _propagate(P, delta, transition, process_noise, factor, A, B, T):  # type: i
     "void(f8[:, :, ::1], f8[:, :, ::1], b1[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], "
     "f8[:, ::1], i8[::1], i8[::1], i8[::1], b1[::1], f8[:, :, ::1], f8[::1], f8[:, :, ::1], f8[:, ::1])"
 )
-def take(  # type: ignore[no-untyped-def]
-    transition, process_noise, moves, instrument, size, innovation, jacobian, noise, correction,
-    first, last, place, active, scale, process_scale, covariance, delta,
-):  # fmt: skip
+def take(
+    transition: Array, process_noise: Array, moves: Flags, instrument: Integers, size: Integers, innovation: Array,
+    jacobian: Array, noise: Array, correction: Array, first: Integers, last: Integers, place: Integers, active: Flags,
+    scale: Array, process_scale: Array, covariance: Array, delta: Array,
+) -> None:  # fmt: skip
     """Take each filter of a bank through its step, with the noise that its agent has set.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What an agent is worth on voyages that it has not seen, beside the plain filter, chance and the oracle."""
+"""What an agent is worth on voyages that it has not seen, beside the plain filter and the oracle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from simnav.estimators.learning.vector import FilterTaskVectorEnv
 from simnav.scenario import Scenario
 from simnav.types import Array
 
-__all__ = ["Agent", "Worth", "by_chance", "interval", "plain", "scoring_envs", "worth"]
+__all__ = ["Agent", "Worth", "interval", "plain", "scoring_envs", "worth"]
 
 #: From (b, o) observations to (b, ...) actions.
 Agent = Callable[[Numbers], Numbers]
@@ -37,12 +37,6 @@ def plain(envs: FilterTaskVectorEnv) -> Agent:
     return lambda observation: np.zeros(shape or (), dtype)
 
 
-def by_chance(envs: FilterTaskVectorEnv, seed: int = 0) -> Agent:
-    """The agent that draws its actions."""
-    envs.action_space.seed(seed)
-    return lambda observation: np.asarray(envs.action_space.sample())
-
-
 def scoring_envs(
     scenario: Scenario | str | Path, seeds: Sequence[int], task: str = "Tuning", **options: object
 ) -> FilterTaskVectorEnv:
@@ -62,7 +56,9 @@ def worth(envs: FilterTaskVectorEnv, seeds: Sequence[int], agent: Agent) -> Wort
     envs : FilterTaskVectorEnv
         Of `scoring_envs`.
     seeds : sequence of int
+        Seed of each voyage, one for each environment.
     agent : callable
+        From the observations to the actions of all environments.
     """
     observation, _ = envs.reset(seed=list(seeds))
     n = envs.num_envs

@@ -94,6 +94,7 @@ class Context:
     Parameters
     ----------
     start : InitialState
+        What the filter is told at the start of the voyage.
     step : float
         Length of a step [s].
     """

@@ -117,7 +117,9 @@ class Filters:
     Parameters
     ----------
     task : Task
+        What the agents decide on.
     layout : Layout
+        Which instruments they see, and at which place.
     reward : str
         One of the task's.
     b, n : int

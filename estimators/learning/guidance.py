@@ -51,8 +51,8 @@ from simnav.estimators.learning.guidance_kernels import ASIDE, LARGEST_TURN, SIZ
 from simnav.estimators.learning.navigators import Navigators
 from simnav.estimators.learning.routes import Routes
 from simnav.scenario import Scenario, load
-from simnav.simulator import Simulator
-from simnav.steps import SteppedRuns
+from simnav.simulation.simulator import Simulator
+from simnav.simulation.steps import SteppedRuns
 from simnav.types import KINDS, Array
 from simnav.world import Vessel, motion
 
@@ -139,13 +139,16 @@ class GuidedVoyages:
     Parameters
     ----------
     options : GuidanceOptions
+        Scenario, route and navigator of the voyages.
     navigators : list of Estimator, optional
         One of each voyage's own; by default the plain filter.
 
     Attributes
     ----------
     runs : SteppedRuns
+        World, instruments and faults of the voyages.
     navigators : Navigators
+        The plain filters of the voyages.
     observation : (n, 16) float32 array
         What the agents saw last.
     aside : (n,) array
@@ -240,6 +243,7 @@ class GuidanceEnv(ChartedEnv[Numbers, Numbers]):
     scenario, route, half_width, navigator, steps, voyages, reveal_truth
         As of `GuidanceOptions`.
     render_mode : {"human", "rgb_array"}, optional
+        As of `NavigationEnv`.
 
     Notes
     -----
@@ -335,7 +339,7 @@ class LineOfSight:
     Parameters
     ----------
     lookahead : float
-        [m].
+        Distance along the track of the point that is steered for [m].
     """
 
     def __init__(self, lookahead: float = 60.0):

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from math import atan2, cos, exp, hypot, inf, log1p, log10, pi, radians, sin
 
-from simnav.compiled import kernel
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.estimators.learning.features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 from simnav.geometry.rotation import wrap_scalar
 
@@ -28,9 +31,10 @@ BEHIND, AHEAD = 20, 120
     "void(b1[::1], f8[:, ::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], "
     "f8[::1], f8[::1], f8[::1], f8[::1])"
 )
-def steer(  # type: ignore[no-untyped-def]
-    active, actions, at, ahead, route, length, points, truth, estimate, planned, wrong, heading, speed
-):
+def steer(
+    active: Flags, actions: Array, at: Integers, ahead: Integers, route: Integers, length: Integers, points: Array,
+    truth: Array, estimate: Array, planned: Array, wrong: Array, heading: Array, speed: Array,
+) -> None:  # fmt: skip
     """What the agents' actions mean for the vessels.
 
     Parameters
@@ -62,7 +66,9 @@ def steer(  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _place(latitude, longitude, at, length, geodetic, course, along):  # type: ignore[no-untyped-def]
+def _place(
+    latitude: float, longitude: float, at: int, length: int, geodetic: Array, course: Array, along: Array
+) -> tuple[int, float, float]:
     """Nearest point within two minutes of one, the distance to starboard [m], and how far along [m]."""
     low, high = max(at - BEHIND, 0), min(at + AHEAD, length)
     least, north, east = inf, 0.0, 0.0
@@ -80,10 +86,11 @@ def _place(latitude, longitude, at, length, geodetic, course, along):  # type: i
     "void(b1[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], "
     "b1[::1], i8, f8, i8[::1], f8[:, ::1], f8[::1], f8[::1], b1[::1])"
 )
-def judge(  # type: ignore[no-untyped-def]
-    active, step, planned, speed, truth, route, length, geodetic, course, along,
-    last, code, half_width, at, tally, aside, rewards, aground,
-):  # fmt: skip
+def judge(
+    active: Flags, step: Array, planned: Array, speed: Array, truth: Array, route: Integers, length: Integers,
+    geodetic: Array, course: Array, along: Array, last: Flags, code: int, half_width: float, at: Integers,
+    tally: Array, aside: Array, rewards: Array, aground: Flags,
+) -> None:  # fmt: skip
     """What a step was worth.
 
     Parameters
@@ -138,13 +145,13 @@ def judge(  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _sigma(variance, unit):  # type: ignore[no-untyped-def]
+def _sigma(variance: float, unit: float) -> float:
     """Decimal logarithm of a sigma in a unit."""
     return 0.5 * log10(max(variance, 1e-18)) - log10(unit)
 
 
 @kernel()
-def _number(value):  # type: ignore[no-untyped-def]
+def _number(value: float) -> float:
     return min(max(value, -LIMIT), LIMIT) if value == value else 0.0
 
 
@@ -153,10 +160,12 @@ def _number(value):  # type: ignore[no-untyped-def]
     "i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, "
     "i8[::1], f8[:, ::1], f8[:, ::1], f4[:, ::1])"
 )
-def look(  # type: ignore[no-untyped-def]
-    active, now, step, estimate, variance, begun, count, who, when, fix, route, length, points, geodetic, course, along,
-    half_width, at, notes, start, observation,
-):  # fmt: skip
+def look(
+    active: Flags, now: Array, step: Array, estimate: Array, variance: Array, begun: Integers, count: Integers,
+    who: Integers, when: Array, fix: Flags, route: Integers, length: Integers, points: Array, geodetic: Array,
+    course: Array, along: Array, half_width: float, at: Integers, notes: Array, start: Array,
+    observation: NDArray[np.float32],
+) -> None:  # fmt: skip
     """What the agents see.
 
     Parameters
@@ -172,7 +181,7 @@ def look(  # type: ignore[no-untyped-def]
     begun : (b,) int array
         0 at the start of a voyage, when there is no step to look back at.
     count, who, when
-        As of `simnav.steps.SteppedRuns`.
+        As of `simnav.simulation.steps.SteppedRuns`.
     fix : (b, i) bool array
         Which instruments give a position.
     half_width : float

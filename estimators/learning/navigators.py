@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import Flags, Integers, kernel
 from simnav.estimator import Estimator
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_update import assimilate_inertial
@@ -26,7 +26,7 @@ from simnav.estimators.models.propagation import (
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.admission import LATE
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.steps import SteppedRuns
+from simnav.simulation.steps import SteppedRuns
 from simnav.types import Array, Estimate, InitialState, Instruments
 
 __all__ = ["Navigators", "navigate"]
@@ -141,11 +141,13 @@ class Navigators:
     "f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
     "f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
 )
-def navigate(  # type: ignore[no-untyped-def]
-    active, until, count, who, when, value, samples, imu_time, imu_interval, rate, force, size, codes, arms, noises,
-    limits, used, now, position, velocity, dcm, memory, bias, turn, clock, sensors, calibration, decay, density,
-    covariance, estimate, spread,
-):  # fmt: skip
+def navigate(
+    active: Flags, until: Array, count: Integers, who: Integers, when: Array, value: Array, samples: Integers,
+    imu_time: Array, imu_interval: Array, rate: Array, force: Array, size: Integers, codes: Integers, arms: Array,
+    noises: Array, limits: Array, used: Array, now: Array, position: Array, velocity: Array, dcm: Array, memory: Array,
+    bias: Array, turn: Array, clock: Array, sensors: Array, calibration: Array, decay: Array, density: Array,
+    covariance: Array, estimate: Array, spread: Array,
+) -> None:  # fmt: skip
     """One step of many inertial filters: each propagated to its measurements, and corrected by them.
 
     Parameters
@@ -155,7 +157,7 @@ def navigate(  # type: ignore[no-untyped-def]
     until : (b,) array
         End of each step [s].
     count, who, when, value, samples, imu_time, imu_interval, rate, force
-        As of `simnav.steps.SteppedRuns`.
+        As of `simnav.simulation.steps.SteppedRuns`.
     size : (b,) int array
         States of each.
     codes, arms, noises, limits : (b, i, ...) arrays

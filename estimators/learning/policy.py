@@ -41,6 +41,7 @@ def record_of_training(scenario: Scenario | str, voyages: int, **more: Any) -> d
     Parameters
     ----------
     scenario : Scenario or str
+        Scenario of the training voyages, or its name.
     voyages : int
         How many.
     **more

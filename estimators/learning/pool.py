@@ -21,6 +21,7 @@ class Pool:
     Parameters
     ----------
     options : TaskOptions
+        Scenario and task of the voyages.
     capacity : int
         Most voyages.
 
@@ -35,6 +36,7 @@ class Pool:
     end, context, error, oracle : (capacity, S, ...) arrays
         As of `simnav.estimators.learning.voyage.Prepared`.
     faulty : (e,) bool array
+        Whether a fault touches the measurement of each event.
     start : list of InitialState
         What a navigator is told at the start of each.
     instruments : list of Instruments

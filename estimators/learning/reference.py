@@ -22,7 +22,7 @@ import numpy as np
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
+from simnav.types import Array, Estimate, Flags, InitialState, Instruments, Integers, Measurement, Measurements
 
 __all__ = ["LARGEST_MEASUREMENT", "Linear", "ReferenceFilter"]
 
@@ -57,10 +57,10 @@ class Linear(NamedTuple):
 
     transition: Array
     process_noise: Array
-    moves: Array
-    instrument: Array
+    moves: Flags
+    instrument: Integers
     time: Array
-    size: Array
+    size: Integers
     innovation: Array
     jacobian: Array
     noise: Array

@@ -25,7 +25,7 @@ from math import log, sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import Array, Flags, Integers, kernel
 
 __all__ = ["NEED_ORACLE", "REWARDS", "reward"]
 
@@ -39,9 +39,11 @@ NEED_ORACLE = ("error", "gain")
     "void(i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[::1], i8[::1], b1[::1], i8[::1], b1[::1], "
     "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
 )
-def reward(  # type: ignore[no-untyped-def]
-    code, error, oracle, action, first, last, instrument, size, faulty, place, active, scale, covariance, delta, rewards
-):
+def reward(
+    code: int, error: Array, oracle: Array, action: Array, first: Integers, last: Integers, instrument: Integers,
+    size: Integers, faulty: Flags, place: Integers, active: Flags, scale: Array, covariance: Array, delta: Array,
+    rewards: Array,
+) -> None:  # fmt: skip
     """What each filter's step was worth; 0 where the truth is not known.
 
     Parameters

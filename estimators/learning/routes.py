@@ -20,6 +20,7 @@ class Routes:
     Parameters
     ----------
     n : int
+        Number of voyages.
 
     Attributes
     ----------

@@ -42,7 +42,9 @@ class Voyage:
     Parameters
     ----------
     scenario : Scenario
+        What is sailed.
     seed : int
+        Seed of the run.
     names : list of str
         The instruments, as the events are to number them (`ReferenceFilter`).
     steps : int, optional
@@ -53,6 +55,7 @@ class Voyage:
     Attributes
     ----------
     recording : Recording
+        The whole run.
     filter : ReferenceFilter
         As of the end of the step; ``filter.linear`` are the events in it.
     step : int
@@ -153,14 +156,14 @@ def prepare(
     faulty, edges, ends, contexts, errors, oracles = [], [0], [], [], [], []
     while voyage.advance():
         count = voyage.filter.count
-        parts.append(Linear(*(array[:count].copy() for array in voyage.filter.linear)))
+        parts.append(Linear._make(array[:count].copy() for array in voyage.filter.linear))
         faulty.append(voyage.faulty)
         edges.append(edges[-1] + count)
         ends.append(voyage.estimate.time)
         contexts.append(voyage.context)
         errors.append(voyage.error)
         oracles.append(voyage.oracle)
-    linear = Linear(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    linear = Linear._make(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     assert linear.transition.shape[1] == n
     return Prepared(
         linear, np.array(edges), np.array(ends), np.stack(contexts), np.stack(errors), np.stack(oracles),

@@ -224,7 +224,7 @@ def gauss_markov(
         Stationary sigma [x] and correlation time [s] of the in-run bias; where the time is infinite it is a random walk
         of ``instability`` per sqrt(s).
     rate_random_walk : float
-        [x/sqrt(s)].
+        Density of the random walk of the bias [x/sqrt(s)].
     shortest : float
         A correlation time below this [s] is white noise of the same density at low frequency, 2 s^2 tau.
     """

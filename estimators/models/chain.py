@@ -93,6 +93,7 @@ def add_motion_noise(
     row : (M,) int array
         Of each aid among the folds; -1 for those that are not folded.
     components : (M,) int array
+        Number of components of each measurement.
     jacobian : (M, 3, n) array
         H, with respect to the state at the fold.
     motion_noise : (K, n, n) array
@@ -480,10 +481,10 @@ class Chain(ABC):
         """
 
     def turned(self, covariance: Array, shift: Array) -> Array:
-        """A covariance about a state, about another that is away by a (n,) shift; a hook, as `less`."""
+        """A covariance about a state, about another that is away by a (n,) shift; a hook, as `relative_shift`."""
         return covariance
 
-    def less(self, shift: Array, step: Array) -> Array:
+    def relative_shift(self, shift: Array, step: Array) -> Array:
         """A (n,) shift as seen from where a step leads; a hook for those whose errors do not simply subtract."""
         return shift - step
 

@@ -146,7 +146,7 @@ def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1])")
-def _less(shift: Array, step: Array, out: Array) -> None:
+def _relative_shift(shift: Array, step: Array, out: Array) -> None:
     """A shift as seen from where a step leads: rotations compose."""
     for j in range(shift.size):
         out[j] = shift[j] - step[j]
@@ -189,7 +189,7 @@ def _linearise_motion(
     moved = np.empty(n)
     for k in range(first, count):
         _move(transition[k], begin_shift[k], moved, jacobian[k])
-        _less(end_shift[k], moved, residual[k])
+        _relative_shift(end_shift[k], moved, residual[k])
 
 
 @kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -208,7 +208,7 @@ def _along_motion(
         _add(along[k], begin_shift[k], shift)
         _move(transition[k], shift, moved, J)
         _add(error, moved, shift)
-        _less(shift, end_shift[k], along[k + 1])
+        _relative_shift(shift, end_shift[k], along[k + 1])
 
 
 @kernel(
@@ -361,7 +361,7 @@ class InertialChain(Chain):
         )  # fmt: skip
         if len(self.folds):
             _retract_folds(step, self.folds["node"], self.base, self.folds["shift"])
-        self.prior_shift = self.less(self.prior_shift, step[0])
+        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
 
     def along_motion(self, step: Array) -> Array:
         """As `Chain.along_motion`."""
@@ -377,10 +377,10 @@ class InertialChain(Chain):
         _turn_covariance(covariance, shift, turned)
         return turned
 
-    def less(self, shift: Array, step: Array) -> Array:
+    def relative_shift(self, shift: Array, step: Array) -> Array:
         """Rotations compose."""
         rest = np.empty_like(shift)
-        _less(shift, step, rest)
+        _relative_shift(shift, step, rest)
         return rest
 
 

@@ -192,7 +192,7 @@ class ShipChain(Chain):
     def retract(self, step: Array) -> None:
         """As `Chain.retract`; the motion factors need no shifts."""
         _retract(step, self.nodes["position"], self.nodes["x"])
-        self.prior_shift = self.less(self.prior_shift, step[0])
+        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
 
     def along_motion(self, step: Array) -> Array:
         """As `Chain.along_motion`."""

@@ -143,7 +143,7 @@ def advance_ship(
     turn_time : float
         Correlation time of the turn rate [s].
     elapsed : float
-        [s].
+        Length of the step [s].
     """
     n = x.size
     steps, dt, turning = steps_of(elapsed, turn_time)

@@ -339,9 +339,9 @@ class BatchEstimator(FixedLagEstimator):
 
     def _keep(self, step: _Step, found: Any) -> None:
         self._factors.push_back(step.motions)
-        begun = self._factors.size()
+        first = self._factors.size()
         self._factors.push_back(step.aids)
-        self._aiding += range(begun, self._factors.size())
+        self._aiding += range(first, self._factors.size())
         self._observed += step.observed
         self._start.insert_or_assign(found)
 

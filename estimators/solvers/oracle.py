@@ -33,7 +33,7 @@ from simnav.types import (
 __all__ = ["OracleEstimator"]
 
 #: All but roll and pitch, of which it is told where there is no IMU.
-NOT_TOLD = np.array([True, True, True, True, True, True, False, False, True])
+ESTIMATED = np.array([True, True, True, True, True, True, False, False, True])
 
 
 class OracleEstimator(KalmanEstimator):
@@ -125,5 +125,5 @@ class OracleEstimator(KalmanEstimator):
             imu = replace(imu, angular_rate=imu.angular_rate - e[:, :3], specific_force=imu.specific_force - e[:, 3:])
         estimate = super().update(Measurements(measurements.start, measurements.time, imu, aids))
         if self._motion is not None:
-            estimate.estimated = NOT_TOLD
+            estimate.estimated = ESTIMATED
         return estimate

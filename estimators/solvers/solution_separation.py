@@ -39,7 +39,7 @@ bounds the error whatever single instrument is wrong, but for a risk that is sha
 ``protection_level`` [m].
 
 **Horizon.** A sub-filter without GNSS grows less certain for ever, until it tests nothing. Sub-filters are therefore
-begun anew from the main filter: there are two for each instrument, the elder ``horizon / 2`` to ``horizon`` seconds
+started anew from the main filter: there are two for each instrument, the elder ``horizon / 2`` to ``horizon`` seconds
 old. So a fault that grows more slowly than the dead reckoning of that time is followed, and the protection level covers
 faults that began after the elder sub-filters. After an exclusion all of them are new.
 
@@ -153,11 +153,11 @@ class _Watched(KalmanEstimator):
 
 @dataclass
 class _Without:
-    """A sub-filter: the instrument that it does without, when it was begun, and its estimate."""
+    """A sub-filter: the instrument that it does without, when it started, and its estimate."""
 
     name: str
     filter: _Watched
-    begun: float
+    start: float
     estimate: Estimate | None = None
 
 
@@ -174,7 +174,7 @@ class SolutionSeparation(Solver):
     false_alarm : float
         Probability of each test to fail where nothing is wrong, in (0, 1).
     horizon : float
-        Age at which a sub-filter is begun anew [s].
+        Age at which a sub-filter is started anew [s].
     recovery : float
         Time for which an excluded instrument must agree before it is used again [s].
     risk : float
@@ -226,7 +226,7 @@ class SolutionSeparation(Solver):
         self._components = {name: len(KINDS[instruments[name].kind].errors) for name in self._names}
         self._pairs = {name: [_Without(name, self._filter(), start.time) for _ in range(2)] for name in self._names}
         for _, younger in self._pairs.values():
-            younger.begun = start.time - 0.5 * self.horizon  # so that the two come of age in turns
+            younger.start = start.time - 0.5 * self.horizon  # so that the two come of age in turns
         tests = max(len(self._names), 1) * len(_TESTED)
         hypotheses = len(self._names) + 1
         self._threshold = float(norm.isf(0.5 * self.false_alarm / tests))
@@ -285,9 +285,9 @@ class SolutionSeparation(Solver):
         most = max(ratios.values(), default=0.0)
         diagnostics = dict(estimate.diagnostics)
         if most > 1.0:
-            guilty = self._guilty([name for name, ratio in ratios.items() if ratio > _SUSPECT * most], ratios)
-            estimate = self._exclude(guilty)
-            flagged += [(guilty, m.time) for m in measurements.aids if m.instrument == guilty]
+            faulty = self._most_probable([name for name, ratio in ratios.items() if ratio > _SUSPECT * most], ratios)
+            estimate = self._exclude(faulty)
+            flagged += [(faulty, m.time) for m in measurements.aids if m.instrument == faulty]
         self._readmit(measurements.time)
         self._renew(measurements.time)
         diagnostics["protection_level"] = self._protection_level(estimate)
@@ -303,7 +303,7 @@ class SolutionSeparation(Solver):
         means = sub.filter.mean_nis.items()
         return max((v / max(usual.get(n, 1.0), 1.0) for n, v in means if n != sub.name and n not in out), default=1.0)
 
-    def _guilty(self, suspects: list[str], ratios: Mapping[str, float]) -> str:
+    def _most_probable(self, suspects: list[str], ratios: Mapping[str, float]) -> str:
         """Of the suspects and the instruments on probation, the one to exclude."""
         probation = {
             name for name, since in self._readmitted.items() if self._time - since < self.horizon and name in ratios
@@ -315,7 +315,7 @@ class SolutionSeparation(Solver):
         return min(tied, key=lambda n: (n not in probation, not self._group.get(n, False), -ratios[n]))
 
     def _elder(self, name: str) -> _Without:
-        return min(self._pairs[name], key=lambda sub: sub.begun)
+        return min(self._pairs[name], key=lambda sub: sub.start)
 
     def _sigmas(self, sub: _Without, estimate: Estimate) -> tuple[Array, Array]:
         """Variances of a sub-filter's nine components, and of its separation."""
@@ -390,14 +390,14 @@ class SolutionSeparation(Solver):
         """Begin sub-filters anew that have come of age."""
         for name in self._names:
             for sub in self._pairs[name]:
-                if time - sub.begun >= self.horizon and name not in self._exclusion.excluded:
+                if time - sub.start >= self.horizon and name not in self._exclusion.excluded:
                     self._begin(sub, time, None)
-        self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.begun < 2.0 * self.horizon}
+        self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.start < 2.0 * self.horizon}
 
     def _begin(self, sub: _Without, time: float, estimate: Estimate | None) -> None:
         """Begin a sub-filter from the main filter's state."""
         sub.filter.take_over(self._main)
-        sub.begun = time
+        sub.start = time
         sub.estimate = estimate if estimate is not None else self._main.model.estimate(self._main.covariance)
 
     def _protection_level(self, estimate: Estimate) -> float:

@@ -458,7 +458,7 @@ class WindowEstimator(Solver):
         if leaving:
             step = chain.nodes["step"][leaving].copy()
             mean = chain.nodes["predicted_shift"][leaving] + step
-            chain.set_prior(chain.turned(chain.nodes["predicted"][leaving], mean), chain.less(mean, step))
+            chain.set_prior(chain.turned(chain.nodes["predicted"][leaving], mean), chain.relative_shift(mean, step))
             chain.drop(leaving)
             self._eliminated -= leaving
 

@@ -36,8 +36,11 @@ def try_estimator(
         One of simnav's own references runs in a fork of this process, which has the recording; so does anyone under the
         confinement ``none``.
     recording : Recording
+        The run, with its truth and labels.
     limits : Limits
+        Time and memory that it may take.
     confinement : {"bubblewrap", "process", "none"}
+        What separates it from the recording (`simnav.leaderboard.campaign.confinement`).
     hidden : sequence of Path
         What it must not read.
     sealed : bool

@@ -24,7 +24,9 @@ class Entrant:
     name : str
         Registered name or absolute path.
     parameters : mapping
+        Parameters of its constructor that are set, by name.
     label : str
+        What results call it.
     reference : bool
         One of simnav's own references: it is told the truth.
     source : str

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["digest", "estimator_source", "named_files", "recording_digest", "simulator_version", "variant"]
 
 #: What makes recordings, and what runs an estimator over them: the imports are followed from here.
-SIMULATOR = ("simnav.source", "simnav.simulator", "simnav.log.source", "simnav.sensors")
+SIMULATOR = ("simnav.source", "simnav.simulation.simulator", "simnav.log.source", "simnav.sensors")
 RUNNER = ("simnav.trial",)
 
 

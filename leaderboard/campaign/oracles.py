@@ -27,7 +27,9 @@ def beside_oracles(
     Parameters
     ----------
     scenarios : sequence of Scenario
+        Of the campaign.
     everyone : sequence of EstimatorRequest
+        The estimators of the campaign.
 
     Yields
     ------

@@ -38,7 +38,9 @@ def record_within(scenario: Scenario, seed: int, seconds: float) -> Recording:
     Parameters
     ----------
     scenario : Scenario
+        What is recorded.
     seed : int
+        Seed of the run.
     seconds : float
         Wall-clock time that it may take [s].
 

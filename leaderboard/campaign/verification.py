@@ -32,6 +32,7 @@ class Verification:
     Attributes
     ----------
     folder : str
+        Folder of the results.
     results : int
         In the folder.
     seal : str

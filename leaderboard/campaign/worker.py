@@ -141,7 +141,7 @@ def _load(estimators: bool) -> None:
     from simnav.compiled import kernels
     from simnav.estimator.registry import discover_own
 
-    importlib.import_module("simnav.simulator")
+    importlib.import_module("simnav.simulation.simulator")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         discover_own()

@@ -16,7 +16,7 @@ from simnav.leaderboard.ranking import tables
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from simnav.catalogue import Header
+    from simnav.scenario.catalogue import Header
     from simnav.spec import Spec
 
 __all__ = ["command", "estimators", "faults", "instruments", "scenarios"]
@@ -98,7 +98,7 @@ class KindItem:
 
 def scenarios() -> list[ScenarioItem]:
     """Every scenario of every pack, by track and group."""
-    from simnav.catalogue import headers
+    from simnav.scenario.catalogue import headers
 
     return [
         ScenarioItem(h.name, h.id, h.title, h.duration, h.tags, h.track, h.group, f"simnav:{h.gym_id}", str(h.path))

@@ -42,9 +42,9 @@ def write_estimator(name: str, output: Path | None = None) -> tuple[str, Path]:
     """
     from jinja2 import Environment
 
-    from simnav.catalogue import headers
     from simnav.estimator import names
     from simnav.leaderboard.campaign.request import kebab as to_kebab
+    from simnav.scenario.catalogue import headers
 
     kebab = to_kebab(name)
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", kebab) or keyword.iskeyword(kebab):

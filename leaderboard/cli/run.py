@@ -48,14 +48,14 @@ def command(
             report = interface.run(chosen, estimator, seed=seed, parameters=parameters(set_), progress=progress)
         drawn = None
         if plot is not None and any(len(e.trial) for e in report.estimators):
-            from simnav.leaderboard.figures.plots import save
+            from simnav.leaderboard.figures.style import save
 
             drawn = save(report.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
         diagrams = {} if stanford is None else report.stanford(alert_limit)
         shown = None
         if stanford is not None and diagrams:
-            from simnav.leaderboard.figures.plots import save
             from simnav.leaderboard.figures.stanford import stanford_diagrams
+            from simnav.leaderboard.figures.style import save
 
             title = f"{report.recording.scenario}, seed {seed}: alert limit {alert_limit:g} m"
             drawing = stanford_diagrams(diagrams, title=title)

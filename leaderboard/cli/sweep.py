@@ -135,7 +135,7 @@ def _breaking(sweep: Sweep) -> Fitted:
 
 
 def _draw(sweep: Sweep, path: Path) -> Path:
-    from simnav.leaderboard.figures.plots import save
+    from simnav.leaderboard.figures.style import save
 
     with mistakes(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)

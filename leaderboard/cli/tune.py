@@ -62,7 +62,7 @@ def command(
         written = None if output is None else found.write(absolute(output))
         drawn = None
         if plot is not None:
-            from simnav.leaderboard.figures.plots import save
+            from simnav.leaderboard.figures.style import save
 
             drawn = save(found.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
         out.document(found.to_dict() | {"file": None if written is None else str(written)})

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.plots import (
+from simnav.leaderboard.figures.plots import Array, Curve
+from simnav.leaderboard.figures.style import (
     GREY,
     INK,
     PAPER,
-    Array,
-    Curve,
     Style,
     figure,
     legend_below,

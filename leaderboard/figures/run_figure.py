@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simnav.geometry.earth import relative_position
-from simnav.leaderboard.figures.plots import Curve, Style, Track, run_chart
+from simnav.leaderboard.figures.plots import Curve, Track, run_chart
+from simnav.leaderboard.figures.style import Style
 from simnav.scoring import errors
 from simnav.sensors.faults import effect_of
 from simnav.types import KINDS, Array

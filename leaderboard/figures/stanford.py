@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.plots import GREY, INK, PALETTE, SHADE, figure, styled
+from simnav.leaderboard.figures.style import GREY, INK, PALETTE, SHADE, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

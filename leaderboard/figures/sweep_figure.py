@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.plots import GREY, Array, Style, figure, legend_below, plain_log_ticks, styled
+from simnav.leaderboard.figures.plots import Array
+from simnav.leaderboard.figures.style import GREY, Style, figure, legend_below, plain_log_ticks, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,6 +28,7 @@ class Line:
     Attributes
     ----------
     label : str
+        Name of the estimator.
     dial, value, low, high : (n,) array
         The error with its interval; infinite where half of the runs failed.
     """
@@ -59,9 +61,11 @@ def error_against_dial(
     Parameters
     ----------
     lines : sequence of Line
+        One for each estimator.
     across, up : str
         Labels of the axes.
     title : str
+        Title of the figure.
     limit : float, optional
         Drawn as a horizontal line.
     breaks : mapping of str to float

@@ -10,7 +10,7 @@ import numpy as np
 
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.training.hybrid_learning import Learned
-from simnav.leaderboard.figures.plots import GREY, PALETTE, figure, legend_below, save, styled
+from simnav.leaderboard.figures.style import GREY, PALETTE, figure, legend_below, save, styled
 from simnav.types import Array
 
 if TYPE_CHECKING:

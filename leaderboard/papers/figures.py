@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simnav.leaderboard.figures.panels import Bar, bars, curves_over_time
-from simnav.leaderboard.figures.plots import Band, Curve, Style, error_cdf, error_over_time, save, trajectory
+from simnav.leaderboard.figures.plots import Band, Curve, error_cdf, error_over_time, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
+from simnav.leaderboard.figures.style import Style, save
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.papers.paper import Figure, Gain, Range, Value
 from simnav.leaderboard.ranking.runs import Runs

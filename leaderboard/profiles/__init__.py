@@ -25,9 +25,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from simnav.catalogue import headers
 from simnav.estimator import describe, names
 from simnav.leaderboard.results.errors import RequestError
+from simnav.scenario.catalogue import headers
 from simnav.spec import closest
 
 __all__ = ["KEYS", "Part", "Profile", "load", "profiles"]
@@ -69,6 +69,7 @@ class Profile:
     Attributes
     ----------
     name, title : str
+        Name of its file, and one line for tables.
     parts : tuple of Part
         In the order in which they are run.
     """

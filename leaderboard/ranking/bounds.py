@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.figures.panels import curves_over_time
-from simnav.leaderboard.figures.plots import Curve, Style
+from simnav.leaderboard.figures.plots import Curve
+from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.results.frame import frame
 from simnav.types import COMPONENTS, Array

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.panels import Bar, bars
-from simnav.leaderboard.figures.plots import Style
+from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.results.frame import frame

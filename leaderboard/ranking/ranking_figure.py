@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.figures.plots import Dot, Style, dots
+from simnav.leaderboard.figures.plots import Dot, dots
+from simnav.leaderboard.figures.style import Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,6 +22,7 @@ def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | 
     Parameters
     ----------
     track : TrackRanking
+        The ranking that is drawn.
     style : Style, optional
         Colours of the rows.
     most : int, optional

@@ -45,11 +45,13 @@ def measure(
     Parameters
     ----------
     scenarios : sequence of Scenario
+        Those whose reference figures are wanted.
     runs : int
         Seeds a scenario, at most 1000. Of a recorded one each recording is taken once.
     folder : path
         Of the runs; started again, it goes on where it was.
     workers : int
+        Number of processes.
     progress : callable, optional
         Called with the runs of the oracle that are done, how many there will be, and a note.
     found : callable, optional

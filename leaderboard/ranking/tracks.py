@@ -53,7 +53,7 @@ class Track:
 
 def catalogued_tracks() -> dict[str, str]:
     """The track of every scenario of the catalogue, by versioned id."""
-    from simnav.catalogue import headers
+    from simnav.scenario.catalogue import headers
 
     return {h.id: h.track for h in headers()}
 

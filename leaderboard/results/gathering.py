@@ -25,6 +25,7 @@ def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[s
     output : path
         A new or empty folder, or one of results, which are kept.
     folders : iterable of path
+        Folders of results, as campaigns wrote them.
 
     Returns
     -------

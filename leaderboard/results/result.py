@@ -232,7 +232,9 @@ def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | Non
     Parameters
     ----------
     file : file
+        Open for writing bytes.
     tables : iterator of pyarrow.Table
+        Each becomes a row group.
     level : int, optional
         Of the compression.
     split : bool

@@ -73,6 +73,7 @@ def backgrounds(tasks: Sequence[tuple[str, Sequence[int]]], workers: int = 1) ->
     tasks : sequence of (str, sequence of int)
         Versioned ids of scenarios, with the seeds whose recordings are wanted.
     workers : int
+        Number of processes.
     """
     kept = [_kept(*task) for task in tasks]
     missing = [task for task, found in zip(tasks, kept, strict=True) if found is None]

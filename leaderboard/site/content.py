@@ -118,6 +118,7 @@ class SiteFacts:
     total : int
         Results; 0 for a page that stands alone.
     scenarios, estimators : sequence
+        What has a page of its own, in the order of the menus.
     papers : sequence of ExtraPage
         Pages of the comparisons of papers.
     editions : sequence of ExtraPage

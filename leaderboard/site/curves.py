@@ -53,7 +53,7 @@ class Curves:
     Attributes
     ----------
     time : (k,) array
-        [s].
+        Times of the errors [s].
     values : dict of str to (k,) array
         Magnitudes of the errors, SI units; ``level``: protection level [m].
     quantiles : (101,) array or None
@@ -75,6 +75,7 @@ class Gathered:
     Attributes
     ----------
     curves : dict of Result to Curves
+        For the charts over all runs.
     single : dict of Result to dict
         As of `one_run`.
     """

@@ -60,6 +60,7 @@ class EstimatorFacts:
     code : str
         Its declaration.
     parameters : tuple of (name, default, annotation)
+        Parameters of the constructor, as text.
     """
 
     family: str = "Other"
@@ -124,7 +125,7 @@ def catalogued(identity: str) -> Scenario | None:
 
 def toml_of(identity: str) -> str:
     """The file of a scenario of the catalogue; empty where there is none."""
-    from simnav.catalogue import headers
+    from simnav.scenario.catalogue import headers
 
     path = next((h.path for h in headers() if h.id == identity), None)
     try:

@@ -32,6 +32,7 @@ class EditionPage:
     lines : sequence of Line
         Of the edition.
     latest : bool
+        Whether no edition is newer.
     """
 
     number: int

@@ -46,6 +46,7 @@ class Line:
     score, low, high : float
         As in `simnav.leaderboard.ranking.board.Row`.
     runs, failed : int
+        Number of runs on the track, and how many of them failed.
     """
 
     edition: int

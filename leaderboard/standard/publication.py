@@ -38,7 +38,9 @@ class Published:
     edition : int
         Number of the edition.
     results : sequence of Result
+        All results of the edition.
     ranking : Ranking
+        The board that follows from them.
     size : int
         Of the files in the folder [bytes].
     readme : Path or None

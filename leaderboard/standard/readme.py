@@ -64,7 +64,7 @@ def _main(ranking: Ranking) -> TrackRanking | None:
 
 def draw(ranking: Ranking, path: Path) -> Path | None:
     """Draw the picture of the README: the best rows of the main track, and the oracles; None without a ranked row."""
-    from simnav.leaderboard.figures.plots import save
+    from simnav.leaderboard.figures.style import save
     from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 
     main = _main(ranking)

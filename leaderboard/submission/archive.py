@@ -46,6 +46,7 @@ def members(archive: zipfile.ZipFile, what: str) -> list[zipfile.ZipInfo]:
     Parameters
     ----------
     archive : ZipFile
+        Open for reading.
     what : str
         Its name, for messages.
 

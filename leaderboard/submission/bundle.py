@@ -44,7 +44,7 @@ class File(_Part):
     sha256 : str
         Hexadecimal.
     size : int
-        [bytes].
+        Length of the file [bytes].
     """
 
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
@@ -88,6 +88,7 @@ class Contents(_Part):
     main : str
         Name of the Python file, or of the wheel, below ``source/``.
     estimators : tuple of Row
+        The rows that are submitted.
     requires : tuple of str
         Packages that they need beside simnav.
     files : mapping of str to File
@@ -119,6 +120,7 @@ class Bundle:
     digest : str
         SHA-256 of the ZIP file.
     contents : Contents
+        What it says of itself.
     folder : Path
         Where it is unpacked.
     """

@@ -33,13 +33,15 @@ class Wanted:
     Attributes
     ----------
     scenario, label : str
+        Versioned id of the scenario, label of the estimator.
     seeds : list of int
         Numbers of the runs, where they are sealed.
     time_limit : float
-        [s]
+        Time that a run may take [s]; 0 where it is not known.
     memory_limit : int
-        [bytes]
+        Memory that a run may take [bytes]; 0 where it is not known.
     sealed : bool
+        Whether the seeds follow from a key.
     """
 
     scenario: str
@@ -59,10 +61,13 @@ class Asked:
     folder : str
         For results; a new one.
     estimators : list of EstimatorRequest
+        The estimators that are run.
     runs : list of Wanted
+        Their runs.
     key : str
         Of sealed seeds, in hexadecimal.
     confinement : str
+        As of `simnav.leaderboard.interface.campaign`.
     """
 
     folder: str

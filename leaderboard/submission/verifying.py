@@ -47,6 +47,7 @@ class SealedRuns:
     Attributes
     ----------
     label, scenario : str
+        Label of the estimator, versioned id of the scenario.
     public, sealed : int
         Runs of either sort.
     failed : int

@@ -53,6 +53,7 @@ def crossing(dial: Array, error: Array, threshold: float) -> float:
     dial, error : (n,) array
         Ascending values, and the error at each; infinite errors are failures.
     threshold : float
+        Error that is passed.
 
     Examples
     --------

@@ -59,6 +59,7 @@ class Sweep:
     scenario : str
         Versioned id of the scenario whose dials were turned.
     dials : tuple of Dial
+        What was turned, one or two.
     values : tuple of tuple of float
         Of each dial, ascending.
     estimators : tuple of str
@@ -70,6 +71,7 @@ class Sweep:
     results : sequence of Result
         All results of the sweep.
     settings : tuple of Setting
+        Values of the dials, with the scenario that each setting gives.
     summary : Summary
         Of the campaign.
     """

@@ -52,6 +52,7 @@ class Figures:
     Attributes
     ----------
     objective : float
+        What the search minimises.
     ratio : mapping of str to float
         Geometric mean of the error ratios, by family.
     lost : float
@@ -83,9 +84,11 @@ class Voyages:
     Parameters
     ----------
     families : sequence of Scenario
+        Training scenarios.
     seeds : range
         The same for all families.
     progress : callable, optional
+        Called with how many of how many voyages are recorded, and ``note=`` the next.
 
     Raises
     ------

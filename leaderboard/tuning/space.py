@@ -24,7 +24,9 @@ class Range:
     Attributes
     ----------
     name : str
+        Name of the parameter.
     low, high : float
+        Bounds, both included.
     scale : str
         ``linear``, ``log`` (the logarithm is varied) or ``integer``.
     """
@@ -95,6 +97,7 @@ def space_of(request: EstimatorRequest, ranges: Sequence[str | Range]) -> tuple[
     request : EstimatorRequest
         The row; a parameter that it sets holds, and is not varied.
     ranges : sequence of str or Range
+        What is varied; as text, ``"name=low:high"`` with ``:log`` or ``:integer``.
 
     Raises
     ------

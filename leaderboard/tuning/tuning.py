@@ -56,12 +56,15 @@ class Tuning:
     estimator : str
         Label of the row.
     ranges : tuple of Range
+        Parameters that were varied, with their bounds.
     families : mapping of str to str
         Versioned id of each family, and the digest of its content.
     seeds, unseen_seeds : (int, int)
         First and last seed of the voyages for the search, and of those for the comparison.
     method : str
+        How it was searched.
     search_seed : int
+        Seed of the search's own random numbers.
     present, chosen : mapping of str to number
         Parameters before and after.
     before, after : Figures
@@ -175,14 +178,17 @@ def search(
     objective : callable
         Of the parameters by name.
     space : sequence of Range
+        Parameters, with their bounds.
     present : mapping of str to number
         Where the search begins; it is evaluated first.
     evaluations : int
         Most calls of ``objective``; the same parameters are not evaluated twice.
     method : str
+        Method of SciPy.
     seed : int
         Of the search's own random numbers.
     progress : callable, optional
+        Called with how many of how many evaluations are done, and ``note=`` the best so far.
 
     Returns
     -------

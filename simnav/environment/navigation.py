@@ -35,7 +35,7 @@ from simnav.types import KINDS, Array, InitialState
 if TYPE_CHECKING:
     from simnav.environment.rendering import Chart
     from simnav.scenario import Scenario
-    from simnav.steps import SteppedRuns
+    from simnav.simulation.steps import SteppedRuns
 
 __all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action", "most_samples"]
 
@@ -176,7 +176,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
             row = rows_of(truth.position, truth.attitude)[0]
             heading = math.remainder(float(start.attitude[2]) - row[5], math.tau)
             self._source.steer_by(*horizontal(start.position.tolist(), row), heading)
-            from simnav.steps import SteppedRuns
+            from simnav.simulation.steps import SteppedRuns
 
             self._runs = SteppedRuns(1)
             self._runs.begin(0, self._source)

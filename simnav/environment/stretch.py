@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import Integers, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS
 from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
     from simnav.recording import AidStream, Block
-    from simnav.steps import SteppedRuns
+    from simnav.simulation.steps import SteppedRuns
 
 __all__ = ["LiveStretch", "Stretch", "horizontal", "pack", "rows_of"]
 
@@ -60,20 +60,26 @@ class Stretch:
 
 
 @kernel("i8(i8, i8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], i8, f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])")
-def _place(count, who, when, value, place, most, row, time, valid, values):  # type: ignore[no-untyped-def]
+def _place(
+    count: int, who: Integers, when: Array, value: Array, place: Integers, most: Integers, row: int, time: Array,
+    valid: NDArray[np.int8], values: Array,
+) -> int:  # fmt: skip
     """Put the measurements of one step into a row of padded arrays; -1, or the instrument that has too many.
 
     Parameters
     ----------
     count, who, when, value
-        As of `simnav.steps.SteppedRuns`, of one run.
+        As of `simnav.simulation.steps.SteppedRuns`, of one run.
     place, most : (i,) int arrays
         Of each of its instruments: its number in the padded arrays, and room for so many a step.
     row : int
+        Number of the step.
     time, valid, values : (S, A, K), (S, A, K), (S, A, K, 3) arrays
+        Of S steps, A instruments and at most K measurements: times [s], which are there, and values;
+        overwritten.
     """
     for j in range(count):
-        i = who[j]
+        i: int = who[j]
         a = place[i]
         k = 0
         while k < most[i] and valid[row, a, k]:
@@ -193,7 +199,7 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
 
 
 @kernel("void(f8[:, :], f8[:, :], f8[:, ::1])")
-def _rows(position, attitude, out):  # type: ignore[no-untyped-def]
+def _rows(position: Array, attitude: Array, out: Array) -> None:
     for i in range(out.shape[0]):
         s, height = np.sin(position[i, 0]), position[i, 2]
         if height != height:  # a log may have no reference of it

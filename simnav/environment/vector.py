@@ -62,6 +62,7 @@ def seeds_of(seed: int | Sequence[int | None] | None, n: int, independent: bool)
     seed : int or sequence of int, optional
         One integer is ``seed + i`` for run i, or spawns; a sequence assigns them; None in it, or none at all: None.
     n : int
+        Number of runs.
     independent : bool
         Whether an integer spawns (`spawn_seeds`).
 

@@ -69,6 +69,7 @@ def lacking(needs: object, instruments: Instruments) -> str:
     needs : object
         As `checked_needs` takes it.
     instruments : Instruments
+        Those that are there.
 
     Raises
     ------

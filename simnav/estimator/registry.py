@@ -31,6 +31,8 @@ __all__ = [
     "point_of",
     "register",
     "registered",
+    "restore",
+    "snapshot",
 ]
 
 GROUP = "simnav.estimators"
@@ -172,16 +174,27 @@ def _is_ours(point: EntryPoint) -> bool:
     return point.dist is not None and point.dist.name == "simnav"
 
 
+def snapshot() -> tuple[dict[str, type[Estimator]], dict[str, str]]:
+    """What is registered now: classes by name, names by alias; for `restore`."""
+    return dict(_classes), dict(_aliases)
+
+
+def restore(before: tuple[dict[str, type[Estimator]], dict[str, str]]) -> None:
+    """Forget what has been registered since a `snapshot`."""
+    _classes.clear()
+    _aliases.clear()
+    _classes.update(before[0])
+    _aliases.update(before[1])
+
+
 def _load(point: EntryPoint) -> None:
-    before = dict(_classes), dict(_aliases)
+    before = snapshot()
     try:
         loaded = point.load()
         if isinstance(loaded, type) and "name" not in vars(loaded):
             register(point.name)(loaded)
     except (Exception, SystemExit) as error:
-        _classes.clear()
-        _aliases.clear()
-        _classes.update(before[0]), _aliases.update(before[1])
+        restore(before)
         owner = f" of package {point.dist.name!r}" if point.dist is not None else ""
         warnings.warn(
             f"estimator plug-in {point.name!r} ({point.value}){owner} is left out: {type(error).__name__}: {error}",

@@ -74,7 +74,9 @@ def gravity_scalar(sin_latitude: float, height: float) -> float:
 
 
 @kernel()
-def displace_scalar(latitude, longitude, height, north, east, down):  # type: ignore[no-untyped-def]
+def displace_scalar(
+    latitude: float, longitude: float, height: float, north: float, east: float, down: float
+) -> tuple[float, float, float]:
     """`displace` for one position: latitude, longitude [rad] and height [m] after an offset [m]."""
     s = sin(latitude)
     x = 1.0 - ECCENTRICITY_SQUARED * (s * s)

@@ -41,7 +41,7 @@ def wrap_angle(angle: Array | float) -> Array:
 
 
 @kernel()
-def wrap_scalar(angle):  # type: ignore[no-untyped-def]
+def wrap_scalar(angle: float) -> float:
     """`wrap_angle` for one angle."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
 

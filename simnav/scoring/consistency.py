@@ -67,6 +67,7 @@ def nees(error: Array, covariance: Array, components: tuple[int, ...]) -> tuple[
     error : (T, 9) array
         NaN components are left out of the epoch's NEES.
     covariance : (T, 9, 9) array
+        Of the error, as the estimator reports it.
     components : tuple of int
         For example one of `GROUPS`.
 
@@ -106,6 +107,7 @@ def nees_band(degrees: int, runs: int, level: float = 0.95) -> tuple[float, floa
     degrees : int
         Of one NEES.
     runs : int
+        Number of independent runs.
     level : float
         Probability that a consistent estimator falls inside.
 

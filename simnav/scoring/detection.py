@@ -24,6 +24,7 @@ def detection(trial: Trial, recording: Recording) -> dict[str, float]:
     trial : Trial
         Only measurements up to its last epoch count.
     recording : Recording
+        The one that it was run on.
 
     Returns
     -------

@@ -69,6 +69,7 @@ def protection_levels(trial: Trial, risk: float = RISK) -> Array:
     Parameters
     ----------
     trial : Trial
+        What the estimator gave.
     risk : float
         For those from a covariance.
 
@@ -158,6 +159,7 @@ def stanford(runs: Iterable[tuple[Trial, Recording]], limit: float = ALERT_LIMIT
     Parameters
     ----------
     runs : iterable of (Trial, Recording)
+        Trials, each with the recording that it was run on.
     limit : float
         Alert limit [m].
     """

@@ -20,6 +20,7 @@ def errors(trial: Trial, recording: Recording) -> Array:
     Parameters
     ----------
     trial : Trial
+        What the estimator gave.
     recording : Recording
         The one that the trial was run on.
 

@@ -27,6 +27,7 @@ def noise_estimation(trial: Trial, recording: Recording) -> dict[str, float]:
     Parameters
     ----------
     trial : Trial
+        What the estimator gave.
     recording : Recording
         The one that it was run on.
 
@@ -51,7 +52,9 @@ def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Arr
     Parameters
     ----------
     trial : Trial
+        What the estimator gave.
     stream : AidStream
+        Measurements of the instrument, with their true sigmas.
     axis : str
         Name of the component, as in ``KINDS[kind].errors``.
 

@@ -27,6 +27,7 @@ class Outage:
     Attributes
     ----------
     instruments : tuple of str
+        Names of the instruments that were lost.
     start, end : float
         Times of the first measurement that was lost and of the first that came again [s]; ``end`` is infinite where
         none came.
@@ -39,6 +40,7 @@ class Outage:
         recover before the next outage of these instruments or the end of the run, the time until then. NaN where
         no measurement came again.
     recovered : bool
+        Whether the horizontal error came under the threshold again.
     """
 
     instruments: tuple[str, ...]

@@ -25,6 +25,7 @@ def series(trial: Trial, recording: Recording, *, points: int = 500, bins: int =
     Parameters
     ----------
     trial : Trial
+        What the estimator gave.
     recording : Recording
         The one that it was run on.
     points : int

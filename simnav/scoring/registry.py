@@ -38,6 +38,7 @@ class ScoringInput:
     Parameters
     ----------
     trial : Trial
+        What the estimator gave.
     recording : Recording
         The one that the trial was run on, with the truth (``recording.data.truth``) and the labels of its faults.
 
@@ -88,6 +89,7 @@ class Score:
     name : str
         In snake_case.
     title : str
+        One line for tables.
     unit : str
         SI, ``%`` or ``-``.
     better : str or None

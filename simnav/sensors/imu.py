@@ -166,10 +166,11 @@ class ImuSpec(Spec):
     "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, ::1], f8[::1],"
     " f8[:, ::1], i8, f8, f8[:, ::1], i8, f8, f8, f8, f8[::1])"
 )
-def triad_errors(  # type: ignore[no-untyped-def]
-    ideal, variates, out, time, interval, density, matrix, bias,
-    instability, first_i, per_second_i, walk, first_w, per_second_w, limit, step, residual,
-):  # fmt: skip
+def triad_errors(
+    ideal: Array, variates: Array, out: Array, time: Array, interval: Array, density: float, matrix: Array,
+    bias: Array, instability: Array, first_i: int, per_second_i: float, walk: Array, first_w: int, per_second_w: float,
+    limit: float, step: float, residual: Array,
+) -> None:  # fmt: skip
     """Errors of one triad (see the module); ``out`` may be ``ideal``."""
     last_i = len(instability) - 1
     last_w = len(walk) - 1

@@ -1,7 +1,7 @@
 """What the instruments that come with simnav read before bias and noise, as one kernel.
 
-The block form (`Instrument.sense`) and the form that goes step by step (`simnav.steps`) call the same code, so that
-they agree bit for bit.
+The block form (`Instrument.sense`) and the form that goes step by step (`simnav.simulation.steps`) call the same code,
+so that they agree bit for bit.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import Flags, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, displace_scalar
 from simnav.sensors.instrument import AidSpec, Instrument
 from simnav.types import Array, TapStates
@@ -46,7 +46,7 @@ NUMBERS = 24
 
 
 @kernel()
-def _to_ned(roll, pitch, yaw, x, y, z):  # type: ignore[no-untyped-def]
+def _to_ned(roll: float, pitch: float, yaw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """`simnav.sensors.instrument.turn_to_ned` for one vector."""
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
     y, z = cr * y - sr * z, sr * y + cr * z
@@ -55,7 +55,7 @@ def _to_ned(roll, pitch, yaw, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _to_body(roll, pitch, yaw, x, y, z):  # type: ignore[no-untyped-def]
+def _to_body(roll: float, pitch: float, yaw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """`simnav.sensors.instrument.turn_to_body` for one vector."""
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
     x, y = cy * x + sy * y, cy * y - sy * x
@@ -64,7 +64,7 @@ def _to_body(roll, pitch, yaw, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def observe_one(code, q, tap, value):  # type: ignore[no-untyped-def]
+def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     """One reading without bias and noise.
 
     Parameters
@@ -137,21 +137,23 @@ def observe_one(code, q, tap, value):  # type: ignore[no-untyped-def]
         altitude = q[DEPTH_OF_WATER] + tap[2]
         if levered:
             altitude -= d
-        return q[LOWEST] <= altitude <= q[HIGHEST]
+        within: bool = q[LOWEST] <= altitude <= q[HIGHEST]
+        return within
     return True
 
 
 @kernel()
-def noise_scalar(q, value, j):  # type: ignore[no-untyped-def]
+def noise_scalar(q: Array, value: Array, j: int) -> float:
     """Sigma of the white noise of a reading's j-th component, from the reading before bias and noise."""
     if q[SPEED_NOISE_SQUARED] == 0.0:
-        return q[SIGMA + j]
+        sigma: float = q[SIGMA + j]
+        return sigma
     x, y, z = value[0], value[1], value[2]
     return sqrt(q[SIGMA_SQUARED + j] + q[SPEED_NOISE_SQUARED] * (x * x + y * y + z * z))
 
 
 @kernel("void(i8, f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[::1])")
-def observe_rows(code, q, taps, values, sigmas, there):  # type: ignore[no-untyped-def]
+def observe_rows(code: int, q: Array, taps: Array, values: Array, sigmas: Array, there: Flags) -> None:
     """`observe_one` and `noise_scalar` for n readings; the (n, d) values and sigmas and (n,) there are overwritten."""
     for i in range(taps.shape[0]):
         there[i] = observe_one(code, q, taps[i], values[i])

@@ -1,14 +1,15 @@
-"""One step of the instruments and faults of many runs: the kernels of `simnav.steps`."""
+"""One step of the instruments and faults of many runs: the kernels of `simnav.simulation.steps`."""
 
 from __future__ import annotations
 
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.kinds import add_error_scalar
-from simnav.sensors.faults.fault import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
+from simnav.sensors.faults.layer import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
 from simnav.sensors.imu import triad_errors
 from simnav.sensors.observation import noise_scalar, observe_one
 
@@ -26,10 +27,11 @@ UNTOUCHED = -2
     "f8[:, :, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1], b1[:, :, ::1], f8[:, :, :, ::1], f8[:, ::1], "
     "f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])"
 )
-def sense_imu(  # type: ignore[no-untyped-def]
-    active, at, samples, matrix, bias, triads, residual, variates, instability, walk, tables, disturbed, disturbance,
-    clock, imu_time, imu_interval, rate, force,
-):  # fmt: skip
+def sense_imu(
+    active: Flags, at: Integers, samples: Integers, matrix: Array, bias: Array, triads: Array, residual: Array,
+    variates: Array, instability: Array, walk: Array, tables: Integers, disturbed: Flags, disturbance: Array,
+    clock: Array, imu_time: Array, imu_interval: Array, rate: Array, force: Array,
+) -> None:  # fmt: skip
     """Errors and disturbances of the IMUs of many runs, over one step each.
 
     Parameters
@@ -83,10 +85,12 @@ def sense_imu(  # type: ignore[no-untyped-def]
     "i8[:, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1], f8[:, :, ::1], i8[::1], i8[:, :, ::1], f8[:, :, :, ::1], "
     "f8[:, :, :, ::1], i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], u4[:, ::1], f8[:, ::1])"
 )
-def sense(  # type: ignore[no-untyped-def]
-    active, first, last, tap_time, taps, owner, error, white, interval, fault, layout, numbers,
-    layers, operations, sizes, held, count, who, when, value, faults, truth,
-):  # fmt: skip
+def sense(
+    active: Flags, first: Integers, last: Integers, tap_time: Array, taps: Array, owner: Integers, error: Array,
+    white: Array, interval: Integers, fault: Array, layout: Integers, numbers: Array, layers: Integers,
+    operations: Integers, sizes: Array, held: Array, count: Integers, who: Integers, when: Array, value: Array,
+    faults: NDArray[np.uint32], truth: Array,
+) -> None:  # fmt: skip
     """What the aiding instruments of many runs deliver in one step each, faults included.
 
     Parameters
@@ -114,13 +118,13 @@ def sense(  # type: ignore[no-untyped-def]
     layers : (b,) int array
         How many layers of faults.
     operations : (b, k, 3) int array
-        What each does (`simnav.sensors.faults.fault.ADDS`, ...), its first bit, and whether each interval has its own.
+        What each does (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and whether each interval has its own.
     sizes : (b, i, k, 4) array
         Of layers that step the noise: the new sigma of an instrument, or the factor on its sigma where that is not 0.
     held : (b, i, k, 8) array
         State of layers that repeat values.
     count, who, when, value, faults : (b, ...) arrays
-        What is delivered: as of `simnav.steps.SteppedRuns`; overwritten.
+        What is delivered: as of `simnav.simulation.steps.SteppedRuns`; overwritten.
     truth : (b, 9) array
         Likewise.
     """
@@ -188,7 +192,7 @@ def sense(  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _hold(held, number, reading, d):  # type: ignore[no-untyped-def]
+def _hold(held: Array, number: int, reading: Array, d: int) -> bool:
     """Repeat, within an interval, what was delivered before it (or else first within); whether it does."""
     if number >= 0 and held[NUMBER] != number + 1.0:
         held[NUMBER] = number + 1.0

@@ -12,7 +12,7 @@ from math import atan2, cos, exp, inf, sin
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.geometry.rotation import wrap_scalar
 from simnav.strapdown import sample_from_motion
 from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
@@ -46,9 +46,19 @@ TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
 PHASES, EDDY_COLUMNS = 3, 6
 
+#: What waves cause at the surface: velocity north, east, down [m/s]; slopes that roll and pitch follow from [rad].
+Responses = tuple[float, float, float, float, float, float, float]
+#: Velocity north-east-down [m/s], direction cosine matrix of the body axes by rows, roll and pitch [rad].
+Composed = tuple[
+    tuple[float, float, float],
+    tuple[float, float, float, float, float, float, float, float, float],
+    float,
+    float,
+]
+
 
 @kernel(fastmath={"reassoc", "contract", "nsz", "arcp"})
-def _waves(phase, table, north, east, dt):  # type: ignore[no-untyped-def]
+def _waves(phase: Array, table: Array, north: float, east: float, dt: float) -> Responses:
     """Turn the components' phases by one step (velocity through the water north, east) and sum the seven responses."""
     # Two loops: the first writes what the second only reads, so that the compiler can vectorize both without
     # checking at run time whether the rows overlap.
@@ -77,7 +87,7 @@ def _waves(phase, table, north, east, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _lag(x, dx, command, dt, tau, decay):  # type: ignore[no-untyped-def]
+def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: float) -> tuple[float, float]:
     """Exact step of a critically damped second-order lag under a constant command; ``decay`` is exp(-dt/tau)."""
     y = x - command
     b = dx + y / tau
@@ -85,12 +95,13 @@ def _lag(x, dx, command, dt, tau, decay):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _wrap(angle):  # type: ignore[no-untyped-def]
-    return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+def _wrap(angle: float) -> float:
+    wrapped: float = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+    return wrapped
 
 
 @kernel()
-def _waypoint(points, j, relative, x):  # type: ignore[no-untyped-def]
+def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, float]:
     """Waypoint j, north and east of the start of the run."""
     a, b = points[j, 0], points[j, 1]
     if relative > 0.0:
@@ -100,7 +111,7 @@ def _waypoint(points, j, relative, x):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
+def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time: float) -> float:
     """Walk the manoeuvre table; leave the references in the state and return the commanded yaw rate."""
     psi = x[PSI] + x[ERROR_HEADING] - x[TO_TRACK]
     # Where the heading would come to rest if the rate were commanded to zero now.
@@ -189,11 +200,12 @@ def _guide(x, index, p, rows, points, time):  # type: ignore[no-untyped-def]
     x[TURNED] = x[TO_TRACK] - x[ERROR_HEADING]
     # Steering the heading of rest makes the loop a plain exponential: its derivative is the commanded rate itself.
     wanted = (x[PSI_REFERENCE] - rest) / (2.0 * p[TAU_R])
-    return min(max(wanted, -x[RATE_LIMIT]), x[RATE_LIMIT])
+    rate_command: float = min(max(wanted, -x[RATE_LIMIT]), x[RATE_LIMIT])
+    return rate_command
 
 
 @kernel()
-def _cosine_sine(angle):  # type: ignore[no-untyped-def]
+def _cosine_sine(angle: float) -> tuple[float, float]:
     """Cosine and sine; by their series, good to rounding, where the angle is small, as roll and pitch mostly are."""
     if abs(angle) > 0.3:
         return cos(angle), sin(angle)
@@ -206,8 +218,9 @@ def _cosine_sine(angle):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _compose(x, p, w0, w1, w2, w3, w4, w5, w6):  # type: ignore[no-untyped-def]
-    """Velocity (3), DCM (9), roll and pitch of the state with the wave responses w0 ... w6 on top."""
+def _compose(x: Array, p: Array, waves: Responses) -> Composed:
+    """Velocity, attitude, roll and pitch of the state with the responses to the waves on top."""
+    w0, w1, w2, w3, w4, w5, w6 = waves
     cp, sp, cg, sg = x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA]
     shade, flow = 1.0, 1.0
     if x[DEPTH_CALM] > 0.0:
@@ -233,7 +246,7 @@ def _compose(x, p, w0, w1, w2, w3, w4, w5, w6):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _water(x, p, eddies, time):  # type: ignore[no-untyped-def]
+def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
     """Leave the velocity of the surface water at the vessel's place in the state."""
     north, east = p[CURRENT_N], p[CURRENT_E]
     for i in range(eddies.shape[0]):
@@ -244,13 +257,13 @@ def _water(x, p, eddies, time):  # type: ignore[no-untyped-def]
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def initialise(x, p, phase, table, eddies):  # type: ignore[no-untyped-def]
+def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) -> None:
     """Complete the state at time 0: velocity and attitude with the waves and the current as they are then."""
     _water(x, p, eddies, 0.0)
     x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
     ahead = x[U] * x[COS_GAMMA]
     w = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], 0.0)
-    v, c, roll, pitch = _compose(x, p, w[0], w[1], w[2], w[3], w[4], w[5], w[6])
+    v, c, roll, pitch = _compose(x, p, w)
     x[V], x[V + 1], x[V + 2] = v
     for i in range(9):
         x[C + i] = c[i]
@@ -258,7 +271,10 @@ def initialise(x, p, phase, table, eddies):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _advance_one(x, index, p, rows, points, phase, table, eddies, tap_time, taps, rate, force):  # type: ignore[no-untyped-def]
+def _advance_one(
+    x: Array, index: Integers, p: Array, rows: Array, points: Array, phase: Array, table: Array, eddies: Array,
+    tap_time: Array, taps: Array, rate: Array, force: Array,
+) -> None:  # fmt: skip
     """Advance one world by as many samples as there is room for in ``rate``; the arguments as of `advance`."""
     dt = p[DT]
     decay_u, decay_r, decay_g = exp(-dt / p[TAU_U]), exp(-dt / p[TAU_R]), exp(-dt / p[TAU_G])
@@ -286,9 +302,10 @@ def _advance_one(x, index, p, rows, points, phase, table, eddies, tap_time, taps
         # Waves, met at the speed through the water
         x[COS_PSI], x[SIN_PSI] = cos(x[PSI]), sin(x[PSI])
         ahead = x[U] * x[COS_GAMMA]
-        w0, w1, w2, w3, w4, w5, w6 = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], dt)
+        waves = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], dt)
         _water(x, p, eddies, t1)
-        v, c, roll, pitch = _compose(x, p, w0, w1, w2, w3, w4, w5, w6)
+        composed = _compose(x, p, waves)
+        v, c, roll, pitch = composed
         # Ideal instruments
         u = (x[V], x[V + 1], x[V + 2])
         b = (x[C], x[C + 1], x[C + 2], x[C + 3], x[C + 4], x[C + 5], x[C + 6], x[C + 7], x[C + 8])
@@ -297,7 +314,7 @@ def _advance_one(x, index, p, rows, points, phase, table, eddies, tap_time, taps
         force[k, 0], force[k, 1], force[k, 2] = out[3], out[4], out[5]
         # Taps between the old state, still in x, and the new one
         while tap < tap_time.size and (tap_time[tap] <= t1 or k == rate.shape[0] - 1):
-            _tap(taps[tap], min((tap_time[tap] - t0) / dt, 1.0), x, p, v, roll, pitch, out, c)
+            _tap(taps[tap], min((tap_time[tap] - t0) / dt, 1.0), x, p, composed, out)
             tap += 1
         for i in range(3):
             x[BODY_RATE + i] = out[i] - c[i] * out[9] - c[6 + i] * out[10]
@@ -316,9 +333,11 @@ def _advance_one(x, index, p, rows, points, phase, table, eddies, tap_time, taps
     "void(b1[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
     "f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1])"
 )
-def advance(  # type: ignore[no-untyped-def]
-    active, x, index, p, sizes, rows, points, phase, table, eddies, tap_time, first, last, taps, samples, rate, force
-):
+def advance(
+    active: Flags, x: Array, index: Integers, p: Array, sizes: Integers, rows: Array, points: Array, phase: Array,
+    table: Array, eddies: Array, tap_time: Array, first: Integers, last: Integers, taps: Array, samples: Integers,
+    rate: Array, force: Array,
+) -> None:  # fmt: skip
     """Advance w worlds, each by its own number of samples.
 
     One kernel for one world and for many: the sum over waves is the only arithmetic that a compiler may reorder, so
@@ -367,8 +386,9 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _tap(out, a, x, p, v, roll, pitch, sample, c):  # type: ignore[no-untyped-def]
+def _tap(out: Array, a: float, x: Array, p: Array, composed: Composed, sample: tuple[float, ...]) -> None:
     """State at the fraction a of a sample interval: velocity and angles linear, position accordingly."""
+    v, c, roll, pitch = composed
     yaw = atan2(x[C + 3], x[C])
     new_yaw = atan2(c[3], c[0])
     # The position's share of the interval under a linear velocity
@@ -391,7 +411,7 @@ def _tap(out, a, x, p, v, roll, pitch, sample, c):  # type: ignore[no-untyped-de
 
 
 @kernel("void(b1[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
-def command(active, x, wrong, heading, speed):  # type: ignore[no-untyped-def]
+def command(active: Flags, x: Array, wrong: Array, heading: Array, speed: Array) -> None:
     """Steer w worlds without manoeuvres.
 
     Parameters

@@ -14,7 +14,7 @@ __all__ = ["PlannedTrack"]
 
 
 @kernel("Tuple((f8, i8))(f8[:, ::1], i8, i8, f8, f8)")
-def _aside(points, at, window, north, east):  # type: ignore[no-untyped-def]
+def _aside(points: Array, at: int, window: int, north: float, east: float) -> tuple[float, int]:
     """How far to starboard of the nearest point a position is, and which point that is."""
     low, high = max(0, at - window), min(points.shape[0] - 1, at + window)
     least = np.inf

@@ -183,6 +183,7 @@ class World:
         Parameters
         ----------
         seconds : int
+            By how much the world is advanced [s].
 
         Returns
         -------

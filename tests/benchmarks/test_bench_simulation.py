@@ -16,7 +16,7 @@ import pyins.strapdown
 import pytest
 
 from simnav.scenario import Scenario, load
-from simnav.simulator import simulate, simulate_many
+from simnav.simulation.simulator import simulate, simulate_many
 from simnav.strapdown import integrate
 from simnav.types import Array
 

@@ -11,7 +11,7 @@ from simnav.estimators.bound import KINDS, Bound, bound, bound_of_run
 from simnav.scenario import Scenario, load
 from simnav.sensors.faults import GrossError, Multipath, NoiseStep, Outage
 from simnav.sensors.imu import AccelerometerSpec, GyroscopeSpec, ImuSpec
-from simnav.simulator import ideal, simulate
+from simnav.simulation.simulator import ideal, simulate
 from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import COMPONENTS

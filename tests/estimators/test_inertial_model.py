@@ -12,7 +12,7 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.propagation import HELD_VELOCITY, propagate_covariance
 from simnav.geometry import earth, rotation
 from simnav.scenario import load
-from simnav.simulator import ideal
+from simnav.simulation.simulator import ideal
 from simnav.types import Datasheet, ImuDatasheet, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
 
 DEG = np.pi / 180.0

@@ -10,7 +10,7 @@ from simnav.estimators.models.true_motion import true_motion
 from simnav.estimators.reference import ReferenceFigure, oracle_run, reference_figure
 from simnav.geometry.earth import relative_position
 from simnav.scenario import Scenario, load
-from simnav.simulator import simulate
+from simnav.simulation.simulator import simulate
 from simnav.spec import SpecError
 from simnav.strapdown import integrate
 

@@ -17,7 +17,7 @@ from simnav.scoring import errors
 from simnav.scoring.consistency import nees, nees_band
 from simnav.scoring.navigation_error import smoothed_errors
 from simnav.sensors.faults import BiasStep, Frozen, GrossError, Multipath, NoiseStep, Outage, Ramp
-from simnav.simulator import simulate
+from simnav.simulation.simulator import simulate
 from simnav.trial import run_trial
 from simnav.types import Datasheet, Instruments, Measurement
 

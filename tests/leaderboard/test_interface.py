@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import simnav
-from simnav import Estimate, Estimator, estimator
+from simnav import Estimate, Estimator
 from simnav.estimator import registry
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.cli.new_estimator import write_estimator
@@ -44,12 +44,9 @@ class LastFix(Estimator):
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clean_registry: None) -> Path:
     """A working directory with a short scenario; what a test registers is forgotten."""
     (tmp_path / "pond.toml").write_text(POND)
-    estimator.names()
-    monkeypatch.setattr(registry, "_classes", dict(registry._classes))
-    monkeypatch.setattr(registry, "_aliases", dict(registry._aliases))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -72,7 +69,7 @@ def command(*words: str) -> Any:
 
 
 def call_list() -> Any:
-    from simnav.catalogue import headers
+    from simnav.scenario.catalogue import headers
 
     return {"estimators": simnav.names(), "scenarios": sorted(h.id for h in headers())}
 
@@ -219,7 +216,7 @@ def test_one_estimator_given_in_four_ways(here: Path) -> None:
     found = [rmse(simnav.run("pond.toml", way)) for way in ways]
     found.append(rmse(simnav.run(simnav.load("pond.toml"), "last_fix.py", parameters=half)))
     assert len(set(found)) == 1
-    registry._classes.pop("last-fix")
+    registry.forget(here / "last_fix.py")
     report = simnav.run("pond.toml", [(LastFix, half), LastFix])
     assert rmse(report) == found[0] != report.estimators[1].scores["horizontal_rmse"]
     assert [e.estimator for e in report.estimators] == ["last-fix(gain=0.5)", "last-fix"]

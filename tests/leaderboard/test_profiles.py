@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 import simnav
-from simnav.catalogue import headers
 from simnav.estimator import describe, names
 from simnav.leaderboard.profiles import Part, load, profiles
 from simnav.leaderboard.results.errors import RequestError
+from simnav.scenario.catalogue import headers
 
 
 def test_the_profiles_that_come_with_simnav():

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.catalogue import Header, headers
 from simnav.estimator import make
 from simnav.scenario import Scenario, load
+from simnav.scenario.catalogue import Header, headers
 from simnav.source import record
 from simnav.types import InitialState
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.catalogue import headers
 from simnav.leaderboard.interface import scenarios_of
 from simnav.scenario import TRAINING_ROOT, load
+from simnav.scenario.catalogue import headers
 from simnav.source import record
 
 FAMILIES = [h for h in headers() if h.path.parent.name == "families"]

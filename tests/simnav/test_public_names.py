@@ -10,7 +10,7 @@ import gymnasium
 import pytest
 
 import simnav
-from simnav.catalogue import headers
+from simnav.scenario.catalogue import headers
 
 
 @pytest.mark.parametrize("name", simnav.__all__)

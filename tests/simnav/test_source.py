@@ -6,7 +6,7 @@ import numpy as np
 
 from simnav.log import LogSource
 from simnav.scenario import load
-from simnav.simulator import Simulator
+from simnav.simulation.simulator import Simulator
 from simnav.source import open_source, record
 
 

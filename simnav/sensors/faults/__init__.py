@@ -11,21 +11,11 @@ from typing import Annotated
 
 from simnav.recording import FaultLabel
 from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, Multipath, NoiseStep, Ramp
-from simnav.sensors.faults.fault import (
-    FAULTS,
-    Activity,
-    Effect,
-    FaultLayer,
-    FaultSpec,
-    Names,
-    Size,
-    effect_of,
-    register_fault,
-    size_by_component,
-    size_range,
-)
+from simnav.sensors.faults.fault import FAULTS, Effect, FaultSpec, Names, effect_of, register_fault
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
+from simnav.sensors.faults.layer import Activity, FaultLayer
 from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
+from simnav.sensors.faults.sizes import Size, size_by_component, size_range
 from simnav.spec import OneOf
 
 __all__ = [

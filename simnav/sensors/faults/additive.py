@@ -11,16 +11,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simnav.recording import AidStream
-from simnav.sensors.faults.fault import (
-    ADDS,
-    STEPS_NOISE,
-    Effect,
-    FaultLayer,
-    FaultSpec,
-    Size,
-    register_fault,
-    size_range,
-)
+from simnav.sensors.faults.fault import Effect, FaultSpec, register_fault
+from simnav.sensors.faults.layer import ADDS, STEPS_NOISE, FaultLayer
+from simnav.sensors.faults.sizes import Size, size_range
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import Positive, quantity
 from simnav.types import KINDS, Array

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from simnav.recording import ImuLabels
-from simnav.sensors.faults.fault import DISTURBS_IMU, Effect, FaultLayer, FaultSpec, Names, register_fault
+from simnav.sensors.faults.fault import Effect, FaultSpec, Names, register_fault
+from simnav.sensors.faults.layer import DISTURBS_IMU, FaultLayer
 from simnav.sensors.instrument import ZERO, SigmaTriple, Triple
 from simnav.spec import SpecError, quantity
 from simnav.types import Array, ImuSamples

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import AidStream
-from simnav.sensors.faults.fault import DROPS, HOLDS, ZEROES, Effect, FaultLayer, FaultSpec, register_fault
+from simnav.sensors.faults.fault import Effect, FaultSpec, register_fault
+from simnav.sensors.faults.layer import DROPS, HOLDS, ZEROES, FaultLayer
 from simnav.types import KINDS, Array
 
 __all__ = ["FalseZero", "Frozen", "Outage", "ReplacingLayer"]

@@ -41,7 +41,7 @@ def test_the_compiled_navigator_is_the_filter_that_works_on_packets(name, monkey
     assert compiled._voyages.navigators._banked.item() == (name != "ship-turn")  # which has no IMU
     by_packets = GuidanceEnv(name, navigator=KalmanEstimator(Suitable()), reveal_truth=True)
     assert_equal(voyage(by_packets, 3, turns), expected)
-    monkeypatch.setattr("simnav.steps.CompiledInstrument", int)  # as if the instruments were those of others
+    monkeypatch.setattr("simnav.simulation.steps.CompiledInstrument", int)  # as if the instruments were those of others
     assert_equal(voyage(by_packets, 3, turns), expected)
 
 

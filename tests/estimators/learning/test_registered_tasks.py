@@ -15,11 +15,11 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FrameStackObservation, RecordEpisodeStatistics, RecordVideo
 
 import simnav  # noqa: F401 (it registers)
-from simnav.catalogue import headers
 from simnav.environment import charted
 from simnav.environment.rendering import Chart
 from simnav.estimators.learning.environment import FilterTaskEnv
 from simnav.log import LogError
+from simnav.scenario.catalogue import headers
 
 TASKS = ("Tuning", "Detection", "Correction", "Guidance")
 IDS = [name for name in gymnasium.registry if name.startswith("simnav/") and name.split("-")[1] in TASKS]

@@ -178,7 +178,7 @@ def test_rotations_compose_exactly(sizes: tuple[float, float]):
         shift, step = np.zeros(15), np.zeros(15)
         shift[6:9], step[6:9] = a, -b
         expected = dcm_from_rotation_vector(a) @ dcm_from_rotation_vector(b)
-        found = dcm_from_rotation_vector(chain.less(shift, step)[6:9])
+        found = dcm_from_rotation_vector(chain.relative_shift(shift, step)[6:9])
         np.testing.assert_allclose(found, expected, atol=5e-9)
 
 

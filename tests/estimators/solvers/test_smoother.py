@@ -13,7 +13,7 @@ from simnav.scenario import load
 from simnav.scoring import errors
 from simnav.scoring.consistency import GROUPS, nees, nees_band
 from simnav.scoring.navigation_error import smoothed_errors
-from simnav.simulator import simulate
+from simnav.simulation.simulator import simulate
 from simnav.trial import run_trial
 from simnav.types import Datasheet, Estimate, InitialState, Instruments, Measurement, Measurements
 

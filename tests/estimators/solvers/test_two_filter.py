@@ -16,7 +16,7 @@ from simnav.estimators.solvers.two_filter import TwoFilterSmoother
 from simnav.geometry import earth
 from simnav.recording import Recording
 from simnav.scenario import load
-from simnav.simulator import simulate
+from simnav.simulation.simulator import simulate
 from simnav.types import Datasheet, Instruments
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from simnav import estimator
 from simnav.estimator import find
 from simnav.leaderboard.campaign import sources
 from simnav.leaderboard.campaign.fingerprint import (
@@ -44,12 +43,8 @@ def write(path: Path, name: str = "Mine", base: str = "Estimator", imports: str 
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(tmp_path: Path, clean_registry: None) -> Iterator[Path]:
     """A place for estimator files; what they import from it is forgotten afterwards."""
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    estimator.names()  # the installed ones are known before
-    monkeypatch.setattr(estimator.registry, "_classes", dict(estimator.registry._classes))
-    monkeypatch.setattr(estimator.registry, "_aliases", dict(estimator.registry._aliases))
     before = set(sys.modules)
     yield tmp_path
     for name in set(sys.modules) - before:
@@ -153,11 +148,13 @@ def test_a_docstring_and_the_chart_keep_the_recordings_and_a_constant_changes_th
         return versions[-1] != versions[-2]
 
     assert not after(comment, library / "strapdown.py")
-    assert not after(edit, library / "simulator.py", '"""What happens from now to a time.', '"""Something else.')
+    assert not after(
+        edit, library / "simulation" / "simulator.py", '"""What happens from now to a time.', '"""Something else.'
+    )
     assert not after(constant, library / "environment" / "rendering.py")
     assert not after(edit, library / "scoring" / "outages.py", "RECOVERY_THRESHOLD = 10.0", "RECOVERY_THRESHOLD = 11.0")
     assert not after(edit, library / "trial_log.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3")
-    assert after(edit, library / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0")
+    assert after(edit, library / "simulation" / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0")
     assert after(constant, library / "geometry" / "earth.py")  # imported indirectly
     assert after(constant, library / "log" / "nmea.py")
     assert after(constant, library / "sensors" / "faults" / "additive.py")
@@ -165,7 +162,10 @@ def test_a_docstring_and_the_chart_keep_the_recordings_and_a_constant_changes_th
 
 @pytest.mark.parametrize("scenario", ["open-sea", "harbour-multipath"])
 def test_what_a_recording_loads_is_in_its_digest(scenario: str) -> None:
-    """The imports that are followed in the text are those that really happen."""
+    """The imports that are followed in the text are those that really happen, but for what reads the scenario's file.
+
+    What was read is in the scenario's own digest.
+    """
     code = f"""
 import json, sys
 from simnav.scenario import load
@@ -176,7 +176,7 @@ print(json.dumps([name for name in sys.modules if name.partition(".")[0] == "sim
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name for name in json.loads(done.stdout) if not (sources._place(name) or Path()).match("__init__.py")}
     assert len(loaded) > 20
-    assert loaded <= set(followed(SIMULATOR))
+    assert loaded - {"simnav.scenario.reading"} <= set(followed(SIMULATOR))
 
 
 def test_an_estimator_of_ours_is_known_by_what_it_imports(library: Path) -> None:
@@ -194,7 +194,10 @@ def test_an_estimator_of_ours_is_known_by_what_it_imports(library: Path) -> None
     assert changed(comment, place["ekf"]) == []
     assert changed(constant, place["federated"]) == ["federated"]
     assert changed(edit, library / "trial_log.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3") == list(names)
-    assert changed(edit, library / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0") == []
+    assert (
+        changed(edit, library / "simulation" / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0")
+        == []
+    )
     assert changed(constant, library / "scoring" / "accuracy.py") == []
     assert changed(edit, data[0], "{", "{ ") == ["anfis-ekf"]
     assert changed((data[0].parent / "other.json").write_text, "{}") == []

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from simnav import estimator
 from simnav.leaderboard import cli
 
 SCENARIO = """
@@ -68,15 +67,10 @@ REST = ["--estimator", "gnss-only"]
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch) -> Path:
+def here(tmp_path, monkeypatch, clean_registry) -> Path:
     """A working directory with a short scenario and an estimator."""
     (tmp_path / "pond.toml").write_text(SCENARIO)
     (tmp_path / "mine.py").write_text(MINE)
-    estimator.names()
-    monkeypatch.setattr(
-        estimator.registry, "_classes", dict(estimator.registry._classes)
-    )  # "mine" is registered for one test
-    monkeypatch.setattr(estimator.registry, "_aliases", dict(estimator.registry._aliases))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

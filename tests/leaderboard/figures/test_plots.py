@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.figures import plots as figures
-from simnav.leaderboard.figures.plots import PALETTE, Band, Curve, Dot, Style, Track
+from simnav.leaderboard.figures.plots import Band, Curve, Dot, Track
+from simnav.leaderboard.figures.style import PALETTE, Style, save
 
 TIME = np.linspace(1.0, 1200.0, 240)
 LABELS = ["ekf", "dead-reckoning", "oracle"]
@@ -162,7 +163,7 @@ def test_what_is_far_off_stands_at_the_edge_as_a_number(style):
 
 def test_dots_of_those_that_all_failed_can_be_drawn(style, tmp_path):
     fig = figures.dots([Dot("ekf", np.nan)], style, label="Horizontal RMSE [m]")
-    assert figures.save(fig, tmp_path / "x.svg", formats=("svg",))[0].stat().st_size > 1000
+    assert save(fig, tmp_path / "x.svg", formats=("svg",))[0].stat().st_size > 1000
 
 
 def test_run_chart_shows_errors_bounds_and_diagnostics(style, truth):
@@ -186,7 +187,7 @@ def test_run_chart_shows_errors_bounds_and_diagnostics(style, truth):
 
 def test_saved_svg_is_valid_has_its_labels_and_follows_the_theme(style, tmp_path):
     fig = figures.error_cdf([band("ekf", 1.0)], style, label="Horizontal error [m]", title="Distribution")
-    svg, png = figures.save(fig, tmp_path / "figure")
+    svg, png = save(fig, tmp_path / "figure")
     assert png.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     content = svg.read_text()
     ET.fromstring(content)
@@ -200,10 +201,10 @@ def test_saved_svg_is_valid_has_its_labels_and_follows_the_theme(style, tmp_path
 
 def test_the_same_figure_is_the_same_file(style, tmp_path):
     for name in ("a", "b"):
-        figures.save(figures.error_cdf([band("ekf", 1.0)], style, label="x"), tmp_path / name, formats=("svg",))
+        save(figures.error_cdf([band("ekf", 1.0)], style, label="x"), tmp_path / name, formats=("svg",))
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
 def test_a_label_in_the_manner_of_tex_is_shown_as_it_is(tmp_path):
     fig = figures.error_cdf([band("$x_$", 1.0)], Style(["$x_$"]), label="Error [m]")
-    assert figures.save(fig, tmp_path / "x", formats=("svg", "pdf"))[1].read_bytes()[:4] == b"%PDF"
+    assert save(fig, tmp_path / "x", formats=("svg", "pdf"))[1].read_bytes()[:4] == b"%PDF"

@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 import simnav
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.figures.panels import Bar, bars, broken
-from simnav.leaderboard.figures.plots import Style
+from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.papers import ALIASES, PAPERS, key_of, mao_2025, sequential, stored
 from simnav.leaderboard.papers import paper as papers
 from simnav.leaderboard.papers.comparison import judge, judge_gain

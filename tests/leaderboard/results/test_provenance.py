@@ -11,6 +11,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from simnav.leaderboard.results import folder as store_folder
 from simnav.leaderboard.results import formats, provenance, store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
@@ -104,7 +105,7 @@ def test_versions_of_the_benchmark_are_not_mixed(folder: Path, tmp_path: Path, m
     assert benchmark_of([MADE, Provenance(identity="lost")]) == BENCHMARK
     with pytest.raises(RequestError, match="must not be mixed"):
         formats.write("results", "json", Document([result(0), result(1, older)]), tmp_path / "r.json")
-    monkeypatch.setattr(store, "BENCHMARK", "simnav-bench 2.0")
+    monkeypatch.setattr(store_folder, "BENCHMARK", "simnav-bench 2.0")
     with pytest.raises(StoreError, match=r"belong to simnav-bench 1\.0.*runs simnav-bench 2\.0"):
         store.create(folder)
     assert store.load(folder) == []  # reading stays allowed

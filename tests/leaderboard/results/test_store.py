@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from simnav.leaderboard.results import folder as store_folder
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.store import Result, StoreError, StoreWarning
 
@@ -163,7 +164,7 @@ def test_a_reader_beside_a_compaction_sees_each_result_once(folder: Path, monkey
     """The compaction falls between the listing of the folder and the reading of its files."""
     for seed in range(3):
         store.write(folder, result(seed))
-    original, calls = store._files, []
+    original, calls = store_folder.files_of, []
 
     def files(path: Path) -> list[Path]:
         found = original(path)
@@ -172,7 +173,7 @@ def test_a_reader_beside_a_compaction_sees_each_result_once(folder: Path, monkey
             store.compact(path)
         return found
 
-    monkeypatch.setattr(store, "_files", files)
+    monkeypatch.setattr(store_folder, "files_of", files)
     assert [r.seed for r in store.load(folder)] == [0, 1, 2]
 
 
@@ -265,7 +266,7 @@ def test_a_full_disk_is_one_sentence_and_loses_nothing(
             def opened(file: Any, mode: str = "r") -> Any:
                 return Full(file, mode) if "w" in mode else open(file, mode)
 
-            patch.setattr(store, "open", opened, raising=False)
+            patch.setattr(store_folder, "open", opened, raising=False)
         else:
             patch.setattr(os, where, full)
         with pytest.raises(StoreError, match="the disk is full") as caught:

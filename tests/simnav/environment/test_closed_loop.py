@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.catalogue import headers
 from simnav.environment import NavigationEnv
 from simnav.geometry.earth import displace, relative_position
 from simnav.scenario import load
+from simnav.scenario.catalogue import headers
 
 SIMULATED = [h.id for h in headers() if not h.recorded]
 QUICK = [name for name in SIMULATED if not name.startswith(("training", "random"))]
@@ -55,7 +55,7 @@ def test_a_step_by_itself_gives_the_numbers_of_a_block(monkeypatch):
     envs = [NavigationEnv(scenario, closed_loop=True, reveal_truth=True, reward="position") for _ in range(2)]
     _, info = envs[0].reset(seed=5)
     with monkeypatch.context() as patched:
-        patched.setattr("simnav.steps.CompiledInstrument", int)  # as if the instruments were those of others
+        patched.setattr("simnav.simulation.steps.CompiledInstrument", int)  # as if the instruments were those of others
         envs[1].reset(seed=5)
     assert [env._runs._compiled.item() for env in envs] == [True, False]
     over = False

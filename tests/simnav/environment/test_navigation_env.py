@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simnav
-from simnav.catalogue import headers
 from simnav.environment import EstimatorAgent, NavigationEnv, unpack
 from simnav.environment import navigation as environment
 from simnav.environment.stretch import pack
@@ -24,6 +23,7 @@ from simnav.geometry.earth import displace
 from simnav.log import LogError
 from simnav.recording import AidStream, Block, packets
 from simnav.scenario import load, parse
+from simnav.scenario.catalogue import headers
 from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Datasheet, Estimate, ImuDatasheet, ImuSamples, Instruments, NavigationStates, TriadDatasheet

@@ -18,7 +18,7 @@ from simnav.recording import Recording
 from simnav.scenario import load, parse
 from simnav.sensors import AidSpec, register_fault, register_instrument
 from simnav.sensors.faults import BiasStep, NoiseStep, effect_of
-from simnav.simulator import ideal
+from simnav.simulation.simulator import ideal
 from simnav.source import record
 from simnav.spec import SpecError, quantity
 from simnav.testing.contract_check import check, contract_recording

@@ -110,7 +110,7 @@ def _folders() -> Iterator[Path]:
     points = {(p.name, p.value): p for p in importlib.metadata.entry_points(group=_GROUP)}
     for point in sorted(points.values(), key=lambda p: (not _own(p), p.name)):
         if _own(point):
-            yield (Path(__file__).parent / "scenarios").resolve()
+            yield (Path(__file__).parents[1] / "scenarios").resolve()
             continue
         try:
             folders = _package_folders(point.module)
@@ -180,7 +180,7 @@ def _head(text: str) -> dict[str, Any]:
 
 def _middle(text: str, source: str) -> float | None:
     """The median duration of a scenario that draws it."""
-    from simnav.draws import Template
+    from simnav.scenario.draws import Template
 
     try:
         duration = Template(tomllib.loads(text), source).middle().get("duration_s")

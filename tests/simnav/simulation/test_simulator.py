@@ -13,7 +13,7 @@ from simnav.geometry.earth import displace
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.recording import Block, Recording
 from simnav.scenario import Scenario, load, names
-from simnav.simulator import Simulator, ideal, sample_times, simulate, simulate_many
+from simnav.simulation.simulator import Simulator, ideal, sample_times, simulate, simulate_many
 from simnav.spec import SpecError
 from simnav.strapdown import integrate
 
@@ -70,7 +70,7 @@ def test_seeds_fix_a_run_and_differ(name):
 DIGEST = """
 import hashlib
 from simnav.scenario import load
-from simnav.simulator import simulate
+from simnav.simulation.simulator import simulate
 data = simulate(load("open-sea").model_copy(update={"duration": 60.0}), 3).data
 arrays = [data.imu.angular_rate, data.imu.specific_force, data.truth.position, *(s.value for s in data.aids.values())]
 print(hashlib.sha256(b"".join(a.tobytes() for a in arrays)).hexdigest())

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.catalogue import ScenarioWarning, headers
 from simnav.scenario import Scenario, load, names, parse
+from simnav.scenario.catalogue import ScenarioWarning, headers
 from simnav.spec import SpecError
 
 TOML = """
@@ -422,7 +422,7 @@ def test_names_that_differ_only_in_hyphens_do_not_share_a_gymnasium_id(tmp_path,
 def test_a_folder_scenarios_in_the_working_directory_does_not_shadow_the_catalogue(tmp_path):
     (tmp_path / "scenarios").mkdir()
     (tmp_path / "scenarios" / "__init__.py").write_text("raise RuntimeError('shadowed')")
-    code = "from simnav.catalogue import headers; print([h.id for h in headers()])"
+    code = "from simnav.scenario.catalogue import headers; print([h.id for h in headers()])"
     out = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     assert "open-sea-v1" in out
 
@@ -431,7 +431,7 @@ def test_heads_are_read_without_the_heavy_libraries():
     code = textwrap.dedent("""
         import sys
         import simnav
-        from simnav.catalogue import headers
+        from simnav.scenario.catalogue import headers
         assert headers()
         heavy = {"pydantic", "numba", "gtsam", "scipy", "matplotlib", "pyarrow"} & set(sys.modules)
         assert not heavy, heavy

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import simnav
-from simnav.draws import Distribution, Template, has_draws, with_values
 from simnav.environment import NavigationEnv
 from simnav.recording import Recording
 from simnav.scenario import TRAINING_ROOT, Scenario, parse
-from simnav.simulator import Simulator, ideal, simulate
+from simnav.scenario.draws import Distribution, Template, has_draws, with_values
+from simnav.simulation.simulator import Simulator, ideal, simulate
 from simnav.spec import SpecError
 from simnav.streams import stream
 
@@ -253,7 +253,7 @@ def test_a_bad_distribution_gets_a_sentence(old: str, new: str, sentence: str):
 
 
 def test_the_head_of_a_file_with_a_drawn_duration(tmp_path):
-    from simnav.catalogue import _header
+    from simnav.scenario.catalogue import _header
 
     text = TOML.replace("duration_s = 40.0", "duration_s = { integers = [40, 60] }")
     (tmp_path / "drawn-run.toml").write_text(

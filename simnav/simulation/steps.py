@@ -1,8 +1,8 @@
 """Runs that go step by step, many of them at once: world, instruments and faults in compiled passes over shared arrays.
 
 What instruments and faults draw depends on the times alone. It is drawn a stretch of steps ahead, with the classes of
-the block form (`simnav.simulator.Simulator.advance`), from the same streams, in the same order. What depends on where
-the vessel goes is left to two kernels, `simnav.world.motion.advance` and `sense`, which go through all runs. The
+the block form (`Simulator.advance`), from the same streams, in the same order. What depends on where the vessel goes is
+left to two kernels, `simnav.world.motion.advance` and `sense`, which go through all runs. The
 numbers are those of the block form, bit for bit, and a step costs no more than its arithmetic.
 
 An instrument or a fault of others, of which no more is known than how it makes a block, is asked for a block of one
@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import packets
-from simnav.sensors.faults.fault import DISTURBS_IMU, STEPS_NOISE, FaultLayer
+from simnav.sensors.faults.layer import DISTURBS_IMU, STEPS_NOISE, FaultLayer
 from simnav.sensors.observation import CompiledInstrument
 from simnav.sensors.stepwise import HELD, UNTOUCHED, sense, sense_imu
-from simnav.simulator import TIME_TOLERANCE, Simulator
+from simnav.simulation.simulator import TIME_TOLERANCE, Simulator
 from simnav.types import ImuSamples, Measurement, Measurements
 from simnav.world import motion
 
@@ -36,6 +36,7 @@ class SteppedRuns:
     Parameters
     ----------
     n : int
+        Number of runs.
 
     Attributes
     ----------
@@ -193,7 +194,7 @@ class SteppedRuns:
         """Begin and end of the last step of a run [s]."""
         simulator, k = self.simulators[b], int(self.step[b])
         assert simulator is not None
-        rate = 1.0 / simulator.step  # as `simnav.simulator.sample_times`
+        rate = 1.0 / simulator.step  # as `simnav.simulation.simulator.sample_times`
         return simulator.step + (k - 2) / rate if k > 1 else 0.0, simulator.step + (k - 1) / rate
 
     def packet(self, b: int) -> Measurements:
@@ -225,7 +226,7 @@ class SteppedRuns:
         times, owners, at = [], [], []
         for i, spec in enumerate([*simulator.scenario.aids.values(), None]):
             rate, phase = (1.0 / simulator.step, simulator.step) if spec is None else (spec.rate, spec.phase)
-            # As `simnav.simulator.sample_times` of each step.
+            # As `simnav.simulation.simulator.sample_times` of each step.
             first = max(0, int(np.floor((start - phase + TIME_TOLERANCE) * rate)) + 1)
             last = np.maximum(np.floor((ends - phase + TIME_TOLERANCE) * rate), first - 1)
             number = np.arange(first, int(last[-1]) + 1)

@@ -1,51 +1,30 @@
-"""Scenarios: the declarative description of a run, read from TOML and validated.
-
-A scenario says what happens (vessel, manoeuvres, sea, current), with what it is observed
-(instruments) and what goes wrong (faults). It is either simulated, or recorded: then a ``[log]``
-table says which files hold what. Everything random is drawn from a run's seed, nothing from here.
-
-`load` finds one by name or path; `simnav.catalogue` knows where the packs are. The schema is
-described in ``docs/reference/scenarios.md``.
-"""
+"""The description of a run: what happens, with what it is observed, what goes wrong, and what is drawn for each run."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-import os
 import pickle
-import re
 import sys
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self, SupportsIndex
 
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from simnav.catalogue import NAME, Header, gym_id, headers
-from simnav.draws import Distribution, Draws, Template, has_draws, with_values
 from simnav.log.spec import RecordedSpec
-from simnav.plugins import PluginError, is_file_module, load_plugin, source_digest
+from simnav.plugins import is_file_module, load_plugin, source_digest
+from simnav.scenario.catalogue import NAME, gym_id
+from simnav.scenario.consistency import LONGEST, check
+from simnav.scenario.draws import Distribution, Draws, Template, has_draws, with_values
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
-from simnav.spec import Positive, Spec, SpecError, closest, entries, quantity
-from simnav.types import KINDS, Array, Instruments
+from simnav.spec import Positive, Spec, SpecError, entries, quantity
+from simnav.types import Array, Instruments
 from simnav.world import Current, Manoeuvre, Sea, Start, Vessel
 
-__all__ = ["Dial", "Header", "InitialError", "Scenario", "headers", "load", "names", "parse"]
-
-#: A measurement's labels are 32 bits, one an interval of a fault.
-_MOST_BITS = 32
-
-#: Longest run [s] and fastest instrument [Hz]: more than anyone needs, less than fills the memory by a slip.
-_LONGEST, _FASTEST = 1e7, 1e5
-#: What the lines look like that the parser of TOML cannot read.
-_LONG_NUMBER, _NESTED = r"[0-9_]{4000}", r"(?:[\[{][^\[{]{0,20}){40}"
-#: Highest speed of a vessel and of a current [m/s], and least magnitude of a number that is not 0.
-_HIGHEST_SPEED, _SMALLEST = 1e3, 1e-200
+__all__ = ["TRAINING_ROOT", "Dial", "InitialError", "Scenario"]
 
 #: What is added to the seed of a run of a training scenario. A campaign's seeds are below it, so that no run of the
 #: board shares a random stream with one that parameters were chosen on.
@@ -53,8 +32,6 @@ TRAINING_ROOT = 1 << 63
 
 #: Files with draws that were tried at the ends of their ranges in this process.
 _CHECKED: set[str] = set()
-
-_INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
 
 Sigmas = tuple[float, float, float]
 
@@ -141,7 +118,7 @@ class Scenario(Spec):
     plugins: tuple[str, ...] = Field(
         (), description="Python files that register the instruments and faults of others, from the folder of this file"
     )
-    duration: Annotated[float, Field(gt=0.0, le=_LONGEST)] = quantity(
+    duration: Annotated[float, Field(gt=0.0, le=LONGEST)] = quantity(
         "s", description="length of a run; a multiple of the step"
     )
     step: Positive = quantity("s", 1.0, description="from one estimate to the next")
@@ -357,13 +334,7 @@ class Scenario(Spec):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_head(self)
-        _check_instruments(self)
-        if self.log is None:
-            _check_world(self)
-        else:
-            _check_log(self, self.log)
-        _check_faults(self)
+        check(self)
         return self
 
 
@@ -390,224 +361,3 @@ def _restore(plugins: tuple[str, ...], reduced: bytes) -> Any:
     scenario = function(*arguments)
     scenario.__setstate__(state)
     return scenario
-
-
-def _check_head(s: Scenario) -> None:
-    if not NAME.fullmatch(s.name) or re.search(r"-v\d+$", s.name):
-        raise ValueError(f"name = {s.name!r} should be in kebab-case and without a version, like 'coastal-voyage'")
-    if not NAME.fullmatch(s.track):
-        raise ValueError(f"track = {s.track!r} should be in kebab-case, like 'aided-ins'")
-    if not s.group.strip():
-        raise ValueError(f"group = {s.group!r} should be a word or two, like 'degraded GNSS'")
-    if s.step > s.duration or abs(s.epochs * s.step - s.duration) > 1e-6:
-        raise ValueError(
-            f"duration_s = {s.duration:g} should be a multiple of step_s = {s.step:g}, "
-            f"like {max(1, s.epochs) * s.step:g}"
-        )
-
-
-def _check_instruments(s: Scenario) -> None:
-    if not s.instruments:
-        raise ValueError("there is no instrument; add at least one table [instruments.NAME]")
-    for name, spec in s.instruments.items():
-        if not _INSTRUMENT.fullmatch(name):
-            raise ValueError(f"instruments.{name}: a name is of lower-case letters, digits and underscores")
-        if name == "interval" or (name in KINDS and name != spec.kind):
-            raise ValueError(
-                f"instruments.{name}.kind = {spec.kind!r}: {name!r} is no name for it, it means something else"
-            )
-        _check_no_subnormal(f"instruments.{name}", spec.model_dump())
-        if spec.rate > _FASTEST:
-            raise ValueError(f"instruments.{name}.rate_hz = {spec.rate:g}: should be at most {_FASTEST:g}")
-        if isinstance(spec, ImuSpec) != (name == "imu"):
-            raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
-
-
-def _check_no_subnormal(where: str, value: Any) -> None:
-    """Numbers next to zero that arithmetic cannot divide by."""
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            _check_no_subnormal(f"{where}.{key}", inner)
-    elif isinstance(value, (list, tuple)):
-        for inner in value:
-            _check_no_subnormal(where, inner)
-    elif isinstance(value, float) and 0.0 < abs(value) < _SMALLEST:
-        raise ValueError(f"{where} = {value:g} (in SI units): should be 0, or at least {_SMALLEST:g}")
-
-
-def _check_speeds(s: Scenario) -> None:
-    """No vessel is faster than `_HIGHEST_SPEED`; beyond it the truth would not be finite."""
-    speeds = {f"manoeuvre {k} ({m.kind}).speed_m_s": getattr(m, "speed", 0.0) for k, m in enumerate(s.manoeuvres, 1)}
-    speeds |= {"start.speed_m_s": getattr(s.start, "speed", 0.0), "current.speed_m_s": getattr(s.current, "speed", 0.0)}
-    for key, speed in speeds.items():
-        if isinstance(speed, (int, float)) and abs(speed) > _HIGHEST_SPEED:
-            raise ValueError(f"{key} = {speed:g}: should be at most {_HIGHEST_SPEED:g}")
-
-
-def _check_world(s: Scenario) -> None:
-    """A simulated run: start and manoeuvres fit the vessel and the water."""
-    if s.start is None:
-        raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
-    if s.imu is not None and abs(s.step * s.imu.rate - round(s.step * s.imu.rate)) > 1e-6:
-        raise ValueError(
-            f"step_s = {s.step:g} should be a multiple of the IMU's sample interval, 1 / {s.imu.rate:g} Hz"
-        )
-    _check_speeds(s)
-    vessel = s.vessel or Vessel()
-    depth = -s.start.altitude
-    if vessel.kind == "ship" and depth > 0.0:
-        raise ValueError(f"start.depth_m = {depth:g}: a ship floats; say vessel.kind = 'uuv' for a submerged vehicle")
-    if s.water_depth is not None and depth >= s.water_depth:
-        raise ValueError(f"start.depth_m = {depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}")
-    for i, m in enumerate(s.manoeuvres):
-        if vessel.kind == "ship" and m.kind in ("dive", "surface"):
-            raise ValueError(f"manoeuvre[{i}].kind = {m.kind!r}: a ship cannot; say vessel.kind = 'uuv'")
-        if m.kind == "dive" and s.water_depth is not None and m.depth >= s.water_depth:
-            raise ValueError(
-                f"manoeuvre[{i}].depth_m = {m.depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}"
-            )
-
-
-def _check_log(s: Scenario, log: RecordedSpec) -> None:
-    """A recorded run: no world beside it, and a source for every instrument."""
-    for key in ("start", "vessel", "manoeuvres", "sea", "current", "world_seed"):
-        if getattr(s, key):
-            table = "manoeuvre" if key == "manoeuvres" else key
-            raise ValueError(f"{table}: a recorded run ([log]) has no simulated world; leave it out")
-    aids = list(s.aids)
-    for name in log.instruments:
-        if name not in aids:
-            raise ValueError(f"log.instruments.{name}: there is no [instruments.{name}] datasheet{closest(name, aids)}")
-    for name in aids:
-        if name not in log.instruments:
-            raise ValueError(f"instruments.{name}: the log says not where it comes from; add [log.instruments.{name}]")
-    if (log.imu is None) != (s.imu is None):
-        there, missing = ("log.imu", "instruments.imu") if s.imu is None else ("instruments.imu", "log.imu")
-        raise ValueError(f"[{there}] needs [{missing}] beside it")
-
-
-def _check_faults(s: Scenario) -> None:
-    kinds = {name: spec.kind for name, spec in s.aids.items()}
-    for i, fault in enumerate(s.faults):
-        try:
-            fault.check(kinds, imu=s.imu is not None)
-        except SpecError as error:
-            raise ValueError(f"fault[{i}] {str(error).removeprefix('fault ')}") from None
-        first = fault.intervals[0][0] if fault.intervals else fault.start
-        if first >= s.duration:
-            raise ValueError(f"fault[{i}] {fault.kind!r}: it starts at {first:g} s, but duration_s = {s.duration:g}")
-    bits = sum(fault.bits for fault in s.faults)
-    if bits > _MOST_BITS:
-        raise ValueError(f"fault: {bits} intervals are too many; the labels have room for {_MOST_BITS}")
-
-
-def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> Scenario:
-    """Read a scenario from the text of a TOML file; load the plug-ins that it names.
-
-    Parameters
-    ----------
-    text : str
-        The whole text of the file.
-    source : str
-        What messages call it.
-    folder : Path, optional
-        From where plug-in files are named; by default the working directory.
-
-    Raises
-    ------
-    SpecError
-        One sentence that names source, key and value, and what would be right.
-    """
-    try:
-        table: dict[str, Any] = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"{source}: not valid TOML: {error}") from None
-    except ValueError:
-        raise SpecError(f"{source}: {_key_of(text, _LONG_NUMBER)}: a number has more digits than can be read") from None
-    except RecursionError:
-        raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
-    if "plugins" in table:
-        table["plugins"] = _load_plugins(table["plugins"], source, folder or Path.cwd())
-    try:
-        return Scenario.from_toml(table, source=source)
-    except RecursionError:
-        raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
-
-
-def _key_of(text: str, value: str) -> str:
-    """The key of the first line that holds a value of a certain form."""
-    for number, line in enumerate(text.splitlines(), 1):
-        if re.search(value, line):
-            key = line.partition("=")[0].strip() if "=" in line else ""
-            return f"line {number}, {key[:60]}" if key else f"line {number}"
-    return "its values"
-
-
-def _load_plugins(names: Any, source: str, folder: Path) -> list[str]:
-    """Load plug-in files; their absolute paths."""
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise SpecError(f"{source}: plugins = {names!r} should be a list of Python files, like ['beacon.py']")
-    paths = [str((folder / Path(name).expanduser()).resolve()) for name in names]
-    for name, path in zip(names, paths, strict=True):
-        try:
-            load_plugin(path)
-        except PluginError as error:
-            raise SpecError(f"{source}: plugins = {name!r}: {error}") from None
-    return paths
-
-
-def names() -> list[str]:
-    """Names of all scenarios of the installed packs, sorted, without versions."""
-    return sorted({h.name for h in headers()})
-
-
-def load(name_or_path: str | Path) -> Scenario:
-    """Find and read a scenario.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        ``"coastal-voyage"`` (the newest version), ``"coastal-voyage-v1"``, or the path of a TOML file
-        (a text counts as a path where it ends in ``.toml`` or has a slash in it).
-
-    Raises
-    ------
-    SpecError
-        If there is no such scenario or file, or it is not valid: one sentence.
-    """
-    text = os.fspath(name_or_path)
-    if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or os.sep in text:
-        return _read(Path(text))
-    return _read(_find(text).path)
-
-
-def _find(name: str) -> Header:
-    available = headers()
-    by_id = {h.id: h for h in available}
-    if name in by_id:
-        return by_id[name]
-    versions = [h for h in available if h.name == name]
-    if versions:
-        return versions[-1]
-    stem = re.sub(r"-v\d+$", "", name)
-    others = [h.id for h in available if h.name == stem]
-    if others:
-        raise SpecError(f"there is no scenario {name!r}; there is {' and '.join(others)}")
-    raise SpecError(f"there is no scenario {name!r}{closest(stem, _unique(h.name for h in available))}")
-
-
-def _unique(items: Iterable[str]) -> list[str]:
-    return list(dict.fromkeys(items))
-
-
-def _read(path: Path) -> Scenario:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        near = closest(path.stem, names()) if path.parent == Path() else ""
-        raise SpecError(f"{path}: no such file{near.replace('did you mean', 'did you mean the scenario')}") from None
-    except UnicodeDecodeError:
-        raise SpecError(f"{path}: not a TOML file, for it is not UTF-8 text") from None
-    except OSError as error:
-        raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
-    return parse(text, source=str(path), folder=path.parent)

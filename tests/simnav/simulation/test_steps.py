@@ -10,8 +10,8 @@ import pytest
 
 from simnav.recording import packets
 from simnav.scenario import Scenario, load, parse
-from simnav.simulator import Simulator
-from simnav.steps import SteppedRuns
+from simnav.simulation.simulator import Simulator
+from simnav.simulation.steps import SteppedRuns
 
 #: Every kind of instrument and fault that comes with simnav.
 TOML = """

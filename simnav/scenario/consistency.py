@@ -1,0 +1,154 @@
+"""What has to fit together in a scenario: names, instruments, the world or the log, faults, and orders of magnitude."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from simnav.log.spec import RecordedSpec
+from simnav.scenario.catalogue import NAME
+from simnav.sensors import ImuSpec
+from simnav.spec import SpecError, closest
+from simnav.types import KINDS
+from simnav.world import Vessel
+
+if TYPE_CHECKING:
+    from simnav.scenario.scenario import Scenario
+
+__all__ = ["LONGEST", "check"]
+
+#: A measurement's labels are 32 bits, one an interval of a fault.
+_MOST_BITS = 32
+
+#: Longest run [s] and fastest instrument [Hz]: more than anyone needs, less than fills the memory by a slip.
+LONGEST, _FASTEST = 1e7, 1e5
+#: Highest speed of a vessel and of a current [m/s], and least magnitude of a number that is not 0.
+_HIGHEST_SPEED, _SMALLEST = 1e3, 1e-200
+
+_INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def check(s: Scenario) -> None:
+    """Check that the parts of a scenario fit together.
+
+    Raises
+    ------
+    ValueError
+        One sentence that names the key, its value, and what would be right.
+    """
+    _check_head(s)
+    _check_instruments(s)
+    if s.log is None:
+        _check_world(s)
+    else:
+        _check_log(s, s.log)
+    _check_faults(s)
+
+
+def _check_head(s: Scenario) -> None:
+    if not NAME.fullmatch(s.name) or re.search(r"-v\d+$", s.name):
+        raise ValueError(f"name = {s.name!r} should be in kebab-case and without a version, like 'coastal-voyage'")
+    if not NAME.fullmatch(s.track):
+        raise ValueError(f"track = {s.track!r} should be in kebab-case, like 'aided-ins'")
+    if not s.group.strip():
+        raise ValueError(f"group = {s.group!r} should be a word or two, like 'degraded GNSS'")
+    if s.step > s.duration or abs(s.epochs * s.step - s.duration) > 1e-6:
+        raise ValueError(
+            f"duration_s = {s.duration:g} should be a multiple of step_s = {s.step:g}, "
+            f"like {max(1, s.epochs) * s.step:g}"
+        )
+
+
+def _check_instruments(s: Scenario) -> None:
+    if not s.instruments:
+        raise ValueError("there is no instrument; add at least one table [instruments.NAME]")
+    for name, spec in s.instruments.items():
+        if not _INSTRUMENT.fullmatch(name):
+            raise ValueError(f"instruments.{name}: a name is of lower-case letters, digits and underscores")
+        if name == "interval" or (name in KINDS and name != spec.kind):
+            raise ValueError(
+                f"instruments.{name}.kind = {spec.kind!r}: {name!r} is no name for it, it means something else"
+            )
+        _check_no_subnormal(f"instruments.{name}", spec.model_dump())
+        if spec.rate > _FASTEST:
+            raise ValueError(f"instruments.{name}.rate_hz = {spec.rate:g}: should be at most {_FASTEST:g}")
+        if isinstance(spec, ImuSpec) != (name == "imu"):
+            raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
+
+
+def _check_no_subnormal(where: str, value: Any) -> None:
+    """Numbers next to zero that arithmetic cannot divide by."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_no_subnormal(f"{where}.{key}", inner)
+    elif isinstance(value, (list, tuple)):
+        for inner in value:
+            _check_no_subnormal(where, inner)
+    elif isinstance(value, float) and 0.0 < abs(value) < _SMALLEST:
+        raise ValueError(f"{where} = {value:g} (in SI units): should be 0, or at least {_SMALLEST:g}")
+
+
+def _check_speeds(s: Scenario) -> None:
+    """No vessel is faster than `_HIGHEST_SPEED`; beyond it the truth would not be finite."""
+    speeds = {f"manoeuvre {k} ({m.kind}).speed_m_s": getattr(m, "speed", 0.0) for k, m in enumerate(s.manoeuvres, 1)}
+    speeds |= {"start.speed_m_s": getattr(s.start, "speed", 0.0), "current.speed_m_s": getattr(s.current, "speed", 0.0)}
+    for key, speed in speeds.items():
+        if isinstance(speed, (int, float)) and abs(speed) > _HIGHEST_SPEED:
+            raise ValueError(f"{key} = {speed:g}: should be at most {_HIGHEST_SPEED:g}")
+
+
+def _check_world(s: Scenario) -> None:
+    """A simulated run: start and manoeuvres fit the vessel and the water."""
+    if s.start is None:
+        raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
+    if s.imu is not None and abs(s.step * s.imu.rate - round(s.step * s.imu.rate)) > 1e-6:
+        raise ValueError(
+            f"step_s = {s.step:g} should be a multiple of the IMU's sample interval, 1 / {s.imu.rate:g} Hz"
+        )
+    _check_speeds(s)
+    vessel = s.vessel or Vessel()
+    depth = -s.start.altitude
+    if vessel.kind == "ship" and depth > 0.0:
+        raise ValueError(f"start.depth_m = {depth:g}: a ship floats; say vessel.kind = 'uuv' for a submerged vehicle")
+    if s.water_depth is not None and depth >= s.water_depth:
+        raise ValueError(f"start.depth_m = {depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}")
+    for i, m in enumerate(s.manoeuvres):
+        if vessel.kind == "ship" and m.kind in ("dive", "surface"):
+            raise ValueError(f"manoeuvre[{i}].kind = {m.kind!r}: a ship cannot; say vessel.kind = 'uuv'")
+        if m.kind == "dive" and s.water_depth is not None and m.depth >= s.water_depth:
+            raise ValueError(
+                f"manoeuvre[{i}].depth_m = {m.depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}"
+            )
+
+
+def _check_log(s: Scenario, log: RecordedSpec) -> None:
+    """A recorded run: no world beside it, and a source for every instrument."""
+    for key in ("start", "vessel", "manoeuvres", "sea", "current", "world_seed"):
+        if getattr(s, key):
+            table = "manoeuvre" if key == "manoeuvres" else key
+            raise ValueError(f"{table}: a recorded run ([log]) has no simulated world; leave it out")
+    aids = list(s.aids)
+    for name in log.instruments:
+        if name not in aids:
+            raise ValueError(f"log.instruments.{name}: there is no [instruments.{name}] datasheet{closest(name, aids)}")
+    for name in aids:
+        if name not in log.instruments:
+            raise ValueError(f"instruments.{name}: the log says not where it comes from; add [log.instruments.{name}]")
+    if (log.imu is None) != (s.imu is None):
+        there, missing = ("log.imu", "instruments.imu") if s.imu is None else ("instruments.imu", "log.imu")
+        raise ValueError(f"[{there}] needs [{missing}] beside it")
+
+
+def _check_faults(s: Scenario) -> None:
+    kinds = {name: spec.kind for name, spec in s.aids.items()}
+    for i, fault in enumerate(s.faults):
+        try:
+            fault.check(kinds, imu=s.imu is not None)
+        except SpecError as error:
+            raise ValueError(f"fault[{i}] {str(error).removeprefix('fault ')}") from None
+        first = fault.intervals[0][0] if fault.intervals else fault.start
+        if first >= s.duration:
+            raise ValueError(f"fault[{i}] {fault.kind!r}: it starts at {first:g} s, but duration_s = {s.duration:g}")
+    bits = sum(fault.bits for fault in s.faults)
+    if bits > _MOST_BITS:
+        raise ValueError(f"fault: {bits} intervals are too many; the labels have room for {_MOST_BITS}")

@@ -1,0 +1,211 @@
+"""A fault in one run: a layer over whatever delivered the measurements, a simulator or a real log.
+
+It acts at the measurement times within its intervals [start, end); elsewhere it neither changes nor draws anything.
+Within them it draws a fixed number of variates per measurement, those counted that something else has dropped, so that
+faults never change one another.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.recording import AidStream, ImuLabels
+from simnav.streams import stream as random_stream
+from simnav.types import KINDS, Array, ImuSamples
+
+if TYPE_CHECKING:
+    from simnav.sensors.faults.fault import FaultSpec
+
+__all__ = [
+    "ADDS",
+    "DISTURBS_IMU",
+    "DROPS",
+    "HOLDS",
+    "STEPS_NOISE",
+    "TOLERANCE",
+    "ZEROES",
+    "Activity",
+    "FaultLayer",
+]
+
+#: Times are multiples of the sample interval up to rounding: half a microsecond decides [s].
+TOLERANCE = 0.5e-6
+
+#: What a layer does to a measurement, as far as it is known from the times alone (`FaultLayer.ahead`): it adds an
+#: error; adds noise up to a new sigma; takes it away; repeats an earlier one; says zero; disturbs the IMU.
+ADDS, STEPS_NOISE, DROPS, HOLDS, ZEROES, DISTURBS_IMU = range(6)
+
+
+class Activity:
+    """When a fault acts.
+
+    Parameters
+    ----------
+    spec : FaultSpec
+        The fault, with its intervals or how they are drawn.
+    rng : numpy.random.Generator
+        For random intervals.
+    """
+
+    def __init__(self, spec: FaultSpec, rng: np.random.Generator):
+        self.spec, self._rng = spec, rng
+        self._random = spec.mean_active is not None
+        intervals = spec.intervals or (() if self._random else ((spec.start, spec.end),))
+        self.starts = np.array([a for a, _ in intervals])
+        self.ends = np.array([b for _, b in intervals])
+
+    def _extend(self, until: float) -> None:
+        spec = self.spec
+        assert spec.mean_active is not None
+        assert spec.mean_gap is not None
+        end = float(self.ends[-1]) if len(self.ends) else spec.start
+        starts, ends = [], []
+        while end < min(until + 1.0, spec.end):
+            start = end + self._rng.exponential(spec.mean_gap)
+            end = min(start + self._rng.exponential(spec.mean_active), spec.end)
+            if start >= spec.end:
+                start = end = spec.end
+            starts.append(start)
+            ends.append(end)
+        self.starts, self.ends = np.append(self.starts, starts), np.append(self.ends, ends)
+
+    def locate(self, time: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+        """Which of the n times lie in an interval.
+
+        Parameters
+        ----------
+        time : (n,) array
+            Ascending [s].
+
+        Returns
+        -------
+        rows, interval : (m,) int array
+            The times that do, and the number of the interval of each; None for none.
+        """
+        if len(time) == 0:
+            return None
+        if self._random:
+            self._extend(float(time[-1]))
+        if len(self.starts) == 0 or time[-1] < self.starts[0] - TOLERANCE or time[0] >= self.ends[-1] - TOLERANCE:
+            return None
+        number = np.searchsorted(self.starts - TOLERANCE, time, side="right") - 1
+        rows = np.flatnonzero((number >= 0) & (time < (self.ends - TOLERANCE)[number]))
+        return (rows, number[rows]) if len(rows) else None
+
+
+class FaultLayer:
+    """A fault in one run, laid over the streams of its instruments block by block.
+
+    Parameters
+    ----------
+    spec : FaultSpec
+        What the scenario says of the fault.
+    index : int
+        First bit of the fault in the labels of measurements.
+    seed : int
+        Seed of the run.
+    key : str
+        Name of its random streams.
+
+    Attributes
+    ----------
+    spec : FaultSpec
+        What the scenario says of the fault.
+    activity : Activity
+        When it acts.
+    """
+
+    #: One of `ADDS`, ..., for runs that go step by step (`simnav.simulation.steps`); None: `apply` alone knows what it
+    #: does.
+    operation: ClassVar[int | None] = None
+
+    def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
+        self.spec, self._index, self._seed, self._key = spec, index, seed, key
+        self._generators: dict[tuple[str, ...], np.random.Generator] = {}
+        self.activity = Activity(spec, self.rng("intervals"))
+
+    def rng(self, *names: str) -> np.random.Generator:
+        """A random stream of this fault's own, the same generator for the same names: "gnss", "noise"."""
+        if names not in self._generators:
+            self._generators[names] = random_stream(self._seed, "fault", self._key, *names)
+        return self._generators[names]
+
+    def touches(self, stream: AidStream) -> bool:
+        """Whether the fault is one of this instrument's."""
+        return self.touches_kind(stream.name, stream.kind)
+
+    def touches_kind(self, name: str, kind: str) -> bool:
+        """Whether the fault is one of the instrument of this name and kind."""
+        return name in self.spec.instruments or kind in self.spec.instruments
+
+    def bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
+        """The label of measurements in intervals of the given numbers."""
+        number = interval if self.spec.intervals else np.zeros_like(interval)
+        return np.left_shift(np.uint32(1), (self._index + number).astype(np.uint32))
+
+    @property
+    def index(self) -> int:
+        """First bit of the fault in the labels of measurements."""
+        return self._index
+
+    def ahead(self, name: str, kind: str, time: Array) -> tuple[NDArray[np.int64], Array]:
+        """What `apply` finds and draws for the next n samples of an instrument, delivered or not.
+
+        Parameters
+        ----------
+        name, kind : str
+            Of one of its instruments.
+        time : (n,) array
+            Sample times [s].
+
+        Returns
+        -------
+        interval : (n,) int array
+            Number of the interval that each sample lies in; -1 for none.
+        error : (n, d) array
+            What is drawn for it; zero where there is nothing to draw.
+        """
+        interval, error = np.full(len(time), -1, np.int64), np.zeros((len(time), len(KINDS[kind].components)))
+        found = self.activity.locate(time)
+        if found is not None:
+            interval[found[0]] = found[1]
+        return interval, error
+
+    def ahead_imu(self, time: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Likewise of the IMU: the n samples that are disturbed, and the (n, 6) errors of rate and force."""
+        raise NotImplementedError(f"{type(self).__name__} does not disturb an IMU")
+
+    def apply(self, stream: AidStream) -> AidStream:
+        """Lay the fault over the next block of a stream.
+
+        Parameters
+        ----------
+        stream : AidStream
+            Measurements of one of the fault's instruments, with what earlier faults did to them.
+
+        Returns
+        -------
+        AidStream
+            The same one where the fault does nothing to it; the argument is never changed.
+        """
+        return stream
+
+    def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
+        """Lay the fault over the next block of IMU samples.
+
+        Parameters
+        ----------
+        samples : ImuSamples
+            Samples, with what earlier faults did to them.
+        labels : ImuLabels or None
+            Labels of these samples; None where no fault of the scenario touches the IMU.
+
+        Returns
+        -------
+        samples, labels
+            As given where the fault is none of the IMU's.
+        """
+        return samples, labels
