@@ -184,6 +184,19 @@ def _integrate(
     position: Array, velocity: Array, dcm: Array, angular_rate: Array, specific_force: Array, interval: Array,
     positions: Array, velocities: Array, dcms: Array,
 ) -> None:  # fmt: skip
+    """Mechanize k samples, from a state that is updated.
+
+    Parameters
+    ----------
+    position, velocity, dcm : (3,), (3,), (3, 3) arrays
+        State at the start; overwritten by that at the end.
+    angular_rate, specific_force : (k, 3) arrays
+        Means over the sample intervals [rad/s], [m/s^2].
+    interval : (k,) array
+        Their lengths [s].
+    positions, velocities, dcms : (k, 3), (k, 3), (k, 3, 3) arrays
+        Overwritten: the states at their ends.
+    """
     memory = np.zeros(6)
     for k in range(interval.size):
         mechanize_step(
@@ -333,6 +346,21 @@ def _rotated(
 def _increments(
     time: Array, velocity: Array, dcm: Array, memory: Array, position: Array, angular_rate: Array, specific_force: Array
 ) -> None:
+    """What ideal sensors deliver between k + 1 states; see `increments`.
+
+    Parameters
+    ----------
+    time : (k + 1,) array
+        Of the states [s].
+    velocity, dcm : (k + 1, 3), (k + 1, 3, 3) arrays
+        Of the states.
+    memory : (6,) array
+        Increments of the interval before, for coning and sculling; updated.
+    position : (k + 1, 3) array
+        The first is given; the others are overwritten by the mechanization's own rule.
+    angular_rate, specific_force : (k, 3) arrays
+        Overwritten: means over the intervals [rad/s], [m/s^2].
+    """
     for k in range(time.size - 1):
         dt = time[k + 1] - time[k]
         a, b = dcm[k], dcm[k + 1]

@@ -94,9 +94,11 @@ class AdaptiveFactor(NoiseAdaptation):
     ``target="P"`` is eq. 28: P/a, for each measurement. ``target="R"`` is what the text does in the end ("the adaptive
     factor can be used to inflate the measurement noise"): R/a by instrument; with the residual statistic and the
     three-segment function these are IGG-III weights. By default it also doubts the prediction, when a fix and a log
-    have failed ``together`` times running: then R stands and P is inflated (`PredictionTest`, which also limits every
-    inflation: eq. 28 with ten gross errors in a row would multiply by 1e30 what nothing observes). The covariance is
-    Joseph's with the noise and P in use (eq. 29's first line lacks the factor).
+    have failed ``together`` times running: then R stands, and the covariance of position, velocity and attitude is
+    inflated (`ErrorModel.loosen`), but not that of the instruments' errors, which do not change because the vessel
+    moves otherwise. `PredictionTest` also limits every inflation: eq. 28 with ten gross errors in a row would multiply
+    by 1e30 what nothing observes. The covariance is Joseph's with the noise and P in use (eq. 29's first line lacks
+    the factor).
 
     Parameters
     ----------
@@ -141,7 +143,8 @@ class AdaptiveFactor(NoiseAdaptation):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
         self.factor = FACTORS[factor]
         self.together = 0 if self.printed or target == "P" else together
-        self.inflates = target == "P" or self.together > 0
+        self.inflates = target == "P"
+        self.inflates_motion = not self.inflates
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

@@ -50,15 +50,19 @@ class Adaptation:
     Attributes
     ----------
     inflation : float
-        What the solver multiplies P by before it uses the measurement that `adapt` has just seen; for those who
-        doubt the prediction rather than the measurement.
+        What the solver inflates the prediction by before it uses the measurement that `adapt` has just seen; for those
+        who doubt the prediction rather than the measurement.
     inflates : bool
-        Whether ``inflation`` is ever other than 1. A window keeps no covariance of a prediction to multiply, and
-        refuses an adaptation that inflates it.
+        Whether all of P is multiplied by ``inflation``. A window keeps no covariance of a prediction to multiply, and
+        refuses such an adaptation.
+    inflates_motion : bool
+        Whether the covariance of the motion is inflated, and no other (`ErrorModel.loosen`). A window weighs motion by
+        its own residuals, and leaves this out.
     """
 
     inflation: float = 1.0
     inflates: bool = False
+    inflates_motion: bool = False
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

@@ -64,7 +64,32 @@ def _average(
     rows: Array, count: int, predicted: Array, nominal: Array, shortest: int, longest: int, low: float, high: float,
     newest: bool, forgetting: float, estimate: Array,
 ) -> int:  # fmt: skip
-    """Eqs. 16-20 over the last of ``count`` rows; ``estimate`` is overwritten; returns the length of the window."""
+    """Noise from the last innovations (eqs. 16-20).
+
+    Parameters
+    ----------
+    rows : (r, ...) array
+        Ring of what `_push` wrote, one row an epoch.
+    count : int
+        Epochs so far; the last r of them are there.
+    predicted, nominal : (m, m) arrays
+        H P H' and R.
+    shortest, longest : int
+        Bounds of the length of the window; equal for a fixed one.
+    low, high : float
+        Bounds of the ratio of variances between which the length is adapted.
+    newest : bool
+        Subtract the newest H P H' from all epochs, not to each its own.
+    forgetting : float
+        Share of the mean in the new estimate.
+    estimate : (m, m) array
+        The last estimate of R; updated.
+
+    Returns
+    -------
+    int
+        Length of the window.
+    """
     m, ring = nominal.shape[0], rows.shape[0]
     length = shortest
     if longest > shortest and count > 1:

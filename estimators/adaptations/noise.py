@@ -138,9 +138,9 @@ class NoiseAdaptation(Adaptation):
     ----------
     together : int
         See `PredictionTest`; 0: the prediction is never at fault.
-    inflates : bool
-        Whether P is inflated besides, where the prediction is at fault. Only `AdaptiveFactor` does: it helps where an
-        IMU is disturbed, and does harm to the attitude where it was the instruments after all.
+    inflates_motion : bool
+        Whether the motion is inflated besides, where the prediction is at fault. Only `AdaptiveFactor` does: it helps
+        where an IMU is disturbed, and does harm where it was two instruments after all.
     """
 
     together = 3
@@ -173,7 +173,7 @@ class NoiseAdaptation(Adaptation):
             self._noisy[name] = innovation.noise
         if self._prediction.fails(innovation):
             noise: Array | None = innovation.noise
-            if self.inflates:
+            if self.inflates or self.inflates_motion:
                 self.inflation = self._prediction.inflation(innovation)
         else:
             noise = self.choose(innovation)

@@ -63,6 +63,8 @@ class ErrorModel(ABC):
     memory: ClassVar[tuple[str, ...]] = ()
     #: Place of the attitude, a rotation vector, in the error; None for a model without one.
     attitude_at: ClassVar[int | None] = None
+    #: Places of position and velocity, and of the attitude: what `loosen` inflates. Here all states and none.
+    moving: ClassVar[tuple[slice, slice]] = (slice(None), slice(0, 0))
 
     @property
     def needs(self) -> Needs:
@@ -161,6 +163,28 @@ class ErrorModel(ABC):
             the model has no faster way than one after the other.
         """
         return None
+
+    def loosen(self, covariance: Array, inflation: float, first: Array) -> None:
+        """Doubt the motion of the state: inflate its covariance in place, and that of nothing else.
+
+        A prediction is wrong where the vessel, or an IMU that is disturbed, has not moved as the model says. Position
+        and velocity are then anywhere. The errors of the instruments are what they were: whoever inflates them, too,
+        lets them follow the first measurement that is wrong.
+
+        Parameters
+        ----------
+        covariance : (n, n) array
+        inflation : float
+            Of the variances, above 1.
+        first : (n,) array
+            Variances at the start of the run. No attitude is doubted beyond its own, for which corrections are linear.
+        """
+        motion, attitude = self.moving
+        factors = np.ones(self.size)
+        factors[motion] = inflation
+        factors[attitude] = np.clip(first[attitude] / covariance.diagonal()[attitude], 1.0, inflation)
+        sigmas = np.sqrt(factors)
+        covariance *= sigmas[:, None] * sigmas
 
     def snapshot(self) -> list[Array]:
         """Copies of what `correct` changes, for `restore`."""

@@ -121,6 +121,7 @@ class InertialModel(ErrorModel):
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("_memory", "_turn", "_clock")
     attitude_at = 6
+    moving = (slice(0, 6), slice(6, 9))
     #: Whether the kernels of `simnav.estimators.models.inertial_update` stand for `measure` and `correct`. A model that
     #: does one of these in a way of its own says False.
     fused: ClassVar[bool] = True

@@ -185,6 +185,21 @@ def _turn_covariance(P: Array, shift: Array, out: Array) -> None:
 def _linearise_motion(
     first: int, transition: Array, begin_shift: Array, end_shift: Array, residual: Array, jacobian: Array
 ) -> None:
+    """Residual and derivative of the motion factors from a row on.
+
+    Parameters
+    ----------
+    first : int
+        Factor to begin with.
+    transition : (K, n, n) array
+        Phi of each motion, on the trajectory that was predicted.
+    begin_shift, end_shift : (K, n) arrays
+        By how much the nodes at both ends have been moved since then.
+    residual : (K, n) array
+        Overwritten: newer node minus where the motion leads from the older one.
+    jacobian : (K, n, n) array
+        Overwritten: derivative of where it leads with respect to the older node.
+    """
     count, n = begin_shift.shape
     moved = np.empty(n)
     for k in range(first, count):
@@ -196,6 +211,17 @@ def _linearise_motion(
 def _along_motion(
     transition: Array, jacobian: Array, residual: Array, begin_shift: Array, end_shift: Array, step: Array, along: Array
 ) -> None:
+    """A step that follows the motion exactly, from one that solves the linear problem (`Chain.along_motion`).
+
+    Parameters
+    ----------
+    transition, jacobian, residual, begin_shift, end_shift
+        As of `_linearise_motion`.
+    step : (K + 1, n) array
+        Step of each node that solves the linear problem.
+    along : (K + 1, n) array
+        Overwritten: the same first step, and after it the motion with the errors that the linear solution leaves to it.
+    """
     count, n = begin_shift.shape
     shift, moved, error, J = np.empty(n), np.empty(n), np.empty(n), np.zeros((n, n))
     along[0] = step[0]
@@ -220,6 +246,29 @@ def _linearise_aids(
     scale_at: Integers, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, calibration: Array,
     residual: Array, jacobian: Array, components: Integers,
 ) -> None:  # fmt: skip
+    """Residuals and derivatives of M measurements at the K states that they are attached to.
+
+    Parameters
+    ----------
+    first : int
+        Measurement to begin with.
+    row : (M,) int array
+        Number of the state of each measurement; -1: none of these states.
+    instrument : (M,) int array
+        Number s of its instrument.
+    value : (M, 3) array
+        What was measured.
+    codes, arms, bias_at, scale_at
+        Of each instrument, as `simnav.estimators.models.measurements.observe_inertial` takes them.
+    position, velocity, dcm, rate, bias, calibration : (K, ...) arrays
+        The states, likewise.
+    residual : (M, 3) array
+        Overwritten: measured minus predicted.
+    jacobian : (M, 3, n) array
+        Overwritten: derivative of the prediction with respect to the state's error.
+    components : (M,) int array
+        Overwritten: components that count; 0 where the state has no such measurement.
+    """
     innovation = np.empty(3)
     for i in range(first, row.size):
         k, s = row[i], instrument[i]
@@ -240,7 +289,21 @@ def _move_folds(
     first: int, transition: Array, shift: Array, position: Array, velocity: Array, dcm: Array, bias: Array,
     calibration: Array, jacobian: Array,
 ) -> None:  # fmt: skip
-    """Correct the states of folds by where their nodes' shifts lead, in place."""
+    """Correct the states of folds by where their nodes' shifts lead, in place.
+
+    Parameters
+    ----------
+    first : int
+        Fold to begin with.
+    transition : (K, n, n) array
+        Phi from each node to the time of its fold.
+    shift : (K, n) array
+        By how much the node has been moved since the fold was predicted.
+    position, velocity, dcm, bias, calibration : (K, ...) arrays
+        States at the folds; updated.
+    jacobian : (K, n, n) array
+        Overwritten: derivative of the fold's state with respect to the node.
+    """
     count, n = shift.shape
     moved, dx = np.empty(n), np.zeros(15 + calibration.shape[1])
     for k in range(first, count):
@@ -261,6 +324,17 @@ def _retract(
     step: Array, position: Array, velocity: Array, dcm: Array, bias: Array, calibration: Array, begin_shift: Array,
     end_shift: Array,
 ) -> None:  # fmt: skip
+    """Move the nodes by a step, in place.
+
+    Parameters
+    ----------
+    step : (K, n) array
+        Corrections, with a rotation vector at 6:9 that turns the attitude from the left.
+    position, velocity, dcm, bias, calibration : (K, ...) arrays
+        States of the nodes; updated.
+    begin_shift, end_shift : (K - 1, n) arrays
+        By how much the nodes at both ends of each motion have been moved; updated.
+    """
     count, n = step.shape
     dx = np.zeros(max(n, 15))
     for k in range(count):

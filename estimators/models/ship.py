@@ -88,6 +88,7 @@ class ShipModel(ErrorModel):
     """
 
     state = ("position", "x")
+    moving = (slice(0, 0), slice(0, 0))  # no IMU that could be disturbed: the noise of the motion covers manoeuvres
 
     def __init__(
         self,

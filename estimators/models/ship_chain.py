@@ -40,6 +40,25 @@ __all__ = ["ShipChain"]
 def _linearise_motion(
     first: int, time: Array, position: Array, x: Array, rate: Array, turn_time: float, residual: Array, jacobian: Array
 ) -> None:
+    """Residual and derivative of the motion factors from a row on.
+
+    Parameters
+    ----------
+    first : int
+        Factor to begin with.
+    time : (K + 1,) array
+        Of the nodes [s].
+    position, x : (K + 1, 3), (K + 1, n) arrays
+        States of the nodes (see `simnav.estimators.models.ship_kernels`).
+    rate : (n,) array
+        Rates of decay of the states [1/s].
+    turn_time : float
+        Correlation time of the turn rate [s].
+    residual : (K, n) array
+        Overwritten: newer node minus where the motion leads from the older one.
+    jacobian : (K, n, n) array
+        Overwritten: derivative of where it leads with respect to the older node.
+    """
     count, n = residual.shape
     p, y, decay = np.empty(3), np.empty(n), np.empty(n)
     for k in range(first, count):
@@ -68,6 +87,27 @@ def _linearise_aids(
     first: int, row: Integers, instrument: Integers, value: Array, codes: Integers, aids: Array, position: Array,
     x: Array, residual: Array, jacobian: Array,
 ) -> None:  # fmt: skip
+    """Residuals and derivatives of M measurements at the states that they are attached to.
+
+    Parameters
+    ----------
+    first : int
+        Measurement to begin with.
+    row : (M,) int array
+        Number of the state of each measurement; -1: none of these states.
+    instrument : (M,) int array
+        Number of its instrument.
+    value : (M, 3) array
+        What was measured.
+    codes, aids : (i,), (i, ...) arrays
+        Of each instrument, as `simnav.estimators.models.ship_kernels.residual_of` takes them.
+    position, x : (K, 3), (K, n) arrays
+        The states.
+    residual : (M, 3) array
+        Overwritten: measured minus predicted.
+    jacobian : (M, 3, n) array
+        Overwritten: derivative of the prediction with respect to the state's error.
+    """
     for i in range(first, row.size):
         k, s = row[i], instrument[i]
         if k < 0:
@@ -88,6 +128,27 @@ def _move_folds(
     first: int, node: Integers, base: int, fold_time: Array, time: Array, position: Array, x: Array, rate: Array,
     turn_time: float, now_position: Array, now_x: Array, jacobian: Array,
 ) -> None:  # fmt: skip
+    """States at the times of folds, each from its node.
+
+    Parameters
+    ----------
+    first : int
+        Fold to begin with.
+    node : (F,) int array
+        Number of the node of each fold; ``base`` is that of the first node that is kept.
+    base : int
+        Number of the first node.
+    fold_time, time : (F,), (K,) arrays
+        Of the folds and of the nodes [s].
+    position, x : (K, 3), (K, n) arrays
+        States of the nodes.
+    rate, turn_time
+        As of `_linearise_motion`.
+    now_position, now_x : (F, 3), (F, n) arrays
+        Overwritten: the states at the folds.
+    jacobian : (F, n, n) array
+        Overwritten: derivative of the fold's state with respect to the node.
+    """
     decay = np.empty(rate.size)
     for i in range(first, node.size):
         k = node[i] - base
@@ -113,6 +174,17 @@ def _along_motion(
     time: Array, position: Array, x: Array, rate: Array, turn_time: float, residual: Array, jacobian: Array,
     step: Array, along: Array,
 ) -> None:  # fmt: skip
+    """A step that follows the motion exactly, from one that solves the linear problem (`Chain.along_motion`).
+
+    Parameters
+    ----------
+    time, position, x, rate, turn_time, residual, jacobian
+        As of `_linearise_motion`.
+    step : (K + 1, n) array
+        Step of each node that solves the linear problem.
+    along : (K + 1, n) array
+        Overwritten: the same first step, and after it the motion with the errors that the linear solution leaves to it.
+    """
     count, n = residual.shape
     p, y, decay, error, F = np.empty(3), np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
     along[0] = step[0]

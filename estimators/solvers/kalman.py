@@ -88,6 +88,7 @@ class KalmanEstimator(Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         self.model = self._chosen(instruments)
         self.covariance = self.model.begin(start, instruments)
+        self._first_variances = self.covariance.diagonal().copy()
         if self.adaptation is not None:
             self.adaptation.reset(instruments)
         self._names = [name for name, sheet in instruments.items() if self.model.observes(sheet)]
@@ -192,7 +193,10 @@ class KalmanEstimator(Solver):
                 flagged.append((m.instrument, m.time))
                 return
             noise, inflation = chosen, self.adaptation.inflation
-            if inflation != 1.0:
+            if inflation != 1.0 and not self.adaptation.inflates:
+                self.model.loosen(self.covariance, inflation, self._first_variances)
+                residual, cross, predicted, _ = self._observe(m) or observation
+            elif inflation != 1.0:
                 for matrix in (self.covariance, cross, predicted):
                     matrix *= inflation
         observation = residual, cross, predicted, noise

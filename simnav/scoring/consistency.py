@@ -13,7 +13,7 @@ The horizontal NEES and the coverage are also scored by parts: before the first 
 from then on. An estimator may be consistent while nothing is wrong, and not know when something is.
 
 An estimator can test itself, too: one whose measurements contradict it sets the diagnostic ``inconsistent`` to 1. A run
-in which it does so for most of the time ends as ``inconsistent``, not as ``ok``.
+in which it does so for most of the time, or at its end, ends as ``inconsistent``, not as ``ok``.
 """
 
 from __future__ import annotations
@@ -219,21 +219,39 @@ for _of in ("_clean", "_faulty"):
     _register_coverage(95, _of)
 
 
+def _reports(given: ScoringInput) -> NDArray[np.bool_]:
+    """Whether it reports that it is inconsistent, at the epochs at which it says anything of it."""
+    reported = given.trial.diagnostics.get("inconsistent", np.empty(0))
+    return reported[np.isfinite(reported)] > 0.5 if reported.ndim == 1 else np.zeros(0, dtype=bool)
+
+
 @register_score(
     "inconsistent", title="Share of the epochs at which it reports that it is inconsistent", unit="-", better="lower"
 )
 def _inconsistent(given: ScoringInput) -> float:
     """NaN for an estimator that does not test itself."""
-    reported = given.trial.diagnostics.get("inconsistent", np.empty(0))
-    known = np.isfinite(reported) if reported.ndim == 1 else np.zeros(0, dtype=bool)
-    return float(np.mean(reported[known] > 0.5)) if known.any() else float("nan")
+    reports = _reports(given)
+    return float(np.mean(reports)) if reports.size else float("nan")
+
+
+@register_score(
+    "inconsistent_end",
+    title="Share of the last tenth of the epochs at which it reports that it is inconsistent",
+    unit="-",
+    better="lower",
+)
+def _inconsistent_end(given: ScoringInput) -> float:
+    """NaN for an estimator that does not test itself."""
+    reports = _reports(given)
+    return float(np.mean(reports[-max(1, reports.size // 10) :])) if reports.size else float("nan")
 
 
 def ending(status: str, scores: Mapping[str, float]) -> str:
     """How a run ended: its status, or ``inconsistent``.
 
-    A run that is ``ok`` ended as inconsistent where the estimator reported for most of the time that its measurements
-    contradict it. It is no failure: a ranking takes its error as it is, so that nobody loses by being honest.
+    A run that is ``ok`` ended as inconsistent where the estimator reported that its measurements contradict it, for
+    most of the time, or for most of the last tenth: one that a late fault leaves wrong has ended so, too. It is no
+    failure: a ranking takes its error as it is, so that nobody loses by being honest.
 
     Parameters
     ----------
@@ -246,8 +264,11 @@ def ending(status: str, scores: Mapping[str, float]) -> str:
     --------
     >>> ending("ok", {"inconsistent": 0.98}), ending("timeout", {}), ending("ok", {"inconsistent": 0.1})
     ('inconsistent', 'timeout', 'ok')
+    >>> ending("ok", {"inconsistent": 0.1, "inconsistent_end": 0.9})
+    'inconsistent'
     """
-    return "inconsistent" if status == "ok" and scores.get("inconsistent", 0.0) > 0.5 else status
+    reported = max(scores.get("inconsistent", 0.0), scores.get("inconsistent_end", 0.0))
+    return "inconsistent" if status == "ok" and reported > 0.5 else status
 
 
 def badge(nees_by_run: Array, degrees: int = 2) -> Badge:

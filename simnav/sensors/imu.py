@@ -171,7 +171,31 @@ def triad_errors(
     bias: Array, instability: Array, first_i: int, per_second_i: float, walk: Array, first_w: int, per_second_w: float,
     limit: float, step: float, residual: Array,
 ) -> None:  # fmt: skip
-    """Errors of one triad (see the module); ``out`` may be ``ideal``."""
+    """Errors of one triad (see the module).
+
+    Parameters
+    ----------
+    ideal, variates : (n, 3) arrays
+        What an ideal triad delivers [rad/s or m/s^2]; unit variates of the white noise.
+    out : (n, 3) array
+        Overwritten; it may be ``ideal``.
+    time, interval : (n,) arrays
+        Ends of the sample intervals, and their lengths [s].
+    density : float
+        Of the white noise, per sqrt(s).
+    matrix, bias : (3, 3), (3,) arrays
+        Scale factors and misalignments with the identity; turn-on bias.
+    instability, walk : (a, 3), (b, 3) arrays
+        In-run bias and random walk of the rate, held between their samples.
+    first_i, first_w : int
+        Number of the first of these samples.
+    per_second_i, per_second_w : float
+        How many there are in a second.
+    limit, step : float
+        Range; least increment of the quantization, 0 for none.
+    residual : (3,) array
+        What quantization has left over so far; updated.
+    """
     last_i = len(instability) - 1
     last_w = len(walk) - 1
     for i in range(len(time)):

@@ -10,10 +10,11 @@ arms, sea and latitude. ::
     python -m tests.agreement.voyages table RESULTS.jsonl
 
 With ``--family`` voyage k is run k of a family of scenarios, such as ``scenarios/families/clean-voyages.toml``. A
-second call of ``run`` goes on where the first one was stopped. The table gives, for each estimator, the horizontal
-RMSE over the best of the estimators in `BEST_OF` on the same voyage: median, 90th percentile and maximum; how often
-the mean horizontal NEES by degree of freedom is above 5, and in how many of these the estimator never reports that it
-is inconsistent; and the processor time of an epoch.
+second call of ``run`` goes on where the first one was stopped, and adds estimators that are missing. The table gives,
+for each estimator, the horizontal RMSE over the best of the estimators in `BEST_OF`, or of those of ``--over``, on the
+same voyage: median, geometric mean, 90th percentile with a 95 % interval, and maximum; how often the mean horizontal
+NEES by degree of freedom is above 5, and in how many of these the estimator never reports that it is inconsistent; and
+the processor time of an epoch.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from __future__ import annotations
 import argparse
 import json
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -42,7 +44,8 @@ BEST_OF = ("ekf", "iekf", "ukf", "inekf", "sw-fgo", "gnc-fgo", "huber-fgo")
 #: A mean NEES by degree of freedom above this is a divergence.
 LARGEST_NEES = 5.0
 _KEPT = (
-    "horizontal_rmse", "heading_rmse", "nees_horizontal", "nees_attitude", "smoothed_horizontal_rmse", "inconsistent"
+    "horizontal_rmse", "heading_rmse", "nees_horizontal", "nees_attitude", "smoothed_horizontal_rmse", "inconsistent",
+    "inconsistent_end",
 )  # fmt: skip
 SPEEDS = {"ship": (3.0, 10.0), "auv": (1.0, 2.5), "rov": (0.2, 1.0), "boat": (5.0, 20.0)}
 
@@ -194,11 +197,24 @@ def run(recording: Recording, estimator: str) -> dict[str, Any]:
     return found
 
 
+def _stored(paths: list[Path]) -> dict[int, dict[str, Any]]:
+    """The voyages of files of results by number; what several lines hold of one voyage is joined."""
+    voyages: dict[int, dict[str, Any]] = {}
+    for path in paths:
+        for line in path.read_text().splitlines() if path.exists() else ():
+            row = json.loads(line)
+            kept = voyages.setdefault(row["number"], row)
+            kept["errors"] |= row["errors"]
+    return voyages
+
+
 def _run_all(arguments: argparse.Namespace) -> None:
     path: Path = arguments.results
-    done = {json.loads(line)["number"] for line in path.read_text().splitlines()} if path.exists() else set()
+    stored = _stored([path])
     for number in range(arguments.first, arguments.first + arguments.count):
-        if number in done:
+        done = stored[number]["errors"] if number in stored else {}
+        missing = [e for e in arguments.estimators.split(",") if e not in done]
+        if not missing:
             continue
         if arguments.family:
             recording, row = voyage_of(arguments.family, number, arguments.heading, arguments.duration)
@@ -208,26 +224,49 @@ def _run_all(arguments: argparse.Namespace) -> None:
         row["heading_off_deg"] = arguments.heading_off
         if arguments.heading_off:
             recording = turned(recording, arguments.heading_off)
-        row["errors"] = {e: run(recording, e) for e in arguments.estimators.split(",")}
+        row["errors"] = {e: run(recording, e) for e in missing}
         with path.open("a") as file:
             file.write(json.dumps(row) + "\n")
 
 
+def percentile_interval(values: Sequence[float], share: float) -> tuple[float, float]:
+    """95 % interval of a percentile, from the order statistics; infinite where there are too few values.
+
+    Source: H. A. David and H. N. Nagaraja, *Order Statistics*, Wiley, 2003, section 7.1.
+
+    Examples
+    --------
+    >>> percentile_interval(range(100), 0.9)
+    (83, 95)
+    """
+    from scipy.stats import binom
+
+    ordered = [-np.inf, *sorted(values), np.inf]
+    below, above = (int(binom.ppf(q, len(values), share)) for q in (0.025, 0.975))
+    return ordered[below], ordered[above + 1]
+
+
 def _table(arguments: argparse.Namespace) -> None:
-    rows = [json.loads(line) for path in arguments.results for line in path.read_text().splitlines()]
+    rows = list(_stored(arguments.results).values())
     for low, high in ((0.0, 2.0), (2.0, 10.0), (10.0, 180.0), (0.0, 180.0)):
         some = [r for r in rows if low <= r["heading_deg"] < high]
         if not some:
             continue
         print(f"\ninitial heading known to {low:g} to {high:g} deg, {len(some)} voyages")
         print(
-            f"{'estimator':30s} median    p90     max  (voyage)  NEES > {LARGEST_NEES:g}  silent  not ok  ms an epoch"
+            f"{'estimator':30s}    n median   mean    p90 [    95 %    ]     max  (voyage)  NEES > {LARGEST_NEES:g}"
+            "  silent  not ok  ms an epoch"
         )
-        for name in some[0]["errors"]:
+        for name in dict.fromkeys(e for r in some for e in r["errors"]):
             ratios, numbers, high_nees, silent, failed, cost = [], [], 0, 0, 0, []
             for r in some:
                 e = r["errors"]
-                best = min(e[b]["horizontal_rmse"] for b in BEST_OF if b in e and "horizontal_rmse" in e[b])
+                others = [
+                    e[b]["horizontal_rmse"] for b in arguments.over.split(",") if b in e and e[b]["status"] == "ok"
+                ]
+                if name not in e or not others:
+                    continue
+                best = min(others)
                 if e[name]["status"] != "ok":
                     failed += 1
                     continue
@@ -240,9 +279,12 @@ def _table(arguments: argparse.Namespace) -> None:
             if not ratios:
                 continue
             worst = int(np.argmax(ratios))
+            low_90, high_90 = percentile_interval(ratios, 0.9)
+            mean = np.exp(np.mean(np.log(ratios)))
             print(
-                f"{name:30s} {np.median(ratios):6.3f} {np.percentile(ratios, 90):6.2f} {ratios[worst]:7.2f}"
-                f"  ({numbers[worst]})  {high_nees:6d}  {silent:7d}  {failed:6d}  {np.median(cost):8.2f}"
+                f"{name:30s} {len(ratios):4d} {np.median(ratios):6.3f} {mean:6.3f} {np.percentile(ratios, 90):6.3f}"
+                f" [{low_90:6.3f}, {high_90:6.3f}] {ratios[worst]:7.2f}  ({numbers[worst]})  {high_nees:6d}"
+                f"  {silent:7d}  {failed:6d}  {np.median(cost):8.2f}"
             )
 
 
@@ -262,6 +304,7 @@ def main() -> None:
     runs.set_defaults(call=_run_all)
     table = commands.add_parser("table", help="print the table")
     table.add_argument("results", type=Path, nargs="+")
+    table.add_argument("--over", default=",".join(BEST_OF), help="divide by the least error of these")
     table.set_defaults(call=_table)
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")

@@ -167,11 +167,11 @@ def test_a_solver_that_cannot_smooth_says_why(solver: type):
         type(Row)("Smoothed", (Row,), {}, solver=solver, model=InertialModel, smoother=Smoother)
 
 
-@pytest.mark.parametrize("adaptation", [FadingMemory(), AdaptiveFactor(), AdaptiveFactor(target="P")])
+@pytest.mark.parametrize("adaptation", [FadingMemory(), AdaptiveFactor(target="P")])
 def test_a_window_refuses_what_inflates_a_prediction(adaptation):
     with pytest.raises(ValueError, match="inflates the covariance of the prediction"):
         WindowEstimator(InertialModel(), adaptation)
-    WindowEstimator(InertialModel(), AdaptiveFactor(together=0))
+    WindowEstimator(InertialModel(), AdaptiveFactor())  # doubts the motion, which a window weighs by itself
 
 
 def test_isolation_is_a_piece_of_windows_with_a_weighting():

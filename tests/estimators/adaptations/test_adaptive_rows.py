@@ -13,6 +13,7 @@ import pytest
 from simnav.estimator import EstimatorError, UnsuitableScenario, find, make, names
 from simnav.geometry.earth import displace
 from simnav.scenario import load
+from simnav.scoring import score
 from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Instruments
@@ -165,3 +166,12 @@ def test_absurd_and_noiseless_instruments(recording_of, name: str):
     noiseless = replace(recording, instruments=Instruments(sheets, recording.instruments.imu, 1.0))
     trial = run_trial(make(name), noiseless)
     assert trial.status == "ok", trial.reason
+
+
+def test_a_log_that_reads_zero_is_not_taken_for_a_wrong_motion():
+    """Fixes and log fail together, for the log pulls the velocity down; the attitude stays what it was."""
+    recording = record(load("training-voyages").with_values({"duration_s": 300.0}), 103)
+    trials = [run_trial(make(name), recording) for name in ("ekf", "adkf")]
+    plain, robust = (score(trial, recording, ["horizontal_rmse", "heading_rmse"]) for trial in trials)
+    assert robust["horizontal_rmse"] < 0.5 * plain["horizontal_rmse"]
+    assert robust["heading_rmse"] < 1.5 * plain["heading_rmse"]

@@ -68,10 +68,17 @@ def test_a_start_beyond_recovery_is_reported(voyage):
     assert trial.status == "ok"
     assert scores["heading_rmse"] > 0.5
     assert scores["inconsistent"] > 0.8
+    assert scores["inconsistent_end"] == 1.0
     result = Result(voyage.scenario, 1, "ekf", {}, False, trial.status, "", scores)
     assert result.ending == "inconsistent"
     assert Runs([result]).statuses == {"inconsistent": 1}
     assert Runs([result]).failed == 0
+
+
+def test_a_run_that_a_late_fault_leaves_wrong_ends_as_inconsistent():
+    scores = {"inconsistent": 0.3, "inconsistent_end": 1.0}
+    assert Result("voyage-v1", 1, "ekf", {}, False, "ok", "", scores).ending == "inconsistent"
+    assert Result("voyage-v1", 1, "ekf", {}, False, "ok", "", scores | {"inconsistent_end": 0.0}).ending == "ok"
 
 
 def test_a_filter_follows_the_current_through_a_turn():
