@@ -183,7 +183,8 @@ def test_rows_of_charts_are_switched_on_and_off(visit, catalogued):
 def test_a_page_is_printed_with_all_its_charts_in_the_colours_of_paper(browser, folder, catalogued):
     visit = Visit(browser, folder, scheme="dark")
     page = visit.open(f"{catalogued}.html")
-    page.evaluate("window.print = () => { window.printed = document.querySelector('[data-charts]').cloneNode(true); }")
+    charts = "document.querySelector('[data-charts]').cloneNode(true)"
+    page.evaluate(f"window.print = () => {{ window.printed = {charts}; }}; 0")
     page.click("[data-print]")
     page.wait_for_function("window.printed")
     assert page.evaluate("[...printed.querySelectorAll('.vega')].every((v) => v.dataset.drawn)")
