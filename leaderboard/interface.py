@@ -425,7 +425,8 @@ def sweep(
 
     Parameters
     ----------
-    scenario, estimators, parameters : as for `run`
+    scenario, estimators, parameters
+        As for `run`.
     dials : mapping of str to sequence of float, or str
         A dial of the scenario (``[[dial]]``), or a key path in its file, to values in the unit of the key; or as on the
         command line, ``"multipath=0,1,2,4"``. Without values: seven over the range. The clean value is always added.

@@ -34,7 +34,16 @@ from simnav.trial_log import DIVERGENCE_LIMIT, DivergedError, Trial, TrialLog
 from simnav.types import NavigationStates
 from simnav.wire import EstimateEncoder, InvalidOutputError, PacketDecoder, PacketEncoder
 
-__all__ = ["DIVERGENCE_LIMIT", "FailureError", "Session", "Trial", "describe_failure", "run_session", "run_trial"]
+__all__ = [
+    "DIVERGENCE_LIMIT",
+    "FailureError",
+    "LostError",
+    "Session",
+    "Trial",
+    "describe_failure",
+    "run_session",
+    "run_trial",
+]
 
 
 class FailureError(Exception):
@@ -50,6 +59,10 @@ class FailureError(Exception):
     def __init__(self, status: str, reason: str):
         super().__init__(reason)
         self.status, self.reason = status, reason
+
+
+class LostError(Exception):
+    """What a session that is elsewhere reports: the estimator is no more there."""
 
 
 class Session(Protocol):
@@ -72,8 +85,8 @@ class Session(Protocol):
         """Begin the run: `Estimator.reset`."""
         ...
 
-    def step(self, packet: list[Any]) -> tuple[bytes | bytearray, float]:
-        """Hand over the packet of a step, as buffers; return the answer, and how long it took [s]."""
+    def run(self, packets: PacketEncoder, log: TrialLog) -> None:
+        """Hand over one packet after the other, each when the answer to the last one is there; log the answers."""
         ...
 
     def smooth(self) -> NavigationStates | None:
@@ -104,7 +117,7 @@ def run_trial(estimator: Estimator, recording: Recording, *, keep_covariance: bo
     Trial
         Never raises for what the estimator does; `KeyboardInterrupt` passes.
     """
-    log = TrialLog(len(recording.data.truth.time), keep_covariance)
+    log = TrialLog(recording.data.truth, keep_covariance)
     return run_session(_LocalSession(estimator), recording, log)
 
 
@@ -121,15 +134,19 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
     Returns
     -------
     Trial
-        Never raises for what the estimator does, unless the session says that it is no more there.
+        Nothing is raised for what the estimator does.
+
+    Raises
+    ------
+    LostError
+        If the session does, and no answer before that was bad.
     """
     status, reason = "ok", ""
     reset_seconds = smooth_seconds = 0.0
     smoothed = None
-    where, k = "reset()", -1
-    data = recording.data
-    packets = PacketEncoder(data, data.truth.time)
-    ends, truth = data.truth.time.tolist(), data.truth.position
+    where = "reset()"
+    ends = recording.data.truth.time
+    packets = PacketEncoder(recording.data, ends)
     try:
         lack = lacking(session.needs, recording.instruments)
         if lack:
@@ -138,16 +155,21 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
         session.begin(recording, packets)
         reset_seconds = time.perf_counter() - begun
         where = ""
-        for k, end in enumerate(ends):
-            answer, seconds = session.step(packets[k])
-            log.add(answer, end, seconds, truth[k])
+        try:
+            session.run(packets, log)
+        except (Exception, SystemExit):
+            log.settle()  # what failed before counts
+            raise
+        log.settle()
         log.check_covariances()
         where = "smooth()"
         begun = time.perf_counter()
         smoothed = log.trajectory(session.smooth())
         smooth_seconds = time.perf_counter() - begun
+    except LostError:
+        raise
     except (Exception, SystemExit) as error:
-        status, reason = _failure(error, session, where or f"update() at {ends[k]:g} s")
+        status, reason = _failure(error, session, where or f"update() at {ends[min(log.step, len(ends) - 1)]:g} s")
     if status != "ok":
         try:
             log.check_covariances()
@@ -191,12 +213,13 @@ class _LocalSession:
             self.estimator.reveal(recording)
         self.estimator.reset(copy.deepcopy(recording.start), copy.deepcopy(recording.instruments))
 
-    def step(self, packet: list[Any]) -> tuple[bytes | bytearray, float]:
-        measurements = self._decode(bytearray(b"".join(packet)))
-        begun = time.perf_counter_ns()
-        estimate = self.estimator.update(measurements)
-        seconds = 1e-9 * (time.perf_counter_ns() - begun)
-        return self._encode(estimate), seconds
+    def run(self, packets: PacketEncoder, log: TrialLog) -> None:
+        for k in range(len(packets)):
+            measurements = self._decode(bytearray(b"".join(packets[k])))
+            begun = time.perf_counter_ns()
+            estimate = self.estimator.update(measurements)
+            seconds = 1e-9 * (time.perf_counter_ns() - begun)
+            log.add(self._encode(estimate), seconds)
 
     def smooth(self) -> NavigationStates | None:
         return self.estimator.smooth()

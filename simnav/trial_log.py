@@ -41,6 +41,9 @@ _EARTH_RADIUS = 6371e3
 _ALL = 0b111111111
 _STATE = 72  # bytes of position, velocity and attitude
 _COVARIANCE = 648
+_FORM = 16  # bytes of the header of an answer that tell its form: all but the time
+_FIRST = ANSWER.size // 8  # where the numbers of an answer begin, in float64; the time is before them
+_HELD = 100  # bytes that are counted for keeping the diagnostics and flags of a step, beside what they take
 _VECTORS = [struct.Struct(f"{3 * n}d") for n in range(4)]  # numbers of so many vectors
 
 
@@ -108,8 +111,8 @@ class TrialLog:
 
     Parameters
     ----------
-    steps : int
-        Of the run.
+    truth : NavigationStates
+        At the ends of the steps; NaN where it is not known.
     keep_covariance : bool
         False saves 648 bytes an epoch; covariances are checked all the same.
     limit : float
@@ -119,11 +122,17 @@ class TrialLog:
     ----------
     n : int
         How many answers are good.
+    step : int
+        Number of the step whose answer is wanted next, or was refused.
     """
 
-    def __init__(self, steps: int, keep_covariance: bool, limit: float = math.inf):
-        self.n = 0
+    def __init__(self, truth: NavigationStates, keep_covariance: bool, limit: float = math.inf):
+        self.n = self.step = 0
+        steps = len(truth.time)
         self._steps, self._keep, self._limit = steps, keep_covariance, limit
+        self._ends: list[float] = truth.time.tolist()
+        self._truth = truth.position
+        self._pending: list[tuple[bytes, float]] = []
         self._time = np.full(steps, np.nan)
         self._seconds = np.full(steps, np.nan)
         self._states = np.full((steps, 9), np.nan)
@@ -132,7 +141,7 @@ class TrialLog:
         self._shapes: list[list[tuple[str, tuple[int, ...]]]] = [[]]  # of diagnostics
         self._sizes = [0]  # of each shape [bytes]
         self._dimensions: dict[str, int] = {}
-        self._diagnostics: list[list[tuple[int, bytes]]] = [[]]  # by shape: step and numbers
+        self._diagnostics: list[list[tuple[int, int, bytes]]] = [[]]  # by shape: first step, how many, numbers
         self._flags: list[tuple[int, str, float]] = []
         self._covariance: Array | None = None
         self._chunk: Array | None = None
@@ -140,17 +149,42 @@ class TrialLog:
         self._epochs: list[int] = []  # of the covariances in the chunk
         self._held = 0  # bytes of diagnostics and flags
 
-    def add(self, answer: bytes | bytearray | memoryview, end: float, seconds: float, truth: Array) -> None:
+    def put(self, answer: bytes, seconds: float) -> None:
+        """Lay the answer to a step by until `settle`; as of `add`."""
+        self._pending.append((answer, seconds))
+
+    def settle(self) -> None:
+        """Take all answers that were laid by, as `add` would one after the other; what follows a bad one is discarded.
+
+        Most answers are of one form and good. Such runs of answers are checked and stored together.
+
+        Raises
+        ------
+        InvalidOutputError, DivergedError, MemoryError
+            As of `add`.
+        """
+        pending, self._pending = self._pending, []
+        first = 0
+        while first < len(pending):
+            answer = pending[first][0]
+            head, size, last = answer[:_FORM], len(answer), first + 1
+            while last < len(pending) and len(pending[last][0]) == size and pending[last][0][:_FORM] == head:
+                last += 1
+            taken = self._add_alike(pending[first:last]) if last > first + 1 else 0
+            first += taken
+            for answer, seconds in () if taken else pending[first:last]:
+                self.add(answer, seconds)
+                first += 1
+
+    def add(self, answer: bytes | bytearray | memoryview, seconds: float) -> None:
         """Take the answer to one step, or raise and leave the log as it was.
 
         Parameters
         ----------
         answer : bytes
             In the form of `simnav.wire`.
-        end, seconds : float
-            End of the step, and wall time of the update [s].
-        truth : (3,) array
-            True position; NaN where it is not known.
+        seconds : float
+            Wall time of the update [s].
 
         Raises
         ------
@@ -159,6 +193,8 @@ class TrialLog:
         MemoryError
             If diagnostics and flags take more than the limit.
         """
+        k = self.step = self.n
+        end, truth = self._ends[k], self._truth[k]
         if len(answer) < ANSWER.size:
             raise _malformed()
         kind, given, bits, shape, flags, size, tail, stamp = ANSWER.unpack_from(answer)
@@ -167,7 +203,7 @@ class TrialLog:
         if not abs(stamp - end) <= _TIME_TOLERANCE:
             raise InvalidOutputError(f"time of the estimate is {stamp!r}, the step ends at {end!r}")
         body = memoryview(answer)
-        k, place = self.n, ANSWER.size
+        place = ANSWER.size
         whole = given & 7 == 7
         vectors = _VECTORS[(given & 7).bit_count()]
         after = place + vectors.size + (_COVARIANCE if given & COVARIANCE else 0)
@@ -198,18 +234,70 @@ class TrialLog:
         self.n += 1
         self._time[k], self._seconds[k], self._estimated[k] = end, seconds, bits
         if shape:
-            self._diagnostics[shape].append((k, numbers))
+            self._diagnostics[shape].append((k, 1, numbers))
         if flagged:
             self._flags += [(k, *f) for f in flagged]
         if given & COVARIANCE:
-            if self._chunk is None:
-                self._chunk = np.empty((min(_CHUNK, self._steps), 9, 9))
-                self._chunk_bytes = _bytes_of(self._chunk)
+            self._room()
             begin = _COVARIANCE * len(self._epochs)
             self._chunk_bytes[begin : begin + _COVARIANCE] = body[after - _COVARIANCE : after]
             self._epochs.append(k)
-            if len(self._epochs) >= len(self._chunk):
+            if self._room() == 0:
                 self.check_covariances()
+        self.step = self.n
+
+    def _add_alike(self, pending: list[tuple[bytes, float]]) -> int:
+        """Take the first of some answers of one form; return how many, 0 where `add` must judge them."""
+        answer = pending[0][0]
+        if len(answer) < ANSWER.size:
+            return 0
+        kind, given, bits, shape, flags, size, tail, _ = ANSWER.unpack_from(answer)
+        if kind != ESTIMATE or given > 15 or bits > _ALL or bits & ~GIVEN_BITS[given & 7] or flags or tail:
+            return 0
+        vectors = 3 * (given & 7).bit_count()
+        after = vectors + (81 if given & COVARIANCE else 0)  # numbers before the diagnostics
+        if shape >= len(self._shapes) or size != 8 * after + self._sizes[shape] or len(answer) != ANSWER.size + size:
+            return 0
+        if given & COVARIANCE:
+            pending = pending[: self._room()]
+        k, m = self.n, len(pending)
+        held = self._held + m * (self._sizes[shape] + _HELD) if shape else self._held
+        if held > self._limit:
+            return 0
+        table = np.frombuffer(b"".join([answer for answer, _ in pending])).reshape(m, -1)
+        values, rest = table[:, _FIRST : _FIRST + vectors], _FIRST + after
+        ends = self._ends[k : k + m]
+        good = np.isfinite(values).all() and (np.abs(table[:, _FIRST - 1] - ends) <= _TIME_TOLERANCE).all()
+        if not good or (bits & 3 == 3 and _some_far(values, self._truth[k : k + m])):
+            return 0
+        if vectors == 9:
+            self._states[k : k + m] = values
+        else:
+            for bit, section in enumerate(VECTORS.values()):
+                if given >> bit & 1:
+                    self._states[k : k + m, section], values = values[:, :3], values[:, 3:]
+        self.n = k + m
+        self.step = self.n - 1
+        self._time[k : k + m], self._seconds[k : k + m] = ends, [seconds for _, seconds in pending]
+        self._estimated[k : k + m] = bits
+        self._held = held
+        if shape:
+            self._diagnostics[shape].append((k, m, table[:, rest:].tobytes()))
+        if given & COVARIANCE and self._chunk is not None:
+            begin = len(self._epochs)
+            self._chunk[begin : begin + m] = table[:, rest - 81 : rest].reshape(m, 9, 9)
+            self._epochs += range(k, k + m)
+            if self._room() == 0:
+                self.check_covariances()
+        self.step = self.n
+        return m
+
+    def _room(self) -> int:
+        """For how many covariances there is room before they are checked."""
+        if self._chunk is None:
+            self._chunk = np.empty((min(_CHUNK, self._steps), 9, 9))
+            self._chunk_bytes = _bytes_of(self._chunk)
+        return len(self._chunk) - len(self._epochs)
 
     def _named(self, numbers: bytes, tail: bytes, shape: int, flags: int) -> list[tuple[str, float]]:
         """Check the diagnostics, learn their names where they are new; return what was flagged."""
@@ -222,7 +310,7 @@ class TrialLog:
         for name, sizes in found or ():
             if self._dimensions.get(name, len(sizes)) != len(sizes):
                 raise InvalidOutputError(f"diagnostic {name!r} changes its number of dimensions")
-        self._held += len(numbers) + len(tail) + 100
+        self._held += len(numbers) + len(tail) + _HELD
         if self._held > self._limit:
             raise MemoryError(f"its diagnostics take more than {self._limit / 2**20:.0f} MiB")
         if found is not None:
@@ -271,21 +359,21 @@ class TrialLog:
 
     def _collected(self, n: int) -> dict[str, Array]:
         """The diagnostics of the first n steps by name, in the order in which they appeared."""
-        kept = [[(k, numbers) for k, numbers in items if k < n] for items in self._diagnostics]
+        kept = [[(k, min(m, n - k), numbers) for k, m, numbers in items if k < n] for items in self._diagnostics]
         sizes: dict[str, tuple[int, ...]] = {}
         for shape, items in zip(self._shapes, kept, strict=True):
             for name, dimensions in shape if items else ():
                 sizes[name] = tuple(map(max, zip(dimensions, sizes.get(name, dimensions), strict=True)))
         found = {name: np.full((n, *dimensions), np.nan) for name, dimensions in sizes.items()}
-        for shape, items in zip(self._shapes, kept, strict=True):
+        for shape, size, items in zip(self._shapes, self._sizes, kept, strict=True):
             if not items:
                 continue
-            epochs = np.array([k for k, _ in items])
-            values = np.frombuffer(b"".join(numbers for _, numbers in items)).reshape(len(items), -1)
+            epochs = np.concatenate([np.arange(k, k + m) for k, m, _ in items])
+            values = np.frombuffer(b"".join([numbers[: m * size] for _, m, numbers in items])).reshape(len(epochs), -1)
             begin = 0
             for name, dimensions in shape:
                 end = begin + math.prod(dimensions)
-                part = values[:, begin:end].reshape(len(items), *dimensions)
+                part = values[:, begin:end].reshape(len(epochs), *dimensions)
                 place: Any = (epochs, *(slice(d) for d in dimensions))
                 found[name][place] = part
                 begin = end
@@ -349,6 +437,15 @@ def _distance(position: Sequence[float], truth: Array) -> float:
     north = float(position[0] - truth[0])
     east = math.remainder(float(position[1] - truth[1]), 2.0 * math.pi) * math.cos(float(truth[0]))
     return _EARTH_RADIUS * math.hypot(north, east)
+
+
+def _some_far(position: Array, truth: Array) -> bool:
+    """Whether one of the positions may be as far away as `DIVERGENCE_LIMIT`: a little less, for the rounding."""
+    with np.errstate(all="ignore"):
+        north = position[:, 0] - truth[:, 0]
+        east = (position[:, 1] - truth[:, 1] + math.pi) % (2.0 * math.pi) - math.pi
+        distance = _EARTH_RADIUS * np.hypot(north, east * np.cos(truth[:, 0]))
+        return bool((distance > 0.99 * DIVERGENCE_LIMIT).any())
 
 
 def _first_bad_covariance(p: Array, estimated: NDArray[np.bool_]) -> tuple[int | None, str]:

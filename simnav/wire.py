@@ -153,8 +153,8 @@ class PacketDecoder:
     @staticmethod
     def size(header: bytes | bytearray) -> int:
         """Bytes of a packet, header included."""
-        samples, _, numbers, *_ = _PACKET.unpack_from(header)
-        return _PACKET.size + 8 * int(numbers + (0 if samples == _NO_IMU else _IMU_WIDTH * samples))
+        samples, _, numbers, _, _, _ = _PACKET.unpack_from(header)
+        return int(_PACKET.size + 8 * (numbers if samples == _NO_IMU else numbers + _IMU_WIDTH * samples))
 
     def __call__(self, packet: bytearray) -> Measurements:
         """The packet; its arrays are views of the buffer, which should not be used again."""

@@ -174,6 +174,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         covariance : (n, n) array
+            P, of the model's error; changed in place.
         inflation : float
             Of the variances, above 1.
         first : (n,) array

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from simnav.scoring.consistency import Badge
 
 __all__ = [
+    "FIRM_REFERENCE",
     "Consistency",
     "Ranking",
     "Reference",
@@ -30,6 +31,9 @@ __all__ = [
     "TrackRanking",
     "TrackRow",
 ]
+
+#: A reference figure of fewer runs is provisional.
+FIRM_REFERENCE = 50
 
 #: Whether a row is ranked, and if not, why: a reference is told the truth; one that is unsuitable needs instruments
 #: that a scenario of the track lacks; one that is incomplete has not run the whole track; one that is implausible has
@@ -98,6 +102,11 @@ class Reference:
     def standard_error(self) -> float:
         """Of the logarithm of the figure; NaN where it is of one run."""
         return self.spread / math.sqrt(self.runs) if self.runs > 1 else math.nan
+
+    @property
+    def provisional(self) -> bool:
+        """Whether it is a geometric mean of fewer runs than `FIRM_REFERENCE`."""
+        return bool(self.estimator) and self.runs < FIRM_REFERENCE
 
     @property
     def bounds(self) -> bool:

@@ -90,11 +90,11 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
             tables.duration(r.update_median), tables.size(r.peak_memory or None),
         ])  # fmt: skip
     columns = ["rank", "tier", "estimator", title, "95 % interval", "95th perc.", "worst run", "failed", "scenarios",
-               "NEES, no fault", "NEES, faults", "95 % coverage", "worst coverage", "per epoch",
-               "memory"]  # fmt: skip
+               "NEES, no fault", "NEES, faults", "95 % coverage, no fault", "worst coverage, no fault",
+               "per epoch", "memory"]  # fmt: skip
     value = ["estimator", title, "rank", "95 % interval", "failed", "worst run", "per epoch", "NEES, no fault",
-             "scenarios", "NEES, faults", "95th perc.", "tier", "95 % coverage", "memory",
-             "worst coverage"]  # fmt: skip
+             "scenarios", "NEES, faults", "95th perc.", "tier", "95 % coverage, no fault", "memory",
+             "worst coverage, no fault"]  # fmt: skip
     numeric = [c for c in columns if c not in ("estimator", "95 % interval", "NEES, no fault", "NEES, faults")]
     notes = [score_caption(track), *track.remarks]
     best = [r.estimator for r in track.rows if r.may_be_best]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from simnav.leaderboard.ranking.board import FIRM_REFERENCE
 from simnav.leaderboard.ranking.statistics import FEWEST, Separation, smallest_p_value
 
 if TYPE_CHECKING:
@@ -60,6 +61,8 @@ def reference_remarks(references: Sequence[Reference]) -> tuple[str, ...]:
     >>> from simnav.leaderboard.ranking.board import Reference
     >>> reference_remarks([Reference(2.0, "oracle", 60, 0.3, stored=True)])
     ('Reference figures: the error of oracle over 60 runs, shipped with the scenario.',)
+    >>> reference_remarks([Reference(2.0, "oracle", 9, 0.3, stored=True)])[-1]
+    'Ratios are provisional: the reference figure is of fewer than 50 runs.'
     """
     found = []
     for shipped in (True, False):
@@ -73,4 +76,9 @@ def reference_remarks(references: Sequence[Reference]) -> tuple[str, ...]:
         s = "s" if len(those) > 1 else ""
         origin = f"shipped with the scenario{s}" if shipped else "of this campaign, for none is shipped"
         found.append(f"Reference figures{where}: the error of {names} over {runs}, {origin}.")
+    weak = sum(r.provisional for r in references)
+    if weak:
+        where = f" on {weak} of {len(references)} scenarios" if weak < len(references) else ""
+        figures = "reference figure is" if weak == 1 else "reference figures are"
+        found.append(f"Ratios are provisional{where}: the {figures} of fewer than {FIRM_REFERENCE} runs.")
     return tuple(found)

@@ -42,20 +42,20 @@ _AFTER = (
     Column("family", "Family", "Kind of method.", "text", filter=True),
     Column(
         "badge",
-        "Consistency",
+        "Consistency, faults",
         "Whether the stated covariance agrees with the errors from the first fault on; optimistic: errors are larger.",
         "badge",
         filter=True,
     ),
     Column(
         "coverage",
-        "95 % coverage",
+        "95 % coverage, faults",
         "Mean share of the epochs, from the first fault of a run on, with the truth in the stated 95 % ellipse.",
         "percent",
     ),
-    Column("clean_badge", "Consistency, clean", "The same before the first fault of a run.", "badge", hidden=True),
+    Column("clean_badge", "Consistency, no fault", "The same before the first fault of a run.", "badge", hidden=True),
     Column(
-        "clean_coverage", "95 % coverage, clean", "The same before the first fault of a run.", "percent", hidden=True
+        "clean_coverage", "95 % coverage, no fault", "The same before the first fault of a run.", "percent", hidden=True
     ),
     Column(
         "failed",

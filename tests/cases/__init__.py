@@ -2,9 +2,34 @@
 
 from pathlib import Path
 
-__all__ = ["POND", "ROV"]
+__all__ = ["POND", "ROV", "ship"]
 
 #: A short voyage with fixes only: the text of its file.
 POND = Path(__file__).with_name("pond.toml").read_text(encoding="utf-8")
 #: A slow ROV with a DVL at 23 Hz and a MEMS IMU: its file.
 ROV = Path(__file__).with_name("rov.toml")
+
+
+def ship(name: str, seconds: float, speed: float = 5.0, sigma: str = "[3.0, 3.0, 5.0]") -> str:
+    """A scenario as TOML: a ship that holds its course, with GNSS once a second and nothing else."""
+    return f"""
+name = "{name}"
+version = 1
+title = "A ship that holds its course"
+duration_s = {seconds}
+
+[start]
+latitude_deg = 50.0
+longitude_deg = -5.0
+heading_deg = 45.0
+speed_m_s = {speed}
+
+[[manoeuvre]]
+kind = "hold"
+duration_s = {seconds}
+
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 1.0
+sigma_m = {sigma}
+"""

@@ -16,28 +16,9 @@ from simnav.leaderboard.results.errors import sentence
 from simnav.scenario import parse
 from simnav.source import record
 from simnav.spec import SpecError
+from tests.cases import ship
 
-TEXT = """
-name = "a"
-version = 1
-title = "A"
-duration_s = 20.0
-
-[start]
-latitude_deg = 50.0
-longitude_deg = -5.0
-heading_deg = 45.0
-speed_m_s = 5.0
-
-[[manoeuvre]]
-kind = "hold"
-duration_s = 20.0
-
-[instruments.gnss]
-kind = "gnss_position"
-rate_hz = 1.0
-sigma_m = [3.0, 3.0, 5.0]
-"""
+TEXT = ship("a", 20.0)
 
 CASES = {
     "speed": ("speed_m_s = 5.0", "speed_m_s = 1e11", "start.speed_m_s = 1e+11: should be at most 1000"),

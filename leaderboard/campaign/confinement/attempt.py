@@ -157,7 +157,7 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
     try:
         with own_core() as core, server.session(entrant, limits, core) as session:
             session.make(entrant, seed_words(recording, entrant))
-            log = TrialLog(len(recording.data.truth.time), True, limits.memory)
+            log = TrialLog(recording.data.truth, True, limits.memory)
             trial = run_session(session, recording, log)
             session.end()
         status, reason = trial.status, trial.reason

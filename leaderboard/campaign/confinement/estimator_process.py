@@ -13,7 +13,7 @@ import numpy as np
 
 from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
 from simnav.kinds import INSTRUMENTS
-from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, command_of, read_message, write_all
+from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, read_message, write_all
 from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.campaign.training_runs import told_of
 from simnav.plugins import load_plugin
@@ -43,10 +43,10 @@ def live(down: int, up: int) -> None:
     """
     session = _Session()
     while True:
-        message = read_message(down)
-        if message is None:
+        found = read_message(down)
+        if found is None:
             return
-        kind = command_of(message)
+        kind, message = found
         if not kind:
             reply = session.step(message)
         elif kind == Down.MAKE:
@@ -70,7 +70,7 @@ class _Session:
         self._estimator: Any = None
         self._encode = EstimateEncoder()
         self._decode = PacketDecoder(())
-        self._before = set(sys.modules)
+        self._before = _loaded_libraries()
 
     def make(self, body: bytes) -> bytes:
         """Import and construct the estimator; of a file or a session that is the first time that its code runs."""
@@ -141,7 +141,7 @@ class _Session:
 
     def end(self) -> bytes:
         """What should be imported before the next one is forked."""
-        new = (set(sys.modules) - self._before) & LIBRARIES
+        new = _loaded_libraries() - self._before
         return answer(Up.DONE, json.dumps({"libraries": sorted(new)}).encode())
 
     def _raised(self, error: BaseException) -> bytes:
@@ -152,6 +152,10 @@ class _Session:
         status = "out-of-memory" if isinstance(error, MemoryError) else "error"
         estimator: Estimator = self._estimator
         return _failure(status, describe_failure(error, estimator, skip=1))
+
+
+def _loaded_libraries() -> set[str]:
+    return {name for name in LIBRARIES if name in sys.modules}  # a look at each name of a module would copy its page
 
 
 def _failure(status: str, reason: str) -> bytes:

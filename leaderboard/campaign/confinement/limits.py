@@ -19,11 +19,13 @@ __all__ = [
     "limit",
     "out_of_memory_kills",
     "resident",
+    "use_huge_pages",
 ]
 
 _LINUX = sys.platform == "linux"
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_MADV_COLLAPSE, _HUGE = 25, 2 << 20  # of madvise(2); bytes of a huge page where a page has 4 KiB
 
 
 def limit(seconds: float, memory: int) -> None:
@@ -72,6 +74,24 @@ def keep_freed_memory() -> None:
             libc = ctypes.CDLL(None)
             for parameter, value in ((_M_MMAP_THRESHOLD, 32 << 20), (_M_TRIM_THRESHOLD, 256 << 20)):
                 libc.mallopt(parameter, value)
+
+
+def use_huge_pages() -> None:
+    """Put the memory that this process has now into pages of 2 MiB, as far as that is possible (Linux 6.1 and later).
+
+    A fork copies an entry for each page, and removes it when it ends. With 140 MB in pages of 4 KiB the two take 10 ms.
+    """
+    if not _LINUX:
+        return
+    with contextlib.suppress(OSError, AttributeError, ValueError):
+        madvise = ctypes.CDLL(None).madvise
+        madvise.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
+        for line in Path("/proc/self/maps").read_text().splitlines():
+            places, rights, _, _, inode, *_ = line.split()
+            if rights == "rw-p" and inode == "0":
+                begin, end = (int(place, 16) for place in places.split("-"))
+                for huge in range(-(-begin // _HUGE) * _HUGE, end - _HUGE + 1, _HUGE):
+                    madvise(huge, _HUGE, _MADV_COLLAPSE)  # where it fails, the memory stays as it is
 
 
 def become_reaper() -> None:

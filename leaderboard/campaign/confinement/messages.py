@@ -15,7 +15,7 @@ from typing import Any
 
 from simnav.wire import ANSWER, PacketDecoder
 
-__all__ = ["LARGEST", "Down", "Up", "answer", "command", "command_of", "read_message", "write_all"]
+__all__ = ["LARGEST", "Down", "Up", "answer", "command", "read_message", "write_all"]
 
 #: Bytes of one answer at most: an estimate with its diagnostics.
 LARGEST = 64 << 20
@@ -48,26 +48,21 @@ def command(kind: Down, body: bytes = b"") -> bytes:
     return _COMMAND.pack(0, 0, len(body), kind) + body
 
 
-def command_of(message: bytes | bytearray) -> int:
-    """Which of `Down` a message is; 0 for a packet."""
-    return int(_COMMAND.unpack_from(message)[3])
-
-
 def answer(kind: Up, body: bytes = b"") -> bytes:
     """A message from the estimator process that is no estimate."""
     return ANSWER.pack(kind, 0, 0, 0, 0, len(body), 0, 0.0) + body
 
 
-def read_message(descriptor: int) -> bytearray | None:
-    """The next message to the estimator process; None where there will be none."""
+def read_message(descriptor: int) -> tuple[int, bytearray] | None:
+    """The next message to the estimator process, and which of `Down` it is (0: a packet); None: there will be none."""
     message = bytearray(os.read(descriptor, _PIECE))
-    wanted = PacketDecoder.HEADER
+    wanted = _COMMAND.size
     while True:
-        if len(message) >= PacketDecoder.HEADER:
-            kind, size = command_of(message), _COMMAND.unpack_from(message)[2]
-            wanted = PacketDecoder.HEADER + size if kind else PacketDecoder.size(message)
+        if len(message) >= _COMMAND.size:
+            _, _, size, kind = _COMMAND.unpack_from(message)
+            wanted = _COMMAND.size + size if kind else PacketDecoder.size(message)
             if len(message) >= wanted:
-                return message
+                return kind, message
         piece = os.read(descriptor, max(_PIECE, wanted - len(message)))
         if not piece:
             return None

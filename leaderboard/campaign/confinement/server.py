@@ -22,9 +22,11 @@ import socket
 import sys
 import tempfile
 import time
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+from simnav.kinds import INSTRUMENTS
 from simnav.leaderboard.campaign.confinement import seccomp
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES, live
 from simnav.leaderboard.campaign.confinement.landlock import Unreadable, restrict
@@ -37,6 +39,7 @@ from simnav.leaderboard.campaign.confinement.limits import (
     limit,
     out_of_memory_kills,
     resident,
+    use_huge_pages,
 )
 
 __all__ = ["COPY_FROM", "main"]
@@ -86,6 +89,8 @@ def _load() -> None:
     discover_own()
     importlib.import_module("simnav.leaderboard.campaign.entrant")  # or each estimator process would
     importlib.import_module("numpy.random")
+    if not entry_points(group=INSTRUMENTS.group):  # otherwise it would run code of others
+        INSTRUMENTS.discover()  # to look for them takes 7 ms
     source, target = os.environ.pop(COPY_FROM, ""), cache_directory()
     if source and target is not None and "kernels" in sys.argv[2:]:
         for part in {k.fingerprint() for kernel in kernels() for k in kernel.tree()}:
@@ -97,6 +102,7 @@ def _load() -> None:
         shutil.rmtree(target, ignore_errors=True)
     gc.collect()
     gc.freeze()  # so that a collection in a forked process does not copy all of this
+    use_huge_pages()
 
 
 def _receive(control: socket.socket) -> tuple[dict[str, Any] | None, list[int]]:

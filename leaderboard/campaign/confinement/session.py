@@ -9,6 +9,7 @@ import os
 import pickle
 import select
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -23,13 +24,14 @@ from simnav.leaderboard.campaign.confinement import bubblewrap, landlock
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES
 from simnav.leaderboard.campaign.confinement.kinds import homes_of_kinds
 from simnav.leaderboard.campaign.confinement.messages import LARGEST, Down, Up, command
-from simnav.trial import FailureError
+from simnav.trial import FailureError, LostError
 from simnav.types import NavigationStates
-from simnav.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketDecoder, PacketEncoder
+from simnav.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.recording import Recording
+    from simnav.trial_log import TrialLog
 
 __all__ = ["EstimatorServer", "Limits", "RemoteSession", "ServerError", "StoppedError"]
 
@@ -44,13 +46,17 @@ _START = 900.0  # for a server to be ready; on a slow and busy machine compiling
 _END = 20.0  # for a server to look after what is left of an estimator process [s]
 _PIECE = 1 << 16
 _TICK = 1000.0  # the longest wait between two looks at the clock [ms]
+_STALL = 50.0  # of a step, or of all since answers were last judged: then they are judged before the next [ms]
+_STEPS = 64  # whose answers are judged together at most
+_BYTES = 1 << 20  # of answers that are judged together
+_SIZE = struct.Struct("<8xI")  # of an answer: bytes after the header
 
 
 class ServerError(Exception):
     """The server cannot be started."""
 
 
-class StoppedError(Exception):
+class StoppedError(LostError):
     """The estimator process is no more there.
 
     Parameters
@@ -276,7 +282,7 @@ class EstimatorServer:
         return StoppedError("error", f"the process died ({ended}) without an answer")
 
 
-class _GoneError(Exception):
+class _GoneError(LostError):
     """The estimator process has closed its pipe."""
 
 
@@ -305,6 +311,7 @@ class RemoteSession:
         self.limits = limits
         self.libraries: list[str] = []
         self.peak_memory = 0
+        self._silent = False  # it is gone, or has not answered all that it was sent
         self._write, self._read = write, read
         self._deadline = time.monotonic() + limits.timeout
         os.set_blocking(write, False)
@@ -342,19 +349,48 @@ class RemoteSession:
         homes = homes_of_kinds(recording.instruments)
         self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes))
 
-    def step(self, packet: list[Any]) -> tuple[bytes, float]:
-        """Hand over a packet; the answer, and how long it took until it was here [s]."""
-        begun = time.perf_counter()
-        self._send(packet)
-        reply = self._receive(LARGEST)
-        seconds = time.perf_counter() - begun
-        if reply[0] != ESTIMATE:
-            self._refuse(reply)
-        return reply, seconds
+    def run(self, packets: PacketEncoder, log: TrialLog) -> None:
+        """Hand over all packets; each is sent when the whole answer to the last one is here.
+
+        Between two steps next to nothing is done, for the estimator finds the caches of the processor as this process
+        left them. Packets are encoded, and answers judged, for up to `_STEPS` steps together.
+        """
+        write, read, ready, clock = os.write, os.read, self._readable.poll, time.perf_counter
+        size_of, header, put = _SIZE.unpack_from, ANSWER.size, log.put
+        for first in range(0, len(packets), _STEPS):
+            began, held = clock(), 0
+            for packet in [b"".join(packets[k]) for k in range(first, min(first + _STEPS, len(packets)))]:
+                begun = clock()
+                try:
+                    sent = write(self._write, packet)
+                except BlockingIOError:
+                    sent = 0
+                except OSError:
+                    raise self._gone() from None
+                if sent != len(packet) or not ready(_STALL):
+                    self._silent = True
+                    log.settle()
+                    self._send_rest(packet[sent:])
+                    self._wait(self._readable)
+                    self._silent = False
+                reply = read(self._read, _PIECE)
+                if len(reply) < header or len(reply) != header + size_of(reply)[0]:
+                    reply = self._rest(reply, LARGEST)
+                now = clock()
+                if reply[0] != ESTIMATE:
+                    self._refuse(reply)
+                put(reply, now - begun)
+                held += len(reply)
+                if held > _BYTES or now - began > _STALL / 1e3:
+                    log.settle()
+                    self._check_time()
+                    began, held = now, 0
+            log.settle()
+            self._check_time()
 
     def smooth(self) -> NavigationStates | None:
         """The smoothed trajectory, or None."""
-        self._send([command(Down.SMOOTH)])
+        self._send(command(Down.SMOOTH))
         reply = self._receive(max(LARGEST, self.limits.memory))
         if reply[0] == Up.DONE:
             return None
@@ -367,7 +403,9 @@ class RemoteSession:
         return f"{type(error).__name__}: {error}"[:500]
 
     def end(self) -> None:
-        """Say that this was all."""
+        """Say that this was all, if it listens."""
+        if self._silent:
+            return
         try:
             names = _told(self._ask(Down.END, None)).get("libraries", [])
         except (FailureError, InvalidOutputError):
@@ -378,7 +416,7 @@ class RemoteSession:
     # -- the pipe ----------------------------------------------------------------------------------
 
     def _ask(self, kind: Down, body: Any) -> bytes:
-        self._send([command(kind, pickle.dumps(body, protocol=pickle.HIGHEST_PROTOCOL))])
+        self._send(command(kind, pickle.dumps(body, protocol=pickle.HIGHEST_PROTOCOL)))
         reply = self._receive(LARGEST)
         if reply[0] != Up.DONE:
             self._refuse(reply)
@@ -393,17 +431,18 @@ class RemoteSession:
                     raise FailureError(status, " ".join(reason.split())[:1000])
         raise InvalidOutputError("the answer is not in the form of an estimate")
 
-    def _send(self, buffers: list[Any]) -> None:
-        wanted = PacketDecoder.size(buffers[0]) if len(buffers) > 1 else len(buffers[0])
+    def _send(self, message: bytes) -> None:
         try:
-            sent = os.writev(self._write, buffers)
-            if sent == wanted:
-                return
+            sent = os.write(self._write, message)
         except BlockingIOError:
             sent = 0
         except OSError:
-            raise _GoneError from None
-        rest = memoryview(b"".join(bytes(b) for b in buffers))[sent:]
+            raise self._gone() from None
+        if sent != len(message):
+            self._send_rest(message[sent:])
+
+    def _send_rest(self, message: bytes) -> None:
+        rest = memoryview(message)
         while rest:
             self._wait(self._writable)
             try:
@@ -411,18 +450,19 @@ class RemoteSession:
             except BlockingIOError:
                 continue
             except OSError:
-                raise _GoneError from None
+                raise self._gone() from None
 
     def _receive(self, most: int) -> bytes:
         """One whole answer of at most so many bytes."""
         self._wait(self._readable)
-        reply = os.read(self._read, _PIECE)
-        if len(reply) >= ANSWER.size and len(reply) == ANSWER.size + ANSWER.unpack_from(reply)[5]:
-            return reply
+        return self._rest(os.read(self._read, _PIECE), most)
+
+    def _rest(self, reply: bytes, most: int) -> bytes:
+        """The whole answer of which this is what came first."""
         pieces = bytearray(reply)
         while reply:
             if len(pieces) >= ANSWER.size:
-                size = ANSWER.size + ANSWER.unpack_from(pieces)[5]
+                size = ANSWER.size + int(_SIZE.unpack_from(pieces)[0])
                 if size > most:
                     raise InvalidOutputError(f"an answer of {size >> 20} MiB, more than {most >> 20} MiB")
                 if len(pieces) > size:
@@ -432,22 +472,21 @@ class RemoteSession:
             self._wait(self._readable)
             reply = os.read(self._read, _PIECE)
             pieces += reply
-        raise _GoneError
+        raise self._gone()
 
     def _wait(self, poll: Any) -> None:
-        if poll.poll(_TICK):
-            if time.monotonic() > self._deadline:
-                raise self._late()
-            return
-        while True:
-            left = self._deadline - time.monotonic()
-            if left <= 0.0:
-                raise self._late()
-            if poll.poll(min(1000.0 * left + 1.0, _TICK)):
-                return
+        while not poll.poll(max(0.0, min(1000.0 * (self._deadline - time.monotonic()) + 1.0, _TICK))):
+            self._check_time()
+        self._check_time()
 
-    def _late(self) -> StoppedError:
-        return StoppedError("timeout", f"stopped after {self.limits.timeout:g} s")
+    def _check_time(self) -> None:
+        if time.monotonic() > self._deadline:
+            self._silent = True
+            raise StoppedError("timeout", f"stopped after {self.limits.timeout:g} s")
+
+    def _gone(self) -> _GoneError:
+        self._silent = True
+        return _GoneError()
 
 
 def _search_path() -> list[str]:

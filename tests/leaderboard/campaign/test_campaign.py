@@ -28,30 +28,11 @@ from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.store import Result, StoreError
 from simnav.scenario import Scenario, load, parse
 from simnav.warmup import warmup
+from tests.cases import ship
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
 
-SHIP = """
-name = "tiny-ship"
-version = 1
-title = "Twenty seconds"
-duration_s = 20.0
-
-[start]
-latitude_deg = 50.0
-longitude_deg = -5.0
-heading_deg = 45.0
-speed_m_s = 5.0
-
-[[manoeuvre]]
-kind = "hold"
-duration_s = 20.0
-
-[instruments.gnss]
-kind = "gnss_position"
-rate_hz = 1.0
-sigma_m = [3.0, 3.0, 5.0]
-"""
+SHIP = ship("tiny-ship", 20.0)
 
 GOOD = '''
 import numpy as np

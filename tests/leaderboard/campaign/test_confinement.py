@@ -115,6 +115,14 @@ CASES = {
     "dimensions": ("", "diagnostics = {'a': np.zeros((1,) * self.k)} if self.k < 3 else {}"),
     "no diagnostics": ("", "diagnostics = [] if self.k == 7 else {}"),
     "a complex one": ("", "diagnostics = {'c': 1j}"),
+    "bad, then dead": ("", "if self.k == 9: os._exit(3)\n        if self.k == 7: return 3"),
+    "late, then dead": ("", "if self.k == 9: os._exit(3)\n        "
+                            "if self.k == 7: return Estimate(0.0, position=self.position)"),
+    "far away, then silent": ("", "time.sleep(600.0 * (self.k == 9))\n        "
+                                  "if self.k == 7: self.position = self.position + 0.1"),
+    "not finite, then raises": ("", "self.position = self.position * np.nan if self.k == 7 else [][self.k == 9]"),
+    "slow": ("", "time.sleep(0.06 * (self.k % 20 == 0)); flagged = [('gnss', 1.0)] * (self.k == 30)"),
+    "large": ("", "diagnostics = {'x': np.arange(self.k % 30 * 1000.0)}"),
     "writes its input": ("", "measurements.imu.specific_force[:] = 0.0; measurements.aids.clear()"),
 }  # fmt: skip
 

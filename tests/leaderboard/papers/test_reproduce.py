@@ -36,6 +36,7 @@ from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.result import Result
 from simnav.scenario import load
 from simnav.scoring import SCORES
+from tests.cases import ship
 
 ROOT = Path(__file__).parents[3]
 ALL = [papers.load(key) for key in PAPERS]
@@ -430,27 +431,7 @@ def test_the_best_candidate_that_is_there_is_taken():
 
 # -- tables and the command ----------------------------------------------------------------------------------
 
-POND = """
-name = "pond"
-version = 1
-title = "Ten seconds"
-duration_s = 10.0
-
-[start]
-latitude_deg = 50.0
-longitude_deg = -5.0
-heading_deg = 45.0
-speed_m_s = 1.0
-
-[[manoeuvre]]
-kind = "hold"
-duration_s = 10.0
-
-[instruments.gnss]
-kind = "gnss_position"
-rate_hz = 1.0
-sigma_m = [1.0, 1.0, 1.0]
-"""
+POND = ship("pond", 10.0, 1.0, "[1.0, 1.0, 1.0]")
 
 FAKE = '''
 import numpy as np

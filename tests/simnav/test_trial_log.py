@@ -1,0 +1,144 @@
+"""Answers that are judged together: the same outcome as one after the other, wherever the row of them is cut."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simnav.trial_log import DivergedError, TrialLog
+from simnav.types import Estimate, NavigationStates
+from simnav.wire import EstimateEncoder, InvalidOutputError
+
+STEPS = 60
+
+
+@pytest.fixture
+def truth(monkeypatch: pytest.MonkeyPatch) -> NavigationStates:
+    monkeypatch.setattr("simnav.trial_log._CHUNK", 16)  # of covariances
+    time = np.arange(1.0, STEPS + 1.0)
+    position = np.tile([0.9, 3.1415, 0.0], (STEPS, 1))
+    position[10] = np.nan  # not known there
+    return NavigationStates(time, position, np.zeros((STEPS, 3)), np.zeros((STEPS, 3)))
+
+
+def change_nothing(estimate: Estimate, rng: np.random.Generator) -> None:
+    pass
+
+
+def another_time(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.time += rng.choice([1e-7, 1e-5])
+
+
+def flags(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.flagged = [("gnss", estimate.time)] * int(rng.integers(1, 3))
+
+
+def more_diagnostics(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.diagnostics = {"a": rng.normal(size=int(rng.integers(1, 3))), "b": 1.0}
+
+
+def matrix(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.diagnostics = {"a": np.eye(2)}  # another number of dimensions
+
+
+def no_velocity(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.velocity = None
+
+
+def some_components(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.estimated = np.arange(9) < 2
+    assert estimate.attitude is not None
+    estimate.attitude = estimate.attitude * np.nan
+
+
+def not_finite(estimate: Estimate, rng: np.random.Generator) -> None:
+    assert estimate.position is not None
+    estimate.position = estimate.position + np.array([0.0, np.inf, 0.0])
+
+
+def far_away(estimate: Estimate, rng: np.random.Generator) -> None:
+    assert estimate.position is not None
+    estimate.position = estimate.position + np.array([100e3 / 6371e3 * rng.choice([0.98, 0.995, 1.001]), 0.0, 0.0])
+
+
+def across_the_date_line(estimate: Estimate, rng: np.random.Generator) -> None:
+    assert estimate.position is not None
+    estimate.position = estimate.position - np.array([0.0, 2.0 * np.pi, 0.0])
+
+
+def no_covariance(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.covariance = None
+
+
+def indefinite(estimate: Estimate, rng: np.random.Generator) -> None:
+    estimate.covariance = -np.eye(9)
+
+
+GOOD = [change_nothing, flags, more_diagnostics, no_velocity, some_components, across_the_date_line, no_covariance]
+BAD = [another_time, matrix, not_finite, far_away, indefinite]
+
+
+def estimates(rng: np.random.Generator, truth: NavigationStates) -> list[Estimate]:
+    """Runs of estimates of one form, and in every other case a bad one among them."""
+    found = []
+    change = change_nothing
+    bad = int(rng.integers(0, 2 * STEPS))
+    for k in range(STEPS):
+        if rng.random() < 0.15:
+            change = GOOD[int(rng.integers(len(GOOD)))]
+        position = np.array([0.9, 3.1415, 0.0]) + 1e-6 * rng.normal(size=3)
+        spread = rng.normal(size=(9, 9))
+        estimate = Estimate(
+            truth.time[k],
+            position,
+            rng.normal(size=3),
+            rng.normal(size=3),
+            spread @ spread.T,
+            diagnostics={"x": 1.0 * k},
+        )
+        change(estimate, rng)
+        if k == bad:
+            BAD[int(rng.integers(len(BAD)))](estimate, rng)
+        found.append(estimate)
+    return found
+
+
+def outcome(log: TrialLog, answers: list[bytes], cuts: list[int] | None) -> tuple[Any, ...]:
+    """How it ended and what is kept, where answers are laid by until the cuts or, for None, added one by one."""
+    try:
+        for k, answer in enumerate(answers):
+            if cuts is None:
+                log.add(answer, 0.5 * k)
+            else:
+                log.put(answer, 0.5 * k)
+                if k in cuts:
+                    log.settle()
+        log.settle()
+        log.check_covariances()
+        end: tuple[Any, ...] = ("ok",)
+    except Exception as error:
+        end = (type(error), str(error), log.step)
+    trial = log.trial("it", "", "")
+    arrays = [trial.time, trial.position, trial.velocity, trial.attitude, trial.estimated, trial.update_seconds]
+    arrays += [np.zeros(0) if trial.covariance is None else trial.covariance]
+    arrays += [trial.diagnostics[name] for name in trial.diagnostics]
+    return end, log.n, trial.flagged, list(trial.diagnostics), [(a.shape, a.tobytes()) for a in arrays]
+
+
+@pytest.mark.parametrize("limit", [np.inf, 4000.0])
+def test_together_or_one_by_one(truth: NavigationStates, limit: float) -> None:
+    ends = set()
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        encode = EstimateEncoder()
+        answers = [encode(estimate) for estimate in estimates(rng, truth)]
+        if rng.random() < 0.3:  # one that no encoder makes
+            k = int(rng.integers(STEPS))
+            answers[k] = [answers[k][:-8], answers[k] + bytes(8), b"", bytes(24), b"\3" + answers[k][1:]][seed % 5]
+        cuts = sorted(rng.choice(STEPS, 4))
+        one_by_one = outcome(TrialLog(truth, True, limit), answers, None)
+        assert outcome(TrialLog(truth, True, limit), answers, cuts) == one_by_one
+        ends.add(one_by_one[0][0])
+    assert ends >= ({"ok", InvalidOutputError, DivergedError} if limit == np.inf else {MemoryError, InvalidOutputError})
