@@ -332,7 +332,8 @@ def publish_standard(
     with mistakes(StoreError):
         made = publish(working, load(profile), folder, file, None if readme is None else absolute(readme))
     if site is not None:
-        found = results_of(working, series=True)
+        published = {r.key for r in made.results}
+        found = [r for r in results_of(working, series=True) if r.key in published]
         build(found, made.ranking, absolute(site), progress=progress, workers=workers, papers=find(Path("reproduced")),
               editions=pages_of(read(file)))  # fmt: skip
     return made

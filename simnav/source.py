@@ -1,4 +1,4 @@
-"""Where measurements come from: the simulator or a real log, behind one door."""
+"""Where measurements come from: the simulator or a recorded log, with the same interface."""
 
 from __future__ import annotations
 

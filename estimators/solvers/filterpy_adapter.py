@@ -1,4 +1,4 @@
-"""A door for filters of filterpy: fill in four small methods, and a `KalmanFilter` or `UnscentedKalmanFilter` is a row.
+"""Filters of filterpy as estimators: four small methods make a row of a `KalmanFilter` or `UnscentedKalmanFilter`.
 
 The adapter works in metres north, east, down of the initial position, takes the measurements in order and each at its
 own time, and reads position, velocity, heading and covariance off the filter's state. It was written against filterpy

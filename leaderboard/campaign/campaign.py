@@ -253,8 +253,11 @@ def run_campaign(
     endings = store.keys(path)
     simulator = simulator_version()
     hidden = [path] if seal is None or seal.file is None else [path, seal.file]
+    alone = workers == 1 and backend == "loky"
+    if alone:  # the process that looks at estimators of others runs them, too, and loads all kernels
+        _compile(report)
     try:
-        entrants = [resolve(request, chosen, hidden, workers == 1 and backend == "loky") for request in estimators]
+        entrants = [resolve(request, chosen, hidden, alone) for request in estimators]
     except ServerError as error:
         raise CampaignError(str(error)) from None
     if seal is None:  # the seeds of a sealed campaign are drawn from 2**63
@@ -313,7 +316,8 @@ def run_campaign(
             store.drop(path, again)
             for key in again:
                 trials.discard(path, key)
-        _compile(report)
+        if not alone:
+            _compile(report)
         run_started = time.monotonic()
         weight, left, loose = 0.0, plan.weight, 0
         report(Progress("run", skipped, total))

@@ -96,6 +96,7 @@ def publish(
         out.print(
             f"results: {made.folder} ({len(made.results)} runs, {made.size / 2**20:.1f} MiB)",
             f"edition: {made.edition}",
+            *(f"remark:  {text}" for text in made.remarks),
             *([f"tables:  {made.readme}"] if made.readme is not None else []),
             f"site:    {site / 'index.html'}",
         )

@@ -158,23 +158,29 @@ class _Scenario:
         self.reference = reference_of(name, track.score, entries, self.recorded)
         ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
         seeds = sorted({x.seed for r in ranked for x in r.tried})
+        self._logs = {n: self._logs_of(r) for n, r in entries.items()}
         self.cells = {n: self._cell(r, seeds) for n, r in entries.items()}
 
     def _cell(self, runs: Runs, seeds: Sequence[int]) -> _Cell:
         there = {r.seed: r for r in runs.tried}
-        counted = []
+        logs, counted = self._logs[runs.estimator], []
         for seed in seeds if not runs.reference else sorted(there):
             if seed not in there:
                 break
             counted.append(there[seed])
-        logs = [self._log(r) for r in counted]
-        return _Cell(runs, [self.unit(r) for r in counted], np.array(logs, dtype=np.float64))
+        units = [self.unit(r) for r in counted]
+        return _Cell(runs, units, np.array([logs[r.seed] for r in counted], dtype=np.float64))
 
-    def _log(self, result: Result) -> float:
-        value = float(result.scores.get(self.track.score, math.nan))
-        if result.status != "ok" or not math.isfinite(value):
-            return math.inf
-        return max(math.log(value / self.reference.value), _LEAST) if value > 0.0 else _LEAST
+    def _logs_of(self, runs: Runs) -> dict[int, float]:
+        """By seed: logarithm of the ratio to the reference figure; infinite where a run failed."""
+
+        def log(status: str, value: float) -> float:
+            if status != "ok" or not math.isfinite(value):
+                return math.inf
+            return max(math.log(value / self.reference.value), _LEAST) if value > 0.0 else _LEAST
+
+        values = runs.column(self.track.score).tolist()
+        return {r.seed: log(r.status, v) for r, v in zip(runs.results, values, strict=True) if r.tried}
 
     def unit(self, result: Result) -> Any:
         """The independent unit of a run."""
@@ -189,8 +195,8 @@ class _Scenario:
         if cell.runs.reference or not self.reference.bounds:
             return False
         oracle = self.cells.get(self.reference.estimator)
-        best = {r.seed: self._log(r) for r in oracle.runs.good} if oracle is not None else {}
-        mine = {r.seed: self._log(r) for r in cell.runs.good}
+        best = self._logs[self.reference.estimator] if oracle is not None else {}
+        mine = self._logs[name]
         pairs = [log - best[seed] for seed, log in mine.items() if math.isfinite(log - best.get(seed, math.inf))]
         return beats(pairs, scenarios) or too_good(cell.logs[~cell.failed], self.reference, scenarios)
 

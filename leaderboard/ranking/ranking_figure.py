@@ -11,13 +11,13 @@ from simnav.leaderboard.figures.style import Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from simnav.leaderboard.ranking.board import TrackRanking
+    from simnav.leaderboard.ranking.board import TrackRanking, TrackRow
 
 __all__ = ["ranking_figure"]
 
 
 def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | None = None) -> Figure:
-    """Score of every estimator of a track with its interval; references are hollow.
+    """Score of every estimator of a track with its interval; what is not ranked is grey, and references are hollow.
 
     Parameters
     ----------
@@ -31,11 +31,17 @@ def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | 
     best = [r for r in track.rows if r.ranked][:most]
     rows = track.rows if most is None else [*best, *(r for r in track.rows if r.reference)]
     if style is None:
-        style = Style([r.estimator for r in rows], [r.estimator for r in rows if r.reference])
+        style = Style([r.estimator for r in rows], [r.estimator for r in rows if not r.ranked])
     points = [
-        Dot(r.estimator, r.score, r.low, r.high, hollow=r.reference, note=f"({r.failed} failed)" if r.failed else "")
+        Dot(r.estimator, r.score, r.low, r.high, hollow=r.reference, note=_note(r))
         for r in rows
         if math.isfinite(r.score)
     ]
     axis = "Error, as a multiple of the reference figure" if track.relative else "Error [m]"
     return dots(points, style, label=axis, title=f"{track.title}, 95 % interval")
+
+
+def _note(row: TrackRow) -> str:
+    words: list[str] = [] if row.ranked else [row.standing]
+    words += [f"{row.failed} failed"] if row.failed else []
+    return f"({', '.join(words)})" if words else ""

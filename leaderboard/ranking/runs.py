@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.leaderboard.figures.plots import Array, Band, Track
 from simnav.leaderboard.ranking.statistics import Interval, median
+from simnav.leaderboard.results.stored_scores import score_matrix
+from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Run", "Runs", "group", "tracks"]
 
 Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
+_PLACES = {name: k for k, name in enumerate(SCORES)}
 
 
 class Runs:
@@ -62,7 +65,7 @@ class Runs:
     @cached_property
     def good(self) -> list[Result]:
         """Those that ended well."""
-        return [r for r in self.tried if r.status == "ok"]
+        return [r for r, good in zip(self.results, self._good.tolist(), strict=True) if good]
 
     @property
     def failed(self) -> int:
@@ -74,9 +77,26 @@ class Runs:
         """Largest of all runs [bytes]."""
         return max((int(r.peak_memory) for r in self.tried), default=0)
 
-    def scores(self, name: str) -> list[float]:
+    def column(self, name: str) -> Array:
+        """(n,) one score of all results, in their order; NaN where it does not apply."""
+        k = _PLACES.get(name)
+        return score_matrix([r.scores for r in self.results], [name])[:, 0] if k is None else self._columns[:, k]
+
+    @cached_property
+    def _columns(self) -> Array:
+        return score_matrix([r.scores for r in self.results], list(_PLACES))
+
+    @cached_property
+    def _tried(self) -> NDArray[np.bool_]:
+        return np.array([r.tried for r in self.results], dtype=bool)
+
+    @cached_property
+    def _good(self) -> NDArray[np.bool_]:
+        return np.array([r.status == "ok" for r in self.results], dtype=bool)
+
+    def scores(self, name: str) -> Array:
         """One score of the runs that ended well; NaN where it does not apply."""
-        return [float(r.scores.get(name, math.nan)) for r in self.good]
+        return self.column(name)[self._good]
 
     def score(self, name: str) -> Interval:
         """Median of a score over the runs that ended well."""
@@ -86,7 +106,7 @@ class Runs:
 
     def numbers(self, name: str) -> Array:
         """A score over all runs, those that failed included as far as they went; only where it is finite."""
-        x = np.array([r.scores.get(name, math.nan) for r in self.tried], dtype=np.float64)
+        x = self.column(name)[self._tried]
         return x[np.isfinite(x)]
 
     @cached_property

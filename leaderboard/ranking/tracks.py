@@ -21,6 +21,7 @@ _TITLES = {
     "aided-ins": "Aided INS",
     "no-imu": "Without an IMU",
     "underwater": "Under water",
+    "long": "An hour and more",
     "post-processing": "Post-processing",
     "generalisation": "Generalisation",
     "generalisation-no-imu": "Generalisation without an IMU",

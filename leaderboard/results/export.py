@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +22,7 @@ from simnav.leaderboard.results.files import whole
 from simnav.leaderboard.results.formats import writes
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.results.provenance import Provenance, benchmark_of, distinct
+from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
@@ -102,11 +102,10 @@ class Document:
             "ranking": plain(self.ranking),
         }
 
-    @cached_property
-    def tables(self) -> list[pa.Table]:
+    def tables(self) -> Iterator[pa.Table]:
         """The results as tables of some thousand rows each; one without a row where there are none."""
-        starts = range(0, max(len(self.results), 1), _CHUNK)
-        return [table(self.results[k : k + _CHUNK]) for k in starts]
+        for k in range(0, max(len(self.results), 1), _CHUNK):
+            yield table(self.results[k : k + _CHUNK])
 
 
 def _run(result: Result) -> dict[str, Any]:
@@ -144,7 +143,7 @@ def write_csv(document: Document, path: Path) -> list[Path]:
     with whole(path) as partial:
         writer = None
         try:
-            for chunk in document.tables:
+            for chunk in document.tables():
                 rows = _with_units(chunk)
                 writer = writer or csv.CSVWriter(partial, rows.schema)
                 writer.write_table(rows)
@@ -181,7 +180,7 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
     with whole(path) as partial:
         writer = None
         try:
-            for chunk in document.tables:
+            for chunk in document.tables():
                 writer = writer or pq.ParquetWriter(partial, chunk.schema, compression="zstd")
                 writer.write_table(chunk)
         finally:
@@ -205,8 +204,7 @@ def table(results: Sequence[Result]) -> pa.Table:
             known = {key: json.dumps(plain(dict(v)), sort_keys=True) for key, v in texts.items()}
             values = [known[id(v)] for v in values]
         columns[name] = pa.array(values, kinds.get(name, text))
-    for name in SCORES:
-        scores = np.array([r.scores.get(name, math.nan) for r in results], dtype=np.float64)
+    for name, scores in zip(SCORES, score_matrix([r.scores for r in results], list(SCORES)).T, strict=True):
         columns[name] = pa.array(scores, real, mask=np.isnan(scores))
     for column, name in _ORIGIN.items():
         columns[column] = pa.array([getattr(r, name) for r in results], kinds.get(column, text))

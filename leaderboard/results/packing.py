@@ -34,6 +34,7 @@ def pack(
     target: str | os.PathLike[str],
     estimators: Collection[str] | None = None,
     *,
+    without: Collection[tuple[str, str]] = (),
     single: bool = False,
 ) -> list[Result]:
     """Write the current results of a folder into another one, without series and trials.
@@ -46,6 +47,8 @@ def pack(
         New, or a folder of results, which is replaced.
     estimators : collection of str, optional
         Labels of those that are taken. Default: all.
+    without : collection of (str, str)
+        Scenarios and estimators that are left out.
     single : bool
         Scores in single precision, and the draws of a run with one estimator only: less than half the size.
 
@@ -63,7 +66,7 @@ def pack(
     found = [
         replace(r, series={}, seconds=round(r.seconds, 3))
         for r in store.load(source, series=False)
-        if estimators is None or r.estimator in estimators
+        if (estimators is None or r.estimator in estimators) and (r.scenario, r.estimator) not in without
     ]
     if single:
         found = shortened(found)

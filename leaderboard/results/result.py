@@ -61,7 +61,7 @@ _HEAVY = frozenset({"scores", "series"})
 Series = NDArray[np.float32]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Result:
     """What one estimator did in one run.
 

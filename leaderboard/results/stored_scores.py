@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-__all__ = ["StoredScores"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["StoredScores", "score_matrix"]
 
 
 class StoredScores(Mapping[str, float]):
@@ -51,3 +54,35 @@ class StoredScores(Mapping[str, float]):
 
     def __reduce__(self) -> tuple[type[dict[str, float]], tuple[dict[str, float]]]:
         return dict, (dict(self),)  # not the scores of all the others
+
+
+def score_matrix(scores: Sequence[Mapping[str, float]], names: Sequence[str]) -> NDArray[np.float64]:
+    """Some scores of many results, read column by column where they are stored.
+
+    Parameters
+    ----------
+    scores : sequence of n mappings
+        Of each result.
+    names : sequence of m str
+        Of the scores.
+
+    Returns
+    -------
+    (n, m) array
+        NaN where a result has no such score.
+    """
+    found = np.full((len(scores), len(names)), np.nan)
+    stored: dict[tuple[int, int], list[int]] = {}  # rows whose scores are in one column, in the same order
+    for k, one in enumerate(scores):
+        if isinstance(one, StoredScores):
+            stored.setdefault((id(one._values), id(one._place)), []).append(k)
+        else:
+            found[k] = [one.get(name, np.nan) for name in names]
+    for rows in stored.values():
+        first = scores[rows[0]]
+        assert isinstance(first, StoredScores)
+        known = [j for j, name in enumerate(names) if name in first._place]
+        places = np.array([first._place[names[j]] for j in known], dtype=np.int64)
+        starts = np.array([scores[k]._start for k in rows], dtype=np.int64)  # type: ignore[attr-defined]
+        found[np.ix_(rows, known)] = np.frombuffer(first._values)[starts[:, None] + places]
+    return found

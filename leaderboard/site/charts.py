@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -61,6 +61,8 @@ class Chart:
         Whether it shows the rows that the reader chose.
     equal : bool
         Whether both axes have one scale; ``data["frame"]`` holds what must be seen.
+    wide : bool
+        Whether it takes the whole width of the page.
     """
 
     name: str
@@ -70,10 +72,11 @@ class Chart:
     data: Mapping[str, Any] = field(default_factory=dict)
     byrow: bool = False
     equal: bool = False
+    wide: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """For the page."""
-        return {name: getattr(self, name) for name in ("name", "title", "caption", "spec", "data", "byrow", "equal")}
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
 def short(value: Any, digits: int = 4) -> float | None:
@@ -320,17 +323,12 @@ def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart
             "encoding": {
                 "x": x,
                 "y": y,
-                "color": {"condition": {"test": "datum.front", "value": "$second"}, "value": "$strong"},
+                "color": _front_colour(),
                 "opacity": {"condition": {"test": "datum.front", "value": 1}, "value": 0.55},
                 "tooltip": _tip(row="Estimator", family="Family", cost="Time per epoch [ms]", error=y_title),
             },
         },
-        {
-            **rows,
-            "transform": [{"filter": "datum.front"}],
-            "mark": {"type": "text", "align": "left", "dx": 7, "dy": -6, "fontSize": 11, "color": "$ink"},
-            "encoding": {"x": x, "y": y, "text": {"field": "row"}},
-        },
+        rows | _front_names({"x": x, "y": y}),
     ]
     caption = (
         "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more "
@@ -340,21 +338,43 @@ def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart
 
 
 def detection(name: str, data: Mapping[str, Any]) -> Chart:
-    """Share of faults that are detected against that of false alarms [%]; columns ``row``, ``found``, ``false``."""
-    spec = {
-        "height": 300,
-        "data": {"name": "rows"},
-        "params": [_ZOOM],
-        "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
-        "encoding": {
-            "x": _roomy(_axis("false", "False alarms [%]")),
-            "y": _roomy(_axis("found", "Faults detected [%]")),
-            "color": {"value": "$strong"},
-            "tooltip": _tip(row="Estimator", found="Faults detected [%]", false="False alarms [%]"),
+    """Share of faults that are detected against that of false alarms [%].
+
+    Parameters
+    ----------
+    data : mapping
+        ``rows``: columns ``row``, ``found``, ``false``, ``front`` (bool).
+    """
+    place = {"x": _roomy(_axis("false", "False alarms [%]")), "y": _roomy(_axis("found", "Faults detected [%]"))}
+    tip = _tip(row="Estimator", found="Faults detected [%]", false="False alarms [%]")
+    layers: list[Spec] = [
+        {
+            "params": [_ZOOM],
+            "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
+            "encoding": {**place, "color": _front_colour(), "tooltip": tip},
         },
-    }
-    caption = f"An estimator at the upper left detects every fault and raises no false alarm. {_ZOOM_HELP}"
+        _front_names(place),
+    ]
+    caption = (
+        "An estimator at the upper left detects every fault and raises no false alarm. Names: no other estimator "
+        f"detects more faults with fewer false alarms. {_ZOOM_HELP}"
+    )
+    spec = {"height": 300, "data": {"name": "rows"}, "layer": layers}
     return Chart(name, "Detection against false alarms", caption, spec, data)
+
+
+def _front_colour() -> Spec:
+    """Another colour for the points of a Pareto front."""
+    return {"condition": {"test": "datum.front", "value": "$second"}, "value": "$strong"}
+
+
+def _front_names(place: Spec) -> Spec:
+    """The names of the points of a Pareto front."""
+    return {
+        "transform": [{"filter": "datum.front"}],
+        "mark": {"type": "text", "align": "left", "dx": 7, "dy": -6, "fontSize": 11, "color": "$ink"},
+        "encoding": {**place, "text": {"field": "row"}},
+    }
 
 
 def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str) -> Chart:
@@ -507,17 +527,17 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
         f"level is above the alert limit of {limit:g} m, so that the navigator is warned. Red: the error is above "
         "that limit without a warning. What is beyond the axes counts at their ends."
     )
-    return Chart(name, "Stanford diagrams: error against protection level", words, spec, data, byrow=True)
+    return Chart(name, "Stanford diagrams: error against protection level", words, spec, data, byrow=True, wide=True)
 
 
-def timeline(name: str, data: Mapping[str, Any], caption: str) -> Chart:
-    """What happens when: columns ``group``, ``name``, ``start``, ``end``, ``words``."""
+def timeline(name: str, data: Mapping[str, Any], caption: str, duration: float) -> Chart:
+    """What happens when, in a run of some length [s]: columns ``group``, ``name``, ``start``, ``end``, ``words``."""
     spec = {
         "height": {"step": 26},
         "data": {"name": "events"},
         "mark": {"type": "bar", "height": 16, "cornerRadius": 3},
         "encoding": {
-            "x": {**_axis("start", "Time [s]"), "scale": {"zero": True, "nice": False}},
+            "x": {**_axis("start", "Time [s]"), "scale": {"domain": [0.0, duration], "nice": False}},
             "x2": {"field": "end"},
             "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
             "color": {"condition": {"test": "datum.group == 'manoeuvres'", "value": "$shade"}, "value": "$second"},
@@ -526,7 +546,7 @@ def timeline(name: str, data: Mapping[str, Any], caption: str) -> Chart:
             "tooltip": _tip(name="What", start="From [s]", end="To [s]", words="How"),
         },
     }
-    return Chart(name, "What happens when", caption, spec, data)
+    return Chart(name, "What happens when", caption, spec, data, wide=True)
 
 
 def ratios_by_group(name: str, data: Mapping[str, Any], caption: str) -> Chart:

@@ -41,6 +41,7 @@ BAND_RUNS = 40
 _POINTS = 120  # of a curve: more cannot be seen
 _RUN_POINTS = 150
 _TRACK_POINTS = 300
+_FULL = 0.999  # a weight above this is as good as 1
 #: From three standard deviations to the protection level that follows from a covariance.
 _PROTECTION = math.sqrt(-2.0 * math.log(RISK)) / 3.0
 
@@ -127,7 +128,7 @@ def _curves(result: Result, times: dict[bytes, Thin]) -> Curves:
     values = {name: np.abs(s[name][keep]) for name, *_ in QUANTITIES if name in s and np.isfinite(s[name]).any()}
     if (level := _level(result)) is not None:
         values["level"] = level[keep].astype(np.float32)
-    weights = {n: s[n].copy() for n in s if n.startswith("weight.") and (s[n] < 0.999).any()}
+    weights = {n: s[n].copy() for n in s if n.startswith("weight.") and (s[n] < _FULL).any()}
     if weights:
         weights["time"] = times.setdefault(s["diagnostics_time"].tobytes(), s["diagnostics_time"].copy())
     return Curves(time, values, s["quantiles"].copy() if _has(result, "quantiles") else None, weights)
@@ -237,7 +238,8 @@ def one_run(result: Result) -> dict[str, Any]:
         known = known[_thinned(len(known), _TRACK_POINTS)] if len(known) else known
         found["truth"] = [s[name][known] for name in ("truth_east", "truth_north", "time")]
     for name, values in s.items():
-        if name.partition(".")[0] in DIAGNOSTICS and np.isfinite(values).any():
-            known = np.isfinite(values)
+        known = np.isfinite(values)
+        plain = name.startswith("weight.") and not (values[known] < _FULL).any()  # nothing was ever weighted
+        if name.partition(".")[0] in DIAGNOSTICS and known.any() and not plain:
             found[name] = {"time": shorts(s["diagnostics_time"][known]), "middle": shorts(values[known])}
     return found

@@ -7,10 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+import numpy as np
+
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background
-from simnav.leaderboard.site.charts import short
+from simnav.leaderboard.site.charts import short, shorts
 from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
 from simnav.leaderboard.site.content import Fact
 from simnav.leaderboard.site.scenario_page import inside_chart, track_from
@@ -77,7 +80,7 @@ def errors_data(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEn
             "page": entry.page,
             "argument": entry.argument,
             "run": list(row.ratios),
-            "error": [short(v, 5) for v in row.ratios.values()],
+            "error": shorts(list(row.ratios.values()), 5),
         }
     return {"label": label, "scenarios": found}
 
@@ -99,7 +102,7 @@ def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs
             "note": [r.note for r in results] if any(r.note for r in results) else None,
             "status": [r.ending for r in results] if any(r.ending != "ok" for r in results) else None,
             "reason": [r.reason for r in results] if any(r.reason for r in results) else None,
-            "seconds": [short(r.seconds, 3) for r in results],
+            "seconds": shorts([r.seconds for r in results], 3),
             "scores": _scores(results),
         }
     return {"label": label, "scenarios": found}
@@ -107,8 +110,10 @@ def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs
 
 def _scores(results: Sequence[Result]) -> dict[str, list[float | None]]:
     """Columns of the scores that any of the runs has."""
-    found = {c.key: [short(f * r.scores.get(c.key, math.nan)) for r in results] for c, f in SCORES_SHOWN}
-    return {key: values for key, values in found.items() if any(v is not None for v in values)}
+    factors = np.array([factor for _, factor in SCORES_SHOWN])
+    matrix = factors * score_matrix([r.scores for r in results], [c.key for c, _ in SCORES_SHOWN])
+    found = {c.key: matrix[:, k] for k, (c, _) in enumerate(SCORES_SHOWN)}
+    return {key: shorts(values) for key, values in found.items() if np.isfinite(values).any()}
 
 
 def estimator_data(

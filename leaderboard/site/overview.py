@@ -319,4 +319,5 @@ def _medians(
             found["row"].append(row.estimator)
             for key, k in (("found", 0), ("false", 1)):
                 found[key].append(short(100.0 * sum(p[k] for p in pairs) / len(pairs)))
+    found["front"] = _front([(false, -right) for false, right in zip(found["false"], found["found"], strict=True)])
     return found

@@ -31,6 +31,7 @@ RUNS_SHOWN = 2
 
 _FIRST = 6  # rows that a chart shows at first
 _PLAIN = "ekf"
+_TICKS = 40  # runs of a row that a chart marks
 
 
 @dataclass(frozen=True)
@@ -143,8 +144,8 @@ def scenario_data(
 
 
 def _chart(chart: Chart, entry: ScenarioEntry) -> dict[str, Any]:
-    """A chart of the page; what depends on the rows that are shown stands in a file."""
-    return chart.to_dict() | ({"data": None, "file": f"{entry.data}-{chart.name}"} if chart.byrow else {})
+    """A chart of the page. Its data stand in a file, which is read when the chart comes into view."""
+    return chart.to_dict() | {"data": None, "file": f"{entry.data}-{chart.name}"}
 
 
 def _same(names: Sequence[str]) -> str:
@@ -238,7 +239,9 @@ def _over_all_runs(
     faults = around.runs[first]["faults"] if around.runs else _NO_FAULTS
     made = []
     if around.happening["name"]:
-        made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}."))
+        ends = [t for t in around.happening["end"] if t is not None]
+        duration = max([float(time[-1]) if len(time) else 0.0, *ends])
+        made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}.", duration))
     count = min(len(entry.seeds), curves.BAND_RUNS)
     seeds = "one seed" if len(entry.seeds) < 2 else f"{'the first ' * (count < len(entry.seeds))}{count} seeds"
     words = f"Median over {seeds}, and the band from the 5th to the 95th percentile. Shaded: faults of seed {first}."
@@ -275,7 +278,7 @@ def _over_all_runs(
                 f"{_MEANING['weight']} {words}", log=False,
             )
         )  # fmt: skip
-    files = {f"{entry.data}-{c.name}": dict(c.data) for c in (*made, *inside) if c.byrow}
+    files = {f"{entry.data}-{c.name}": dict(c.data) for c in (*made, *inside)}
     return made, inside, files
 
 
@@ -331,11 +334,10 @@ def _spread(
         found = cell.score(score)
         if not found.value > 0.0:
             continue
-        for result in cell.good:
-            value = result.scores.get(score, math.nan)
-            if value > 0.0:
-                for key, x in (("row", row.estimator), ("value", short(value)), ("run", _run_name(result))):
-                    ticks[key].append(x)
+        values = zip(cell.scores(score).tolist(), cell.good, strict=True)
+        for value, result in _marked([(v, r) for v, r in values if v > 0.0]):
+            for key, x in (("row", row.estimator), ("value", short(value)), ("run", _run_name(result))):
+                ticks[key].append(x)
         low, high = (found.low, found.high) if math.isfinite(found.low) else (found.value, found.value)
         for key, x in (
             ("row", row.estimator),
@@ -346,10 +348,19 @@ def _spread(
             middles[key].append(x)
     if not middles["row"]:
         return None
-    caption = "Ticks: runs that ended well. Point and line: the median with its 95 % interval."
+    most = max(len(runs[row.estimator].good) for row in ranking.rows)
+    some = f", at most {_TICKS} of a row from the smallest to the largest value" if most > _TICKS else ""
+    caption = f"Ticks: runs that ended well{some}. Point and line: the median with its 95 % interval."
     if ideal:
         caption += " In the band the covariance agrees with the errors; to the right the estimator is optimistic."
     return charts.spread(name, title, axis, {"runs": ticks, "middles": middles}, caption, ideal=ideal)
+
+
+def _marked(runs: list[tuple[float, Result]]) -> list[tuple[float, Result]]:
+    """Runs in order of their value: all, or as many as a chart can show, at even steps of the rank."""
+    runs.sort(key=lambda run: run[0])
+    count = len(runs)
+    return runs if count <= _TICKS else [runs[k * (count - 1) // (_TICKS - 1)] for k in range(_TICKS)]
 
 
 def _run_name(result: Result) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import warnings
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from simnav.estimator import EstimatorError, find
 from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
@@ -17,7 +19,10 @@ from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import Result
 from simnav.scenario import load
 
-__all__ = ["Outdated", "outdated"]
+__all__ = ["Change", "Outdated", "changes", "outdated"]
+
+#: What may have changed: the estimator, the scenario or its simulator; or the scenario is not there any more.
+Change = Literal["row", "scenario", "gone"]
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ class Outdated:
     scores : tuple of str
         Modules of scores that have changed; all results need them.
     gone : tuple of str
-        Scenarios and estimators that are not there any more.
+        Versioned ids of scenarios that are not there any more.
     benchmark : str
         Version of the benchmark of the results, where it is not that of today.
     """
@@ -59,7 +64,7 @@ class Outdated:
         if self.rows:
             said.append(f"these rows have changed: run {', '.join(self.rows)} on all scenarios")
         if self.gone:
-            said.append(f"these are not there any more: {', '.join(self.gone)}")
+            said.append(f"these scenarios are not there any more: {', '.join(self.gone)}")
         return said
 
     def to_dict(self) -> dict[str, Any]:
@@ -67,7 +72,7 @@ class Outdated:
         return {**vars(self), "current": not self}
 
 
-def outdated(folder: str | os.PathLike[str]) -> Outdated:
+def outdated(folder: str | os.PathLike[str], without: Collection[tuple[str, str]] = ()) -> Outdated:
     """Compare the keys of results with the code of today; nothing is run.
 
     Of an estimator that does not come with simnav only the scenarios are compared.
@@ -76,6 +81,8 @@ def outdated(folder: str | os.PathLike[str]) -> Outdated:
     ----------
     folder : path
         Of the results.
+    without : collection of (str, str)
+        Scenarios and estimators whose results do not matter.
 
     Raises
     ------
@@ -83,40 +90,43 @@ def outdated(folder: str | os.PathLike[str]) -> Outdated:
         If it is no folder of results.
     """
     path = Path(folder)
-    marker = store.described(path)
+    version = str(store.described(path).get("benchmark", ""))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", store.StoreWarning)
         results = store.load(path, series=False, scores=())
-    version = str(marker.get("benchmark", ""))
     if version != BENCHMARK:
         return Outdated(benchmark=version or "no version")
+    results = [r for r in results if (r.scenario, r.estimator) not in without]
+    found: dict[Change, set[str]] = {"row": set(), "scenario": set(), "gone": set()}
+    for (scenario, label), change in changes(results).items():
+        found[change].add(label if change == "row" else scenario)
+    now, scores = scoring_code(), set[str]()
+    for text in {r.scoring for r in results if r.scores or r.scoring != "{}"}:
+        scores |= _changed(text, now)
+    rows, scenarios, gone = (tuple(sorted(found[change])) for change in ("row", "scenario", "gone"))
+    return Outdated(rows, scenarios, tuple(sorted(scores)), gone)
+
+
+def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
+    """What has changed since results were computed, by scenario and estimator; those of today are not in it."""
     one: dict[tuple[str, str], Result] = {}
     for result in results:
         one.setdefault((result.scenario, result.estimator), result)
     simulator = simulator_version()
-    rows, scenarios, gone, scores = set[str](), set[str](), set[str](), set[str]()
     recordings = {s: _recording(s, simulator) for s in {scenario for scenario, _ in one}}
-    sources: dict[str, str | None] = {}
-    now = scoring_code()
+    sources: dict[str, str] = {}
+    found: dict[tuple[str, str], Change] = {}
     for (scenario, label), result in one.items():
-        recording = recordings[scenario]
-        if recording is None:
-            gone.add(scenario)
-            continue
-        if recording != result.recording:
-            scenarios.add(scenario)
-            continue
-        name = label.partition("(")[0]
+        recording, name = recordings[scenario], label.partition("(")[0]
         if name not in sources:
             sources[name] = _source(name)
-        source = sources[name]
-        if source is None:
-            gone.add(label)
-        elif source and variant(recording, label, name, result.parameters, source) != result.variant:
-            rows.add(label)
-    for text in {r.scoring for r in results if r.scores or r.scoring != "{}"}:
-        scores |= _changed(text, now)
-    return Outdated(tuple(sorted(rows)), tuple(sorted(scenarios)), tuple(sorted(scores)), tuple(sorted(gone)))
+        if recording is None:
+            found[scenario, label] = "gone"
+        elif recording != result.recording:
+            found[scenario, label] = "scenario"
+        elif sources[name] and variant(recording, label, name, result.parameters, sources[name]) != result.variant:
+            found[scenario, label] = "row"
+    return found
 
 
 def _recording(scenario: str, simulator: str) -> str | None:
@@ -127,8 +137,8 @@ def _recording(scenario: str, simulator: str) -> str | None:
         return None
 
 
-def _source(name: str) -> str | None:
-    """The digest of an estimator's code; None where there is none of the name, empty where it is of others."""
+def _source(name: str) -> str:
+    """The digest of the code of an estimator of simnav; empty for all others."""
     try:
         cls = find(name)
     except EstimatorError:
@@ -137,8 +147,6 @@ def _source(name: str) -> str | None:
 
 
 def _changed(before: str, now: str) -> set[str]:
-    import json
-
     if not scoring_differs(before, now):
         return set()
     old, new = json.loads(before or "{}"), json.loads(now)

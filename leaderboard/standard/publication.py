@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,10 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.gathering import gather
 from simnav.leaderboard.results.packing import pack, shortened
+from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.standard import shipped
-from simnav.leaderboard.standard.currency import outdated
+from simnav.leaderboard.standard.currency import changes, outdated
 from simnav.leaderboard.standard.history import append
 from simnav.leaderboard.standard.readme import PICTURE, draw, replaced, tables
 from simnav.scenario import load
@@ -44,6 +45,8 @@ class Published:
         Of the files in the folder [bytes].
     readme : Path or None
         That was brought up to date.
+    remarks : tuple of str
+        What readers should know: results that were left out, or that others cannot repeat.
     """
 
     folder: Path
@@ -52,6 +55,7 @@ class Published:
     ranking: Ranking
     size: int
     readme: Path | None
+    remarks: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav standard publish --json`` prints."""
@@ -60,6 +64,7 @@ class Published:
             "edition": self.edition,
             "runs": len(self.results),
             "size": self.size,
+            "remarks": list(self.remarks),
             "readme": None if self.readme is None else str(self.readme),
             "ranking": self.ranking.to_dict(),
         }
@@ -67,7 +72,7 @@ class Published:
 
 def begin(working: Path, folder: Path) -> None:
     """Let a new folder start with the results that come with simnav: what has not changed since is not run again."""
-    if shipped(folder) and not store.described(working) and not outdated(folder).benchmark:
+    if shipped(folder) and not store.described(working) and store.described(folder).get("benchmark") == BENCHMARK:
         gather(working, [folder])
 
 
@@ -94,6 +99,8 @@ def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
 def publish(working: Path, profile: Profile, folder: Path, history: Path, readme: Path | None) -> Published:
     """Pack the results of a profile, add an edition to the history, and write the tables of the README.
 
+    Results that the profile does not name, as those of submissions, are published as long as they are not out of date.
+
     Parameters
     ----------
     working : Path
@@ -112,12 +119,15 @@ def publish(working: Path, profile: Profile, folder: Path, history: Path, readme
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", store.StoreWarning)
-        results = shortened(store.load(working, series=False))  # as others will have them
-    old = outdated(working)
+        found = store.load(working, series=False)
+    named = {(load(s).id, label) for part in profile.parts for s in part.scenarios for label in part.estimators}
+    without = changes(found).keys() - named
+    old = outdated(working, without)
     if old:
         raise RequestError(
             f"these results are out of date: {'; '.join(old.sentences())}; 'simnav standard run' does it"
         )
+    results = shortened(r for r in found if (r.scenario, r.estimator) not in without)  # as others will have them
     lacking = missing(profile, results)
     if lacking:
         first = next(iter(lacking))
@@ -127,11 +137,24 @@ def publish(working: Path, profile: Profile, folder: Path, history: Path, readme
         )
     ranking = rank(results)
     text = replaced(readme, tables(ranking, results)) if readme is not None else ""  # fails before anything is written
-    if working.resolve() != folder.resolve():
-        pack(working, folder, single=True)
+    if working.resolve() != folder.resolve() or without:
+        pack(working, folder, without=without, single=True)
     edition = append(history, ranking, results)
     if readme is not None:
         write_whole(readme, text)
         draw(ranking, readme.parent / PICTURE)
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
-    return Published(folder, edition, results, ranking, size, readme)
+    return Published(folder, edition, results, ranking, size, readme, _remarks(results, without))
+
+
+def _remarks(results: Sequence[Result], without: Collection[tuple[str, str]]) -> tuple[str, ...]:
+    said = [
+        f"{label} on {scenario} is left out: it is out of date, and the profile does not name it"
+        for scenario, label in sorted(without)
+    ]
+    tried = [r for r in results if r.tried]
+    if dirty := sum(bool(r.provenance.dirty) for r in tried):
+        said.append(f"{dirty} runs were computed with changes that no commit holds, so others cannot repeat them")
+    if free := sum(r.provenance.confinement in ("", "none") for r in tried):
+        said.append(f"{free} runs were computed without confinement")
+    return tuple(said)

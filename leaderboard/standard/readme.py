@@ -27,7 +27,10 @@ _BEST = 4  # rows that a cell names
 def tables(ranking: Ranking, results: Sequence[Result]) -> str:
     """A table of the tracks, and one of the best rows of the main track, as Markdown."""
     known = distinct(r.provenance for r in results)
-    commits = ", ".join(sorted({f"`{p.commit[:12]}`" for p in known if p.commit})) or "a version without a commit"
+    commits = (
+        ", ".join(sorted({f"`{p.commit[:12]}`{' with changes' if p.dirty else ''}" for p in known if p.commit}))
+        or "a version without a commit"
+    )
     days = sorted({p.date for p in known if p.date})
     when = f", computed from {days[0]} to {days[-1]}" if len(days) > 1 else f", computed on {days[0]}" if days else ""
     benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -36,11 +37,23 @@ def clean_python(folder: Path, versions: Mapping[str, str]) -> Path:
     """
     _run([sys.executable, "-m", "venv", str(folder)], "a new environment cannot be made")
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    checkout = LIBRARY.parent
-    simnav = str(checkout) if (checkout / "pyproject.toml").is_file() else f"simnav=={version('simnav')}"
+    simnav = _copied(LIBRARY.parent, folder.with_name("simnav-source")) or f"simnav=={version('simnav')}"
     pinned = [f"{name}=={versions[name]}" for name in _PINNED if re.fullmatch(r"[\w.+!]+", versions.get(name, ""))]
     _pip(python, [simnav, *pinned], "simnav cannot be installed into a new environment")
     return python
+
+
+def _copied(checkout: Path, folder: Path) -> str:
+    """Copy what simnav is built from; empty where it does not run from a checkout.
+
+    A build in the checkout would leave files there, and would take up what an earlier one left.
+    """
+    if not (checkout / "pyproject.toml").is_file():
+        return ""
+    shutil.copytree(LIBRARY, folder / LIBRARY.name, ignore=shutil.ignore_patterns("__pycache__"))  # links are followed
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copyfile(checkout / name, folder / name)
+    return str(folder)
 
 
 def install_requirements(python: Path, requires: Sequence[str], folder: Path) -> None:

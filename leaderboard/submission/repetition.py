@@ -11,10 +11,11 @@ import sys
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
+from simnav.leaderboard.campaign.campaign import MEMORY, Progress, run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.results import store
@@ -124,12 +125,13 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
     total, done = sum(len(w.seeds) for w in asked.runs), 0
     for sealed in (False, True):  # in one folder, because the estimators' processes are made for one
         for wanted in (w for w in asked.runs if w.sealed == sealed):
-            progress(done, total, f"{wanted.label} on {wanted.scenario}")
+            what = f"{wanted.label} on {wanted.scenario}"
+            progress(done, total, what)
             try:
                 run_campaign(
                     [load(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder, workers=1,
                     timeout=wanted.time_limit or None, confinement=asked.confinement, seal=seal if sealed else None,
-                    memory=wanted.memory_limit or MEMORY,
+                    memory=wanted.memory_limit or MEMORY, progress=partial(_noted, progress, done, total, what),
                 )  # fmt: skip
             except Exception as error:
                 for seed in wanted.seeds:
@@ -144,6 +146,12 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
                     {name: float(value).hex() for name, value in r.scores.items()},
                 )  # fmt: skip
     return {"runs": [asdict(a) for a in found.values()], "provenance": here().to_dict()}
+
+
+def _noted(progress: Callable[..., None], done: int, total: int, what: str, now: Progress) -> None:
+    """Say how far the kernels are, which a new environment has to compile."""
+    if now.stage == "compile" and now.done < now.total:
+        progress(done, total, f"{what}: compiling kernels, {now.done} of {now.total}")
 
 
 def main() -> None:

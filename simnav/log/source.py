@@ -1,4 +1,4 @@
-"""A real log through the same door as the simulator.
+"""A recorded log with the same interface as the simulator.
 
 The measurements and the reference are those of the log; a seed chooses the recording and draws the initial error, the
 faults and the instruments that are simulated from the reference.

@@ -47,8 +47,8 @@ def test_standard_covers_all_tracks_with_fewer_seeds_of_other_rows_and_of_long_s
     assert 20 <= len(chosen) <= 25
     assert {row for _, row in most} == {n for n in names() if not describe(n).slow}
     for (scenario, row), runs in most.items():
-        short = known[scenario].duration <= 3600.0 and known[scenario].track != "papers"
-        assert runs == ((30 if row in chosen else 10) if short else 3 if scenario == "twelve-hours" else 10)
+        short = known[scenario].track not in ("papers", "long")
+        assert runs == ((30 if row in chosen else 10) if short else 6 if scenario == "twelve-hours" else 10)
         assert short or row in chosen
 
 

@@ -58,7 +58,16 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
     assert scenario.recorded or re.search(r"^ours\b|\b20\d\d\b", scenario.source)
     assert scenario.source
     assert scenario.tags
-    tracks = {"aided-ins", "no-imu", "underwater", "generalisation", "generalisation-no-imu", "recorded", "papers"}
+    tracks = {
+        "aided-ins",
+        "no-imu",
+        "underwater",
+        "long",
+        "generalisation",
+        "generalisation-no-imu",
+        "recorded",
+        "papers",
+    }
     assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")
     assert scenario.group != "other"
@@ -226,7 +235,9 @@ def test_the_catalogue_is_packaged():
     assert project["project"]["entry-points"]["simnav.scenarios"] == {"simnav": "simnav.scenarios"}
 
 
-@pytest.mark.parametrize("track", ["aided-ins", "no-imu", "underwater", "generalisation", "generalisation-no-imu"])
+@pytest.mark.parametrize(
+    "track", ["aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu"]
+)
 def test_a_track_has_an_estimator_that_suits_all_of_it(track: str):
     """The ranking takes full coverage only."""
     row = "ship-ekf" if "no-imu" in track else "ekf"

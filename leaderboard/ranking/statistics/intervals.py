@@ -160,11 +160,12 @@ def median(values: Iterable[float]) -> Interval:
     >>> median([2.0, 2.0, 2.0]).low, median([2.0] * 6)
     (nan, Interval(value=2.0, low=2.0, high=2.0, runs=6))
     """
-    x = np.sort(np.asarray([v for v in values if not math.isnan(v)], dtype=np.float64))
+    x = np.asarray(values if isinstance(values, np.ndarray) else list(values), dtype=np.float64)
+    x = np.sort(x[~np.isnan(x)])
     n = len(x)
     if not n:
         return Interval(math.nan)
-    value = float(np.median(x))
+    value = float(0.5 * (x[(n - 1) // 2] + x[n // 2]))
     if n < FEWEST or not np.isfinite(x).all():
         return Interval(value, runs=n)
     k, part = _order(n)

@@ -10,7 +10,8 @@
   const inks = { light: { ink: "#1b2430", grey: "#5b6673", grid: "#dfe3e8", shade: "#9aa5b1" }, dark: { ink: "#e8ebef", grey: "#9aa5b1", grid: "#343c46", shade: "#66707d" } };
   const dashes = [[1, 0], [6, 2], [2, 2], [6, 2, 2, 2]];
 
-  const theme = () => (dark.matches ? "dark" : "light");
+  let printing = false;
+  const theme = () => (dark.matches && !printing ? "dark" : "light");
 
   const config = (name) => {
     const { ink, grey, grid } = inks[name];
@@ -95,8 +96,9 @@
     constructor(host, given) {
       Object.assign(this, { host, given });
       this.place = make("div", { class: "vega", role: "group", "aria-label": given.title });
-      host.append(make("figure", { class: given.spec.facet ? "chart wide" : "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
+      host.append(make("figure", { class: given.wide ? "chart wide" : "chart", id: `chart-${given.name}` }, make("h3", {}, given.title), this.place, make("figcaption", {}, given.caption ?? "")));
       this.drawn = false;
+      simnav.drawings.add(this);
       new IntersectionObserver((entries, observer) => {
         if (!entries.some((e) => e.isIntersecting)) return;
         observer.disconnect();
@@ -146,7 +148,25 @@
     }
   }
 
+  /** Draw the charts that were not in view yet, all in the colours of paper, and print the page. */
+  simnav.print = async () => {
+    const redraw = (paper) => {
+      printing = paper;
+      simnav.switches?.();
+      return Promise.all([...simnav.drawings].filter((c) => c.place.offsetParent && (dark.matches || !c.drawn)).map((c) => c.draw()));
+    };
+    await redraw(true);
+    print();
+    await redraw(false);
+  };
+  addEventListener("keydown", (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.key !== "p") return;
+    event.preventDefault();
+    simnav.print();
+  });
+
   simnav.charts = {};
+  simnav.drawings = new Set();
   simnav.chart = (host, given) => (simnav.charts[given.name] = new Chart(host, given));
 
   /** Switches of the rows that are drawn: those shown as buttons, the others in a list. */
@@ -164,6 +184,7 @@
       select.addEventListener("change", () => { if (select.value) shown.set([...shown.rows, select.value]); });
       host.replaceChildren(...chips, others.length ? select : "");
     };
+    simnav.switches = draw;
     shown.listeners.push(draw);
     dark.addEventListener("change", draw);
     draw();

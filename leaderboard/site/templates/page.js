@@ -284,5 +284,6 @@
 
   const kinds = { index, scenario, estimator, compare, about: () => {} };
   kinds[page.kind]?.();
+  at("print")?.addEventListener("click", () => simnav.print());
   document.body.dataset.ready = "true";
 }

@@ -35,7 +35,7 @@ def test_failures_do_not_count_as_runs_that_do_not_suit():
     assert [r.seed for r in runs.results] == [0, 1, 2, 3, 4]
     assert (len(runs.tried), len(runs.good), runs.failed) == (3, 2, 1)
     assert runs.statuses == {"ok": 2, "timeout": 1}
-    assert runs.scores("horizontal_rmse") == [1.0, 2.0]
+    assert runs.scores("horizontal_rmse").tolist() == [1.0, 2.0]
     assert runs.unsuitable() == "why"
     assert Runs([ended(0, "unsuitable")]).tried == []
     assert Runs([ended(0, "no-recording")]).unsuitable() == ""

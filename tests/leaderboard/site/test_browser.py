@@ -180,6 +180,21 @@ def test_rows_of_charts_are_switched_on_and_off(visit, catalogued):
     assert "ekf" not in page.evaluate("new URLSearchParams(location.hash.slice(1)).get('rows').split('|')")
 
 
+def test_a_page_is_printed_with_all_its_charts_in_the_colours_of_paper(browser, folder, catalogued):
+    visit = Visit(browser, folder, scheme="dark")
+    page = visit.open(f"{catalogued}.html")
+    charts = "document.querySelector('[data-charts]').cloneNode(true)"
+    page.evaluate(f"window.print = () => {{ window.printed = {charts}; }}; 0")
+    page.click("[data-print]")
+    page.wait_for_function("window.printed")
+    assert page.evaluate("[...printed.querySelectorAll('.vega')].every((v) => v.dataset.drawn)")
+    ink = "printed.querySelector('.role-axis-title text').getAttribute('fill')"
+    assert page.evaluate(ink) == "#1b2430"
+    page.emulate_media(media="print")
+    assert page.locator(".rowswitch .chip").first.is_visible()  # or nobody knows which curve is which
+    visit.close()
+
+
 def test_one_run_has_its_track_and_the_command_that_repeats_it(visit, catalogued):
     page = visit.open(f"{catalogued}.html#row=sw-fgo&seed=0")
     page.locator("[data-run]").scroll_into_view_if_needed()

@@ -14,10 +14,13 @@ from urllib.parse import unquote, urlparse
 import pyarrow.parquet as pq
 import pytest
 
+from simnav.estimator import find, names
+from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
 from simnav.leaderboard.site import charts, site
+from simnav.leaderboard.site.facts import estimator_facts
 from simnav.leaderboard.site.scenario_page import ScenarioData
 from simnav.scoring import SCORES
 
@@ -320,3 +323,9 @@ def test_where_everything_failed_there_is_still_a_site(results, tmp_path):
     (row,) = data_of(index)["tracks"][0]["table"]["rows"]
     assert row["failed"]["text"] == "12 of 12"
     assert "too slow" in Page(tmp_path / "site" / f"{SCENARIOS[0]}.html").text
+
+
+def test_every_estimator_of_simnav_has_a_family():
+    mine = [name for name in names() if comes_with_simnav(find(name))]
+    assert len(mine) > 60
+    assert [name for name in mine if estimator_facts(name).family == "Other"] == []

@@ -127,6 +127,25 @@ def test_a_change_of_one_row_runs_that_row_only(home: Path, tmp_path: Path, monk
     assert codes[0]["dead-reckoning"] == codes[1]["dead-reckoning"]
 
 
+def test_what_the_profile_does_not_name_is_left_out_when_it_is_out_of_date(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "small.toml").write_text(PROFILE.replace('"gnss-only", ', ""))
+    (tmp_path / "README.md").write_text(README)
+    made = publish(tmp_path, home / "work")
+    assert {r.estimator for r in made.results} == {"dead-reckoning", "gnss-only"}  # another row is welcome
+    assert not any("left out" in text for text in made.remarks)
+
+    def edited(cls: type) -> str:
+        return ("x" if cls.name == "gnss-only" else "") + estimator_source(cls)
+
+    monkeypatch.setattr(currency, "estimator_source", edited)
+    made = publish(tmp_path, home / "work")
+    assert {r.estimator for r in made.results} == {r.estimator for r in store.load(made.folder)} == {"dead-reckoning"}
+    assert "gnss-only on clean-voyages-v1 is left out: it is out of date" in made.remarks[0]
+    assert not publishing.check_standard(made.folder)
+
+
 def test_a_change_of_simulator_scores_or_benchmark_is_said(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
