@@ -117,4 +117,5 @@ def test_a_policy_in_plain_arrays_is_the_network_of_the_library(example):
     actions = model.predict(normalisation.normalize_obs(observation), deterministic=True)[0]
     policy = module.policy_of(model, envs, told)
     assert np.abs(actions).max() > 0.01
-    np.testing.assert_allclose(policy(observation), actions, atol=1e-5)
+    np.testing.assert_allclose(policy(observation)[:, :1], actions, atol=1e-5)
+    assert (policy(observation)[:, 1] == 0.0).all()  # the process noise
