@@ -45,14 +45,16 @@ def sailed(task, scenario, seed, agent):
     env.reset(seed=seed)
     env.action_space.seed(seed)
     o = env.options
-    voyage = Voyage(o.scenario, seed, o.layout.watched, STEPS, oracle=False)
+    voyage = Voyage(o.scenario, seed, o.layout.watched, STEPS, oracle=False) if agent == "told" else None
     total, squares, steps, over = 0.0, 0.0, 0, False
     while not over:
-        voyage.advance()
-        if agent == "random":
+        if voyage is not None:
+            voyage.advance()
+            action = told(task, voyage, env)
+        elif agent == "random":
             action = env.action_space.sample()
         else:
-            action = told(task, voyage, env) if agent == "told" else np.zeros(o.action_shape, env.action_space.dtype)
+            action = np.zeros(o.action_shape, env.action_space.dtype)
         _, reward, _, over, info = env.step(action)
         total, squares, steps = total + reward, squares + info["error"] ** 2, steps + 1
     return total, (squares / steps) ** 0.5
