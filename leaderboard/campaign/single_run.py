@@ -35,7 +35,7 @@ class EstimatorRun:
     reference : bool
         Told the truth.
     status, reason : str
-        As in `simnav.trial`.
+        As in `simnav.trial.trial`.
     seconds : float
         Wall-clock time of the whole run [s].
     scores : mapping of str to float

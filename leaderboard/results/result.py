@@ -78,7 +78,7 @@ class Result:
     reference : bool
         True for rows that are told the truth; they are not ranked.
     status, reason : str
-        As in `simnav.trial`, and ``timeout``, ``out-of-memory``, ``no-recording``.
+        As in `simnav.trial.trial`, and ``timeout``, ``out-of-memory``, ``no-recording``.
     scores : mapping of str to float
         As in `simnav.scoring.SCORES`.
     series : mapping of str to array

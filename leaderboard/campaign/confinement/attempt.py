@@ -16,8 +16,8 @@ from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.leaderboard.campaign.confinement.cores import own_core
 from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, StoppedError
 from simnav.trial import FailureError, Trial, run_session
-from simnav.trial_log import TrialLog
-from simnav.wire import InvalidOutputError
+from simnav.trial.log import TrialLog
+from simnav.trial.wire import InvalidOutputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -18,8 +18,8 @@ from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.campaign.training_runs import told_of
 from simnav.plugins import load_plugin
 from simnav.trial import describe_failure
+from simnav.trial.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
 from simnav.types import NavigationStates
-from simnav.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.confinement.kinds import Home

@@ -1,9 +1,9 @@
 """What a worker and an estimator process say to each other.
 
 The worker sends messages with a header of the size of a packet's: packets themselves, and those of `Down` with a body.
-The estimator process gives one answer to each, with the header `simnav.wire.ANSWER`: an estimate, or one of `Up` with a
-body in JSON or in float64. Bodies to the estimator process are pickled, for they come from the harness; those from it
-never are.
+The estimator process gives one answer to each, with the header `simnav.trial.wire.ANSWER`: an estimate, or one of
+`Up` with a body in JSON or in float64. Bodies to the estimator process are pickled, for they come from the harness;
+those from it never are.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import struct
 from enum import IntEnum
 from typing import Any
 
-from simnav.wire import ANSWER, PacketDecoder
+from simnav.trial.wire import ANSWER, PacketDecoder
 
 __all__ = ["LARGEST", "Down", "Up", "answer", "command", "read_message", "write_all"]
 
@@ -36,7 +36,7 @@ class Down(IntEnum):
 
 
 class Up(IntEnum):
-    """From the estimator process; 1 is an estimate (`simnav.wire.ESTIMATE`)."""
+    """From the estimator process; 1 is an estimate (`simnav.trial.wire.ESTIMATE`)."""
 
     DONE = 2
     FAILURE = 3

@@ -25,13 +25,13 @@ from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES
 from simnav.leaderboard.campaign.confinement.kinds import homes_of_kinds
 from simnav.leaderboard.campaign.confinement.messages import LARGEST, Down, Up, command
 from simnav.trial import FailureError, LostError
+from simnav.trial.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
 from simnav.types import NavigationStates
-from simnav.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.recording import Recording
-    from simnav.trial_log import TrialLog
+    from simnav.trial.log import TrialLog
 
 __all__ = ["EstimatorServer", "Limits", "RemoteSession", "ServerError", "StoppedError"]
 

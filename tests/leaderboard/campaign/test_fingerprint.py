@@ -153,7 +153,7 @@ def test_a_docstring_and_the_chart_keep_the_recordings_and_a_constant_changes_th
     )
     assert not after(constant, library / "environment" / "rendering.py")
     assert not after(edit, library / "scoring" / "outages.py", "RECOVERY_THRESHOLD = 10.0", "RECOVERY_THRESHOLD = 11.0")
-    assert not after(edit, library / "trial_log.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3")
+    assert not after(edit, library / "trial" / "log.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3")
     assert after(edit, library / "simulation" / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0")
     assert after(constant, library / "geometry" / "earth.py")  # imported indirectly
     assert after(constant, library / "log" / "nmea.py")
@@ -193,7 +193,9 @@ def test_an_estimator_of_ours_is_known_by_what_it_imports(library: Path) -> None
     data = sorted(ours.rglob("anfis_innovation.json"))
     assert changed(comment, place["ekf"]) == []
     assert changed(constant, place["federated"]) == ["federated"]
-    assert changed(edit, library / "trial_log.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3") == list(names)
+    assert changed(edit, library / "trial" / "log.py", "DIVERGENCE_LIMIT = 100e3", "DIVERGENCE_LIMIT = 90e3") == list(
+        names
+    )
     assert (
         changed(edit, library / "simulation" / "simulator.py", "_RATE_WITHOUT_IMU = 20.0", "_RATE_WITHOUT_IMU = 21.0")
         == []

@@ -233,7 +233,7 @@ def test_an_exception_is_recorded_with_its_place(recording: Recording) -> None:
     assert trial.status == "error"
     assert len(trial) == 5
     line = divide.__code__.co_firstlineno + 1
-    assert trial.reason == f"update() at 6 s: ZeroDivisionError: division by zero (test_trial.py:{line} in divide)"
+    assert trial.reason == f"update() at 6 s: ZeroDivisionError: division by zero (test_session.py:{line} in divide)"
 
 
 @pytest.mark.parametrize("error", [MemoryError("too much"), SystemExit(3), RecursionError("deep")])
@@ -443,7 +443,7 @@ def test_an_earlier_bad_covariance_outranks_a_later_exception(recording: Recordi
 
 
 def test_many_epochs_are_checked_in_chunks(recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simnav.trial_log._CHUNK", 4)
+    monkeypatch.setattr("simnav.trial.log._CHUNK", 4)
     trial = run_trial(failing(with_(covariance=2.0 * np.eye(9))), recording)
     assert trial.status == "ok"
     assert trial.covariance is not None

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.trial_log import DivergedError, TrialLog
+from simnav.trial.log import DivergedError, TrialLog
+from simnav.trial.wire import EstimateEncoder, InvalidOutputError
 from simnav.types import Estimate, NavigationStates
-from simnav.wire import EstimateEncoder, InvalidOutputError
 
 STEPS = 60
 
 
 @pytest.fixture
 def truth(monkeypatch: pytest.MonkeyPatch) -> NavigationStates:
-    monkeypatch.setattr("simnav.trial_log._CHUNK", 16)  # of covariances
+    monkeypatch.setattr("simnav.trial.log._CHUNK", 16)  # of covariances
     time = np.arange(1.0, STEPS + 1.0)
     position = np.tile([0.9, 3.1415, 0.0], (STEPS, 1))
     position[10] = np.nan  # not known there

@@ -181,7 +181,7 @@ class EstimateEncoder:
     """From `Estimate` to an answer in plain form; one for each run.
 
     What is no array of the right shape raises `InvalidOutputError` here. What the numbers are worth is for
-    `simnav.trial_log` to judge.
+    `simnav.trial.log` to judge.
     """
 
     def __init__(self) -> None:

@@ -1,21 +1,4 @@
-"""A trial: one estimator run over one recording, step by step, with every failure caught and named.
-
-The estimator sees copies, packet by packet: it can neither look ahead nor spoil the recording for the next one.
-Its output is checked at every step; the first step that fails ends the trial, and all that came before is kept.
-
-==================  ==================================================================================================
-status              meaning
-==================  ==================================================================================================
-``ok``              every step gave a valid estimate
-``error``           the estimator raised an exception
-``invalid-output``  not an `Estimate`, wrong shape or time, NaN or infinity in an estimated component, a covariance that
-                    is not symmetric or not positive semi-definite
-``diverged``        finite, but horizontally more than `DIVERGENCE_LIMIT` from the truth
-``out-of-memory``   the estimator raised MemoryError
-``unsuitable``      an instrument is lacking that `Estimator.needs` names: no failure. To refuse a scenario that has all
-                    of them (`UnsuitableScenario`) is an ``error``
-==================  ==================================================================================================
-"""
+"""Run an estimator over a recording, step by step, wherever the estimator is."""
 
 from __future__ import annotations
 
@@ -30,16 +13,15 @@ from typing import Any, Protocol
 
 from simnav.estimator import Estimator, NeedsError, UnsuitableScenario, lacking
 from simnav.recording import Recording
-from simnav.trial_log import DIVERGENCE_LIMIT, DivergedError, Trial, TrialLog
+from simnav.trial.log import DivergedError, TrialLog
+from simnav.trial.trial import Trial
+from simnav.trial.wire import EstimateEncoder, InvalidOutputError, PacketDecoder, PacketEncoder
 from simnav.types import NavigationStates
-from simnav.wire import EstimateEncoder, InvalidOutputError, PacketDecoder, PacketEncoder
 
 __all__ = [
-    "DIVERGENCE_LIMIT",
     "FailureError",
     "LostError",
     "Session",
-    "Trial",
     "describe_failure",
     "run_session",
     "run_trial",

@@ -1,7 +1,7 @@
 """What an estimator gave in a run, collected step by step, and every answer checked.
 
-The answers come in the plain form of `simnav.wire`: from this process or from another that nobody vouches for. What is
-no well-formed answer is invalid output, whoever made it.
+The answers come in the plain form of `simnav.trial.wire`, from this process or from another that cannot be trusted. An
+answer that is not well-formed is invalid output, whoever made it.
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.types import COMPONENTS, Array, NavigationStates
-from simnav.wire import (
+from simnav.trial.trial import Trial
+from simnav.trial.wire import (
     ANSWER,
     COVARIANCE,
     ESTIMATE,
@@ -28,8 +27,9 @@ from simnav.wire import (
     read_tail,
     real_array,
 )
+from simnav.types import COMPONENTS, Array, NavigationStates
 
-__all__ = ["DIVERGENCE_LIMIT", "DivergedError", "Trial", "TrialLog"]
+__all__ = ["DIVERGENCE_LIMIT", "DivergedError", "TrialLog"]
 
 #: Horizontal error [m] above which an estimate counts as diverged: no instrument of a vessel is of use that far off.
 DIVERGENCE_LIMIT = 100e3
@@ -45,61 +45,6 @@ _FORM = 16  # bytes of the header of an answer that tell its form: all but the t
 _FIRST = ANSWER.size // 8  # where the numbers of an answer begin, in float64; the time is before them
 _HELD = 100  # bytes that are counted for keeping the diagnostics and flags of a step, beside what they take
 _VECTORS = [struct.Struct(f"{3 * n}d") for n in range(4)]  # numbers of so many vectors
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """What an estimator gave on one recording, up to the end or to its failure: T epochs.
-
-    Attributes
-    ----------
-    estimator : str
-        Registered name, or the name of the class.
-    status, reason : str
-        See the module; ``reason`` is empty where the status is ``ok``.
-    time : (T,) array
-        Ends of the steps that were completed [s]: the first T of ``recording.data.truth.time``.
-    position, velocity, attitude : (T, 3) array
-        As in `Estimate`; NaN where a vector was not given.
-    estimated : (T, 9) bool array
-        Which of `COMPONENTS` were estimated.
-    covariance : (T, 9, 9) array or None
-        NaN at epochs without one; None where there was none at all or it was not kept.
-    diagnostics : dict of str to (T, ...) array
-        NaN at epochs without the diagnostic; arrays of changing length are padded with NaN.
-    flagged : list of (instrument, time)
-        Measurements that the estimator judged faulty.
-    update_seconds : (T,) array
-        Wall time of each update [s].
-    smoothed : NavigationStates or None
-        What ``smooth()`` returned: T states.
-    reset_seconds, smooth_seconds : float
-        Wall time of ``reset()`` and ``smooth()`` [s].
-    """
-
-    estimator: str
-    status: str
-    reason: str
-    time: Array
-    position: Array
-    velocity: Array
-    attitude: Array
-    estimated: NDArray[np.bool_]
-    covariance: Array | None
-    diagnostics: dict[str, Array]
-    flagged: list[tuple[str, float]]
-    update_seconds: Array
-    smoothed: NavigationStates | None = None
-    reset_seconds: float = 0.0
-    smooth_seconds: float = 0.0
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-    @property
-    def failed(self) -> bool:
-        """Whether the trial counts as a failure (an unsuitable scenario does not)."""
-        return self.status not in ("ok", "unsuitable")
 
 
 class DivergedError(Exception):
@@ -182,7 +127,7 @@ class TrialLog:
         Parameters
         ----------
         answer : bytes
-            In the form of `simnav.wire`.
+            In the form of `simnav.trial.wire`.
         seconds : float
             Wall time of the update [s].
 
