@@ -400,6 +400,7 @@ def increments(time: Array, position: Array, velocity: Array, attitude: Array) -
     samples : ImuSamples
         n samples, at ``time[1:]``.
     positions : (n + 1, 3) array
+        Latitude, longitude [rad] and height [m] at the times.
 
     Raises
     ------

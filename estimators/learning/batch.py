@@ -112,6 +112,7 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
         Returns
         -------
         observation : (n, o) float32 array
+            What each agent sees: o features of each voyage.
         info : dict
             ``seed``, ``start`` and ``instruments`` of each voyage that begins.
         """

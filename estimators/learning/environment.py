@@ -149,6 +149,7 @@ class FilterTaskEnv(ChartedEnv[Numbers, Numbers]):
         Returns
         -------
         observation : (o,) float32 array
+            What the agent sees at the start: o features.
         info : dict
             ``seed`` of the run, ``start`` and ``instruments``.
         """

@@ -87,6 +87,7 @@ class OwnObservation:
         Returns
         -------
         innovation : (d,) array
+            Reading minus prediction, in the units of the kind.
         jacobian : (d, n) array
             Of the prediction.
         """

@@ -211,6 +211,7 @@ def next_stretch(
     Returns
     -------
     i : int
+        Index of the sample that covers the stretch.
     stop : float
         End of the stretch.
     whole : float

@@ -168,8 +168,11 @@ class TangentFrame:
         Returns
         -------
         position, velocity : (3,) arrays
+            Latitude, longitude [rad], height [m]; north-east-down [m/s].
         dcm : (3, 3) array
+            Body to north-east-down.
         error_map : (9, 9) array
+            Of an error, to north-east-down from the frame; as of `tangent_state`.
         """
         position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
         # GTSAM's arrays are in Fortran's order, or to be read only.

@@ -283,6 +283,7 @@ class WindowEstimator(Solver):
         solved : int
             Linear systems.
         cost : float
+            Half the weighted sum of squares at the solution.
         moved : (n,) array
             By how much the newest node was moved.
         attached : int

@@ -160,6 +160,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         Returns
         -------
         observation : dict
+            As that of `NavigationEnv`, with a first axis of n.
         info : dict
             As that of `NavigationEnv`, an array of n for each key; zero, or None, for runs that go on.
 

@@ -165,6 +165,7 @@ class HeldGaussMarkov:
         Returns
         -------
         values : (m, d) array
+            In the unit of the process; d components.
         first : int
             Number of the first grid point; the value at time t is that of number floor(t / h + 1e-6), the millionth
             being for times that are multiples of h up to rounding.

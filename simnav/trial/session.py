@@ -36,6 +36,7 @@ class FailureError(Exception):
     status : str
         ``error``, ``invalid-output``, ``out-of-memory`` or ``unsuitable`` (it refuses).
     reason : str
+        What happened, for people.
     """
 
     def __init__(self, status: str, reason: str):
@@ -109,7 +110,9 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
     Parameters
     ----------
     session : Session
+        The estimator, here or elsewhere.
     recording : Recording
+        The run; its packets are handed over one by one.
     log : TrialLog
         A new one.
 
@@ -216,7 +219,9 @@ def describe_failure(error: BaseException, estimator: Estimator, skip: int) -> s
     Parameters
     ----------
     error : BaseException
+        What the estimator raised.
     estimator : Estimator
+        Whose file is looked for in the traceback.
     skip : int
         How many frames are of those who called the estimator.
     """

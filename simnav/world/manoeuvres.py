@@ -161,7 +161,9 @@ def table(manoeuvres: Sequence[Manoeuvre]) -> tuple[Array, Array]:
     Returns
     -------
     rows : (n, 6) array
+        One row a manoeuvre, in SI units; see each manoeuvre's ``row``.
     points : (m, 2) array
+        The waypoints that rows refer to: north and east [m].
     """
     points: list[Point] = []
     rows = [m.row(points) for m in manoeuvres]

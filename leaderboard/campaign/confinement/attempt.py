@@ -100,6 +100,7 @@ def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, se
     Parameters
     ----------
     confinement : {"process", "bubblewrap"}
+        A process of its own, or that in a sandbox of bubblewrap.
     hidden : sequence of Path
         What estimators must not read.
     loaded : bool

@@ -47,6 +47,7 @@ def wrapped(
     Parameters
     ----------
     command : sequence of str
+        Program and arguments.
     environment : dict
         That the command is started with; what the sandbox needs is set in it.
     hidden : sequence of Path

@@ -64,6 +64,7 @@ class StoppedError(LostError):
     status : str
         As of `simnav.leaderboard.campaign.isolation.Outcome`.
     reason : str
+        What happened, for people.
     """
 
     def __init__(self, status: str, reason: str):
@@ -93,6 +94,7 @@ class EstimatorServer:
     Parameters
     ----------
     confinement : {"process", "bubblewrap"}
+        A process of its own, or that in a sandbox of bubblewrap.
     hidden : sequence of Path
         What estimators must not read: the folder of the results, and the file of a secret key.
     loaded : bool
@@ -105,6 +107,7 @@ class EstimatorServer:
     confinement : str
         What is in force: ``process``, ``landlock`` or ``bubblewrap``.
     hidden : tuple of Path
+        What estimators cannot read.
     sealed : bool
         Of ``bubblewrap`` what is hidden is fixed; otherwise both count for the next run.
 
@@ -214,7 +217,9 @@ class EstimatorServer:
         Parameters
         ----------
         entrant : Entrant
+            Which estimator, and its parameters.
         limits : Limits
+            What the process may take.
         core : int, optional
             On which it runs.
 
@@ -294,6 +299,7 @@ class RemoteSession:
     write, read : int
         Descriptors of the pipes.
     limits : Limits
+        What the process may take.
 
     Attributes
     ----------
