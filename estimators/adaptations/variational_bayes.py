@@ -80,11 +80,11 @@ class VariationalBayes(EstimatedNoise):
 
     def __init__(
         self,
-        forgetting: float = 0.96,
-        prior: float = 10.0,
+        forgetting: float = 0.902,
+        prior: float = 4.63,
         iterations: int = 2,
         lowest: float = 1.0,
-        highest: float = 30.0,
+        highest: float = 63.1,
         scope: Scope = "all",
     ):
         super().__init__(lowest, highest, scope=scope)

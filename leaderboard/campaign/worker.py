@@ -55,7 +55,7 @@ class Unit:
     memory : int
         Of an estimator [bytes].
     parent : int
-        Process that runs the campaign.
+        Process that runs the campaign and started the worker; 0 where something else started it.
     scores : OwnScores
         Scores of others that workers must be sent.
     scoring : str
@@ -123,17 +123,16 @@ class Unit:
 def _prepare_worker(unit: Unit) -> None:
     """Once a worker: Ctrl-C is the parent's business, and it ends when the parent is gone."""
     global _prepared
-    if unit.confinement != "none":
-        prepare(unit.confinement, unit.hidden)  # loads its kernels while the first recording is made
-    if _prepared:
-        return
-    _prepared = True
-    _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
-    if os.getpid() != unit.parent:
+    first, _prepared = not _prepared, True
+    if first and os.getpid() != unit.parent:  # before anything that takes time
         with contextlib.suppress(ValueError):  # not in the main thread of a Dask worker
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-        if os.getppid() == unit.parent:
+        if unit.parent:
             threading.Thread(target=_end_with, args=(unit.parent,), daemon=True).start()
+    if unit.confinement != "none":
+        prepare(unit.confinement, unit.hidden)  # loads its kernels while the first recording is made
+    if first:
+        _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
 
 
 def _load(estimators: bool) -> None:

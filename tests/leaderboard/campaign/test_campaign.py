@@ -231,12 +231,16 @@ def _descendants(process: int) -> set[int]:
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are listed in /proc")
-def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path) -> None:
+@pytest.mark.parametrize("loading", [True, False], ids=["while workers load", "while estimators run"])
+def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path, loading: bool) -> None:
     estimator(tmp_path)
     estimator(tmp_path, "raises", "import time; time.sleep(1.0)")
     process = start(tmp_path, tmp_path / "out", 12)
-    wait_until(lambda: results_in(tmp_path / "out") >= 1, process)
-    time.sleep(0.5)
+    if loading:
+        wait_until(lambda: len(_descendants(process.pid)) >= 4, process)  # two workers, and what joblib starts
+    else:
+        wait_until(lambda: results_in(tmp_path / "out") >= 1, process)
+        time.sleep(0.5)
     left = _descendants(process.pid)
     assert len(left) >= 4  # two workers, their servers, the estimators
     process.kill()

@@ -155,7 +155,10 @@ def test_a_shipped_file_is_of_training_families_and_the_row_has_what_was_chosen(
     document = read(path)
     assert document["estimator"] == path.stem in names()
     defaults = {p.name: p.default for p in describe(path.stem).parameters}
-    assert {name: defaults[name] for name in document["chosen"]} == document["chosen"]
+    # What does not hold on unseen voyages is not adopted.
+    holds = document["unseen_after"]["objective"] < document["unseen_before"]["objective"]
+    values = document["chosen" if holds else "present"]
+    assert {name: defaults[name] for name in values} == values
     assert set(document["chosen"]) == {r.name for r in ranges_of(document)}
     for family in document["families"]:
         assert load(family.rpartition("-v")[0]).training
@@ -165,8 +168,6 @@ def test_a_shipped_file_is_of_training_families_and_the_row_has_what_was_chosen(
     best = min(e[-1] for e in document["evaluations"])
     assert document["after"]["objective"] == pytest.approx(best, abs=1e-9)
     assert document["after"]["objective"] <= document["before"]["objective"]
-    # What does not hold on unseen voyages is not adopted.
-    assert document["unseen_after"]["objective"] <= document["unseen_before"]["objective"]
 
 
 def test_some_rows_are_tuned():
