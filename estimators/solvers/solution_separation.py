@@ -7,16 +7,21 @@ the right model the separation d has the covariance
     cov(d) = P_i - P_0                                              (R. G. Brown and P. W. McBurney 1988)
 
 which gives the threshold of the test, component by component of the position, velocity and heading:
-``T_i = K_fa sqrt(P_i - P_0)``. Where a test fails, an instrument is excluded: of those with a large separation, the one
-whose sub-filter is in the best agreement with the instruments that it uses (the least mean NIS of its worst instrument
-over `_RECENT` seconds; residual monitoring after Young and McGraw). Where several agree alike (within `_TIED`, or with
-a mean NIS of up to `_AGREEMENT`), it is one on probation (see below), else a fix, since without the log a vessel is
-lost sooner, else that of the largest separation. Its sub-filter becomes the main one, so that what the fault has done
-so far is undone, too.
+``T_i = K_fa sqrt(P_i - P_0)``. A filter without a compass may not know its heading well. A heading error of ``K_fa``
+sigmas changes a velocity v by ``v (K_fa sigma)^2 / 2`` at second order, which is in no covariance. So this is added to
+the threshold of the horizontal velocity.
+
+Where a test fails, an instrument is excluded: of those with a large separation, the one whose sub-filter is in the best
+agreement with the instruments that it uses (the least mean NIS of its worst instrument over `_RECENT` seconds; residual
+monitoring after Young and McGraw). Where several agree alike (within `_TIED`, or with a mean NIS of up to
+`_AGREEMENT`), it is one on probation (see below), else a fix, since without the log a vessel is lost sooner, else that
+of the largest separation. Its sub-filter becomes the main one, so that what the fault has done so far is undone, too.
 
 Where a fix is excluded, the sub-filter without the log is kept beside, and the other way round: the hypothesis that was
 not chosen. If the instrument that was believed fails a test in its turn, and the one excluded agrees with all others in
-that filter, the two change places.
+that filter, the two change places. On a vessel without an IMU the compass is among them, and nothing is excluded that
+cannot be spared: a fix, or a log and a compass, must be left. Its fixes are out for `_DEAD_RECKONING` seconds at most,
+and the separation of the filter without a compass counts less, because its turns are known by the compass alone.
 
 A datasheet may be wrong. Whatever is said here of a NIS is said of its ratio to the mean of the last ``horizon``
 seconds, where this is above 1.
@@ -91,8 +96,13 @@ _PRIOR = 20.0
 _SUSPECT = 0.3
 #: Most that ``recovery`` is multiplied by.
 _LONGEST = 16
+#: Without an IMU the turns of a vessel are known by its compass only, and they are not the random process of the model.
+#: So the separation of the filter without a compass counts this much less.
+_TURNING = 3.0
 #: Longest time without fixes and logs by exclusion [s].
 _COASTING = 60.0
+#: Longest time for which log and compass alone are followed by exclusion of the fixes, without an IMU [s].
+_DEAD_RECKONING = 180.0
 #: An instrument that has said nothing for so long, or for three periods, is silent [s].
 _SILENCE = 5.0
 #: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
@@ -175,6 +185,8 @@ class SolutionSeparation(Solver):
         Probability of each test to fail where nothing is wrong, in (0, 1).
     horizon : float
         Age at which a sub-filter is started anew [s].
+    horizon_without_imu : float
+        The same for a vessel without an IMU, whose dead reckoning is soon worse than any fix [s].
     recovery : float
         Time for which an excluded instrument must agree before it is used again [s].
     risk : float
@@ -194,6 +206,7 @@ class SolutionSeparation(Solver):
         model: ModelChoice,
         false_alarm: float = 1e-6,
         horizon: float = 300.0,
+        horizon_without_imu: float = 60.0,
         recovery: float = 30.0,
         risk: float = 1e-5,
         fault_probability: float = 1e-2,
@@ -201,12 +214,14 @@ class SolutionSeparation(Solver):
         for name, p in (("false_alarm", false_alarm), ("risk", risk), ("fault_probability", fault_probability)):
             if not 0.0 < p < 1.0:
                 raise ValueError(f"{name} = {p:g}: it must lie between 0 and 1")
-        if not horizon > 0.0:
-            raise ValueError(f"horizon = {horizon:g} s: it must be above 0")
+        for name, seconds in (("horizon", horizon), ("horizon_without_imu", horizon_without_imu)):
+            if not seconds > 0.0:
+                raise ValueError(f"{name} = {seconds:g} s: it must be above 0")
         if not recovery >= 0.0:
             raise ValueError(f"recovery = {recovery:g} s: it must not be negative")
         self._choice = model
-        self.false_alarm, self.horizon, self.recovery = false_alarm, horizon, recovery
+        self.false_alarm, self.recovery = false_alarm, recovery
+        self.horizon, self.horizon_without_imu = horizon, horizon_without_imu
         self.risk, self.fault_probability = risk, fault_probability
 
     def _filter(self, exclusion: _Exclusion | None = None) -> _Watched:
@@ -220,13 +235,15 @@ class SolutionSeparation(Solver):
         from scipy.stats import norm
 
         self._begin_with = start, instruments
+        self._inertial = instruments.imu is not None
+        self._horizon = self.horizon if self._inertial else self.horizon_without_imu
         self._exclusion = _Exclusion()
         self._main = self._filter(self._exclusion)
         self._names = [name for name, sheet in instruments.items() if self._main.model.observes(sheet)]
         self._components = {name: len(KINDS[instruments[name].kind].errors) for name in self._names}
         self._pairs = {name: [_Without(name, self._filter(), start.time) for _ in range(2)] for name in self._names}
         for _, younger in self._pairs.values():
-            younger.start = start.time - 0.5 * self.horizon  # so that the two come of age in turns
+            younger.start = start.time - 0.5 * self._horizon  # so that the two come of age in turns
         tests = max(len(self._names), 1) * len(_TESTED)
         hypotheses = len(self._names) + 1
         self._threshold = float(norm.isf(0.5 * self.false_alarm / tests))
@@ -235,6 +252,7 @@ class SolutionSeparation(Solver):
         self._missed = float(norm.isf(min(share, 0.5)))
         self._group = fixes_and_logs(instruments)
         self._coasting: float | None = None
+        self._settled = start.time
         self._heard = dict.fromkeys(self._names, start.time)
         self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
         self._readmitted: dict[str, float] = {}
@@ -265,7 +283,7 @@ class SolutionSeparation(Solver):
         fading = exp(-max(measurements.time - self._time, 0.0) / _RECENT)
         self._main.watch(estimate, self._components, fading)
         since = measurements.time - self._begin_with[0].time
-        slow = min((measurements.time - self._time) / min(self.horizon, since + _PRIOR), 1.0)
+        slow = min((measurements.time - self._time) / min(self._horizon, since + _PRIOR), 1.0)
         for name in self._names:
             nis = float(estimate.diagnostics.get(f"nis.{name}", np.nan)) / self._components[name]
             if nis == nis:
@@ -284,10 +302,11 @@ class SolutionSeparation(Solver):
         ratios = {name: self._separation(name, estimate) for name in self._names if name not in out}
         most = max(ratios.values(), default=0.0)
         diagnostics = dict(estimate.diagnostics)
-        if most > 1.0:
+        if most > 1.0 and measurements.time >= self._settled:
             faulty = self._most_probable([name for name, ratio in ratios.items() if ratio > _SUSPECT * most], ratios)
-            estimate = self._exclude(faulty)
-            flagged += [(faulty, m.time) for m in measurements.aids if m.instrument == faulty]
+            if faulty is not None:
+                estimate = self._exclude(faulty)
+                flagged += [(faulty, m.time) for m in measurements.aids if m.instrument == faulty]
         self._readmit(measurements.time)
         self._renew(measurements.time)
         diagnostics["protection_level"] = self._protection_level(estimate)
@@ -303,16 +322,33 @@ class SolutionSeparation(Solver):
         means = sub.filter.mean_nis.items()
         return max((v / max(usual.get(n, 1.0), 1.0) for n, v in means if n != sub.name and n not in out), default=1.0)
 
-    def _most_probable(self, suspects: list[str], ratios: Mapping[str, float]) -> str:
-        """Of the suspects and the instruments on probation, the one to exclude."""
+    def _most_probable(self, suspects: list[str], ratios: Mapping[str, float]) -> str | None:
+        """Of the suspects and the instruments on probation, the one to exclude; None where none can be spared."""
         probation = {
-            name for name, since in self._readmitted.items() if self._time - since < self.horizon and name in ratios
+            name for name, since in self._readmitted.items() if self._time - since < self._horizon and name in ratios
         }
         out = self._exclusion.excluded
-        apart = {name: self._disagreement(self._elder(name), out) for name in {*suspects, *probation}}
+        spared = [name for name in {*suspects, *probation} if self._can_spare(name)]
+        if not spared:
+            return None
+        apart = {name: self._disagreement(self._elder(name), out) for name in spared}
         least = max(min(apart.values()), _AGREEMENT)
         tied = [name for name in self._names if apart.get(name, np.inf) <= _TIED * least]
         return min(tied, key=lambda n: (n not in probation, not self._group.get(n, False), -ratios[n]))
+
+    def _can_spare(self, name: str) -> bool:
+        """Whether what is left without an instrument gives a position: always with an IMU, for a while."""
+        if self._inertial:
+            return True
+        out = {name} if self._mistaken(name) else {name, *self._exclusion.excluded}
+        left = [n for n in self._names if n not in out and self._time - self._heard[n] <= self._silence[n]]
+        roles = {self._group.get(n) for n in left}  # None: a compass
+        return True in roles or {False, None} <= roles
+
+    def _mistaken(self, name: str) -> bool:
+        """Whether it was this instrument that should have been excluded, and not the one that was."""
+        before = self._alternatives.get(name)
+        return before is not None and self._disagreement(before, ()) <= _AGREEMENT
 
     def _elder(self, name: str) -> _Without:
         return min(self._pairs[name], key=lambda sub: sub.start)
@@ -324,7 +360,10 @@ class SolutionSeparation(Solver):
         assert estimate.covariance is not None
         main = estimate.covariance.diagonal()
         own = sub.estimate.covariance.diagonal()
-        return own, np.maximum(own - main, 0.0) + _LINEARISATION**2 * main
+        apart = np.maximum(own - main, 0.0) + _LINEARISATION**2 * main
+        if estimate.velocity is not None:  # a heading error as large as its test allows, at second order
+            apart[3:5] += (0.5 * self._threshold * own[8] * estimate.velocity[:2]) ** 2
+        return own, apart
 
     def _separation(self, name: str, estimate: Estimate) -> float:
         """The largest separation over its threshold, of all tested components and both sub-filters."""
@@ -336,17 +375,18 @@ class SolutionSeparation(Solver):
             for q in _TESTED:
                 if mask[q] and variance[q] > 0.0:
                     largest = max(largest, abs(apart[q]) / (self._threshold * sqrt(variance[q])))
-        return largest
+        return largest if self._inertial or name in self._group else largest / _TURNING
 
     def _exclude(self, name: str) -> Estimate:
         """Take the sub-filter without an instrument for the main filter; all others begin anew from it."""
-        excluded, before = self._exclusion.excluded, self._alternatives.pop(name, None)
+        excluded, before = self._exclusion.excluded, self._alternatives.get(name)
         chosen = self._elder(name)
-        if before is not None and self._disagreement(before, ()) <= _AGREEMENT:
-            chosen = before  # it was another one that should have been excluded
+        if before is not None and self._mistaken(name):
+            chosen = before
             excluded.clear()
         elif not excluded:
-            self._alternatives = {n: self._elder(n) for n in self._group if n != name and name in self._group}
+            others = self._group if self._inertial else self._names
+            self._alternatives = {n: self._elder(n) for n in others if n != name and name in others}
             for n, sub in self._alternatives.items():
                 self._pairs[n] = [other for other in self._pairs[n] if other is not sub]
                 self._pairs[n].append(_Without(n, self._filter(), self._time))
@@ -359,7 +399,7 @@ class SolutionSeparation(Solver):
         self._main.take_over(chosen.filter)
         for other in self._names:
             for k, sub in enumerate(self._pairs[other]):
-                self._begin(sub, self._time - 0.5 * self.horizon * k, chosen.estimate)
+                self._begin(sub, self._time - 0.5 * self._horizon * k, chosen.estimate)
         return copy.copy(chosen.estimate)
 
     def _readmit(self, time: float) -> None:
@@ -371,10 +411,16 @@ class SolutionSeparation(Solver):
             if time - since >= self.recovery * min(2.0 ** (self._count[name] - 1), _LONGEST)
         ]
         heard = [name for name in self._group if time - self._heard[name] <= self._silence[name]]
-        coasting = bool(heard) and set(heard) <= excluded
+        fixes, logs = ([n for n in heard if self._group[n] is kind] for kind in (True, False))
+        needed, first, longest = (
+            (heard, logs or fixes, _COASTING) if self._inertial else (fixes, fixes, _DEAD_RECKONING)
+        )
+        coasting = bool(needed) and set(needed) <= excluded
         self._coasting = (time if self._coasting is None else self._coasting) if coasting else None
-        if self._coasting is not None and time - self._coasting >= _COASTING:
-            again += [n for n in [n for n in heard if not self._group[n]] or heard if n not in again]
+        if self._coasting is not None and time - self._coasting >= longest:
+            again += [n for n in first if n not in again]
+            if not self._inertial:  # the filters go to the fixes; until then they differ for that alone
+                self._settled = time + _RECENT
         if again:
             self._alternatives = {}
         for name in again:
@@ -384,15 +430,15 @@ class SolutionSeparation(Solver):
             for one in (self._main, *(sub.filter for pair in self._pairs.values() for sub in pair)):
                 one.mean_nis.pop(name, None)
             for k, sub in enumerate(self._pairs[name]):
-                self._begin(sub, time - 0.5 * self.horizon * k, None)
+                self._begin(sub, time - 0.5 * self._horizon * k, None)
 
     def _renew(self, time: float) -> None:
         """Begin sub-filters anew that have come of age."""
         for name in self._names:
             for sub in self._pairs[name]:
-                if time - sub.start >= self.horizon and name not in self._exclusion.excluded:
+                if (time - sub.start >= self._horizon or time < self._settled) and name not in self._exclusion.excluded:
                     self._begin(sub, time, None)
-        self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.start < 2.0 * self.horizon}
+        self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.start < 2.0 * self._horizon}
 
     def _begin(self, sub: _Without, time: float, estimate: Estimate | None) -> None:
         """Begin a sub-filter from the main filter's state."""

@@ -13,6 +13,8 @@ from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.solution_separation import SolutionSeparation
 from simnav.estimators.solvers.state_difference import difference, displaced
 from simnav.geometry import earth
+from simnav.scenario import load
+from simnav.source import record
 from simnav.types import Datasheet, Estimate, Measurements
 
 GNSS = Datasheet("gnss", "gnss_position", 1.0, np.array([1.5, 1.5, 3.0]), lever_arm=np.array([2.0, -1.0, -8.0]))
@@ -147,3 +149,29 @@ def test_a_larger_risk_is_a_lower_level(recording_of):
 def test_a_senseless_parameter_is_refused(name: str, value: float):
     with pytest.raises(ValueError, match=name):
         SolutionSeparation(InertialModel(), **{name: value})
+
+
+# --- a ship without an IMU ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [50, 51, 53])
+def test_a_steady_turn_excludes_nothing_on_a_ship_without_an_imu(seed: int):
+    recording = record(load("ship-turn").model_copy(update={"duration": 300.0}), seed)
+    error, _, excluded = run(recording)
+    assert not any(excluded)
+    assert np.sqrt(np.mean(error**2)) < 3.0
+
+
+@pytest.mark.parametrize("seed", [100, 131, 134])
+def test_a_ship_without_an_imu_keeps_a_fix_or_log_and_compass(seed: int):
+    recording = record(load("training-ships"), seed)
+    error, _, excluded = run(recording)
+    assert any(excluded)
+    for out in map(set, excluded):
+        assert "gnss" not in out or not out & {"gyrocompass", "speed_log"}
+    longest = run_length = 0
+    for out in excluded:
+        run_length = run_length + 1 if "gnss" in out else 0
+        longest = max(longest, run_length)
+    assert longest <= 181  # steps of one second
+    assert error.max() < 1000.0
