@@ -21,13 +21,7 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
 
 
 @register("student-t-rts")
-class StudentTRts(
-    Row,
-    solver=KalmanEstimator,
-    model=Suitable,
-    adaptation=StudentT,
-    smoother=piece(StudentTSmoother, rename={"dof": "smoothed_dof"}),
-):
+class StudentTRts(StudentTKf, smoother=piece(StudentTSmoother, rename={"dof": "smoothed_dof"})):
     """The Student-t filter with a robust smoother behind it: measurements are judged by the smoothed trajectory.
 
     Source: A. Y. Aravkin, J. V. Burke and G. Pillonetto, *Robust and trend-following Student's t Kalman smoothers*,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from simnav.estimator import EstimatorError, describe
 from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
-from simnav.leaderboard.ranking.ranking_table import between, ratio
+from simnav.leaderboard.ranking.ranking_table import ratio
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
@@ -36,8 +38,9 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
     benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
     tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
     parts = [
-        f"{len(results)} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the error, "
-        "divided by the scenario's reference figure; smaller is better."
+        f"{len(results)} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the "
+        "horizontal error, divided by the scenario's reference figure: the error of an oracle that knows the true noise "
+        "and every fault, or of a plain filter on recorded voyages. Smaller is better."
     ]
     if tracks:
         parts.append("\n".join([
@@ -49,8 +52,8 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
         parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
         parts.append(f"The first {min(_ROWS, sum(r.ranked for r in main.rows))} rows of the track *{main.title}*:")
         parts.append("\n".join([
-            "| rank | estimator | score, 95 % interval | worst run | failed runs |", "|---|---|---|---|---|",
-            *(f"| {r.ranks} | `{r.estimator}` | {ratio(r.score)}{_interval(r)} | {ratio(r.worst)} "
+            "| rank | estimator | method | score, 95 % interval | worst run | failed runs |", "|---|---|---|---|---|---|",
+            *(f"| {r.ranks} | `{r.estimator}` | {_method(r)} | {ratio(r.score)}{_interval(r)} | {ratio(r.worst)} "
               f"| {r.failed} of {r.runs} |" for r in [r for r in main.rows if r.ranked][:_ROWS]),
         ]))  # fmt: skip
     return "\n\n".join(parts)
@@ -74,9 +77,17 @@ def draw(ranking: Ranking, path: Path) -> Path | None:
     return save(ranking_figure(main, most=_DRAWN), path, formats=("png",))[0]
 
 
+def _method(row: TrackRow) -> str:
+    """What a row is, in a few words; empty for one that is not registered by this name."""
+    try:
+        summary = describe(row.estimator).summary
+    except EstimatorError:
+        return ""
+    return summary.partition(": ")[0].rstrip(".")
+
+
 def _interval(row: TrackRow) -> str:
-    found = between(row.low, row.high, ratio)
-    return f" [{found}]" if found else ""
+    return f" [{ratio(row.low)}, {ratio(row.high)}]" if math.isfinite(row.low) and math.isfinite(row.high) else ""
 
 
 def _track(track: TrackRanking) -> str:
