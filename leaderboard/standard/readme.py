@@ -39,8 +39,8 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
     tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
     parts = [
         f"{len(results)} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the "
-        "horizontal error, divided by the scenario's reference figure: the error of an oracle that knows the true noise "
-        "and every fault, or of a plain filter on recorded voyages. Smaller is better."
+        "horizontal error, divided by the scenario's reference figure: the error of an oracle that knows the true "
+        "noise and every fault, or of a plain filter on recorded voyages. Smaller is better."
     ]
     if tracks:
         parts.append("\n".join([
@@ -52,7 +52,8 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
         parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
         parts.append(f"The first {min(_ROWS, sum(r.ranked for r in main.rows))} rows of the track *{main.title}*:")
         parts.append("\n".join([
-            "| rank | estimator | method | score, 95 % interval | worst run | failed runs |", "|---|---|---|---|---|---|",
+            "| rank | estimator | method | score, 95 % interval | worst run | failed runs |",
+            "|---|---|---|---|---|---|",
             *(f"| {r.ranks} | `{r.estimator}` | {_method(r)} | {ratio(r.score)}{_interval(r)} | {ratio(r.worst)} "
               f"| {r.failed} of {r.runs} |" for r in [r for r in main.rows if r.ranked][:_ROWS]),
         ]))  # fmt: skip
