@@ -288,6 +288,7 @@ def publish_standard(
     readme: str | os.PathLike[str] | None = None,
     site: str | os.PathLike[str] | None = None,
     workers: int = 2,
+    preliminary: bool = False,
     progress: Callable[..., None] | None = None,
 ) -> Published:
     """Make what comes with simnav from the results of `run_standard`: packed results, history, README, and a site.
@@ -306,6 +307,8 @@ def publish_standard(
         Folder of a site that is drawn; default: none.
     workers : int
         Processes that draw.
+    preliminary : bool
+        Also if runs are missing; the tables say so, and there is no edition.
     progress : callable, optional
         Called with how many of how many pages are done.
 
@@ -330,7 +333,9 @@ def publish_standard(
     if not working.exists():
         working = folder
     with mistakes(StoreError):
-        made = publish(working, load(profile), folder, file, None if readme is None else absolute(readme))
+        made = publish(
+            working, load(profile), folder, file, None if readme is None else absolute(readme), preliminary=preliminary
+        )
     if site is not None:
         published = {r.key for r in made.results}
         found = [r for r in results_of(working, series=True) if r.key in published]

@@ -76,6 +76,7 @@ def publish(
     readme: Annotated[Path | None, typer.Option(help="Whose tables are written. [README.md, if it is here]")] = None,
     site: Annotated[Path, typer.Option(help="Folder of the site.")] = Path("site"),
     workers: Workers = 2,
+    preliminary: Annotated[bool, typer.Option("--preliminary", help="Publish also if runs are missing.")] = False,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -90,12 +91,12 @@ def publish(
         with out.progress("site") as bar:
             made = publishing.publish_standard(
                 results=results, profile=profile, shipped=shipped, history=history, readme=readme, site=site,
-                workers=workers, progress=bar,
+                workers=workers, preliminary=preliminary, progress=bar,
             )  # fmt: skip
         out.document({**made.to_dict(), "site": str(site)})
         out.print(
             f"results: {made.folder} ({len(made.results)} runs, {made.size / 2**20:.1f} MiB)",
-            f"edition: {made.edition}",
+            f"edition: {made.edition or 'none yet, because runs are missing'}",
             *(f"remark:  {text}" for text in made.remarks),
             *([f"tables:  {made.readme}"] if made.readme is not None else []),
             f"site:    {site / 'index.html'}",

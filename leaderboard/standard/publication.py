@@ -36,7 +36,7 @@ class Published:
     folder : Path
         Of the packed results.
     edition : int
-        Number of the edition.
+        Number of the edition; 0 for a preliminary result, which is none.
     results : sequence of Result
         All results of the edition.
     ranking : Ranking
@@ -96,7 +96,9 @@ def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
     return found
 
 
-def publish(working: Path, profile: Profile, folder: Path, history: Path, readme: Path | None) -> Published:
+def publish(
+    working: Path, profile: Profile, folder: Path, history: Path, readme: Path | None, *, preliminary: bool = False
+) -> Published:
     """Pack the results of a profile, add an edition to the history, and write the tables of the README.
 
     Results that the profile does not name, as those of submissions, are published as long as they are not out of date.
@@ -111,6 +113,8 @@ def publish(working: Path, profile: Profile, folder: Path, history: Path, readme
         Packed results and file of the history.
     readme : Path or None
         With the marks of `simnav.leaderboard.standard.readme`.
+    preliminary : bool
+        Also if runs are missing. The tables then say how many are there, and the history gets no edition.
 
     Raises
     ------
@@ -129,17 +133,18 @@ def publish(working: Path, profile: Profile, folder: Path, history: Path, readme
         )
     results = shortened(r for r in found if (r.scenario, r.estimator) not in without)  # as others will have them
     lacking = missing(profile, results)
-    if lacking:
+    if lacking and not preliminary:
         first = next(iter(lacking))
         raise RequestError(
             f"{sum(lacking.values())} runs of the profile {profile.name} are missing, such as of {first}; "
-            "'simnav standard run' continues"
+            "'simnav standard run' continues, and --preliminary publishes what is there"
         )
     ranking = rank(results)
-    text = replaced(readme, tables(ranking, results)) if readme is not None else ""  # fails before anything is written
+    of = len(results) + sum(lacking.values())
+    text = replaced(readme, tables(ranking, results, of)) if readme is not None else ""  # fails before all is written
     if working.resolve() != folder.resolve() or without:
         pack(working, folder, without=without, single=True)
-    edition = append(history, ranking, results)
+    edition = 0 if lacking else append(history, ranking, results)
     if readme is not None:
         write_whole(readme, text)
         draw(ranking, readme.parent / PICTURE)

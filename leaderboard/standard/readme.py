@@ -26,8 +26,18 @@ _DRAWN = 24  # of the picture
 _BEST = 4  # rows that a cell names
 
 
-def tables(ranking: Ranking, results: Sequence[Result]) -> str:
-    """A table of the tracks, and one of the best rows of the main track, as Markdown."""
+def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -> str:
+    """A table of the tracks, and one of the best rows of the main track, as Markdown.
+
+    Parameters
+    ----------
+    ranking : Ranking
+        The board.
+    results : sequence of Result
+        That it is made from.
+    of : int, optional
+        How many runs there should be: with fewer, the tables are called preliminary.
+    """
     known = distinct(r.provenance for r in results)
     commits = (
         ", ".join(sorted({f"`{p.commit[:12]}`{' with changes' if p.dirty else ''}" for p in known if p.commit}))
@@ -37,8 +47,9 @@ def tables(ranking: Ranking, results: Sequence[Result]) -> str:
     when = f", computed from {days[0]} to {days[-1]}" if len(days) > 1 else f", computed on {days[0]}" if days else ""
     benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
     tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
+    few = f"**Preliminary: {len(results)} of {of} runs.** " if of is not None and len(results) < of else ""
     parts = [
-        f"{len(results)} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the "
+        f"{few}{len(results)} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the "
         "horizontal error, divided by the scenario's reference figure: the error of an oracle that knows the true "
         "noise and every fault, or of a plain filter on recorded voyages. Smaller is better."
     ]

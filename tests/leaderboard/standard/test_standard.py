@@ -113,6 +113,12 @@ def test_a_change_of_one_row_runs_that_row_only(home: Path, tmp_path: Path, monk
     assert (stopped.summary.skipped, stopped.summary.computed, stopped.summary.left) == (2, 0, 2)
     with pytest.raises(RequestError, match=r"2 runs of the profile small are missing, such as of gnss-only on"):
         publish(home, tmp_path / "work")
+    for name in ("small.toml", "README.md"):
+        (tmp_path / name).write_text((home / name).read_text())
+    early = publish(tmp_path, tmp_path / "work", preliminary=True)
+    assert early.edition == 0
+    assert not (tmp_path / "history.csv").exists()
+    assert readme.marked(tmp_path / "README.md").startswith("**Preliminary: 2 of 4 runs.** 2 runs of")
     done = run(home, tmp_path / "work")
     assert (done.summary.skipped, done.summary.computed, done.summary.left) == (2, 2, 0)
     made = publish(home, tmp_path / "work")
