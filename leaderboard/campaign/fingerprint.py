@@ -27,11 +27,21 @@ if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.scenario import Scenario
 
-__all__ = ["digest", "estimator_source", "named_files", "recording_digest", "simulator_version", "variant"]
+__all__ = [
+    "digest",
+    "estimator_source",
+    "has_recordings",
+    "named_files",
+    "recording_digest",
+    "simulator_version",
+    "variant",
+]
 
 #: What makes recordings, and what runs an estimator over them: the imports are followed from here.
 SIMULATOR = ("simnav.source", "simnav.simulation.simulator", "simnav.log.source", "simnav.sensors")
 RUNNER = ("simnav.trial",)
+
+_ABSENT = "absent"
 
 
 def _code_digest(code: Mapping[str, str]) -> str:
@@ -94,9 +104,14 @@ def _log_digest(scenario: Scenario) -> str:
             for file in scenario.log.files.values():
                 path = channel.locate(scenario.log, file, recording)
                 files.append((f"{recording}/{file.path}", path))
-    except (ValueError, OSError):  # absent data: every run says so
-        return "absent"
+    except (ValueError, OSError):  # every run says so
+        return _ABSENT
     return files_digest(files)
+
+
+def has_recordings(scenario: Scenario) -> bool:
+    """Whether the files of a recorded scenario are on this machine; True for one that is simulated."""
+    return _log_digest(scenario) != _ABSENT
 
 
 def estimator_source(cls: type[Estimator]) -> str:

@@ -11,7 +11,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from simnav.estimator import EstimatorError, find
-from simnav.leaderboard.campaign.fingerprint import estimator_source, recording_digest, simulator_version, variant
+from simnav.leaderboard.campaign.fingerprint import (
+    estimator_source,
+    has_recordings,
+    recording_digest,
+    simulator_version,
+    variant,
+)
 from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.results import store
@@ -108,7 +114,10 @@ def outdated(folder: str | os.PathLike[str], without: Collection[tuple[str, str]
 
 
 def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
-    """What has changed since results were computed, by scenario and estimator; those of today are not in it."""
+    """What has changed since results were computed, by scenario and estimator; those of today are not in it.
+
+    Of a recorded scenario whose files are not on this machine nothing can be said: it counts as it is.
+    """
     one: dict[tuple[str, str], Result] = {}
     for result in results:
         one.setdefault((result.scenario, result.estimator), result)
@@ -120,6 +129,8 @@ def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
         recording, name = recordings[scenario], label.partition("(")[0]
         if name not in sources:
             sources[name] = _source(name)
+        if recording == "":
+            continue
         if recording is None:
             found[scenario, label] = "gone"
         elif recording != result.recording:
@@ -130,11 +141,12 @@ def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
 
 
 def _recording(scenario: str, simulator: str) -> str | None:
-    """The digest of a scenario's recordings; None where the catalogue does not have it."""
+    """The digest of a scenario's recordings: None where the catalogue does not have it, empty without its files."""
     try:
-        return recording_digest(load(scenario), simulator)
+        found = load(scenario)
     except (ValueError, OSError):
         return None
+    return recording_digest(found, simulator) if has_recordings(found) else ""
 
 
 def _source(name: str) -> str:

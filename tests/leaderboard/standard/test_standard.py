@@ -167,6 +167,10 @@ def test_a_change_of_simulator_scores_or_benchmark_is_said(
     with monkeypatch.context() as patch:
         patch.setattr(currency, "BENCHMARK", "simnav-bench 9.9")
         assert outdated(folder).benchmark
+    with monkeypatch.context() as patch:  # of logs that are not on this machine nothing can be said
+        patch.setattr(currency, "simulator_version", lambda: "0.1+other")
+        patch.setattr(currency, "has_recordings", lambda scenario: False)
+        assert not outdated(folder)
     with pytest.raises(RequestError, match="'simnav standard run' makes one"):
         publishing.check_standard(tmp_path)
 
