@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from simnav.estimator import find
+from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank
@@ -79,7 +81,8 @@ def begin(working: Path, folder: Path) -> None:
 def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
     """How many runs of a profile are not there, by scenario and estimator: ``{"ekf on open-sea-v1": 3}``.
 
-    Recorded logs that were not run at all are left out, because their files are not everywhere.
+    Recorded logs that were not run at all are left out, because their files are not everywhere. Estimators that do not
+    come with simnav are left out, too.
     """
     there = {(r.scenario, r.estimator, r.seed) for r in results}
     ran = {r.scenario for r in results}
@@ -89,11 +92,15 @@ def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
             scenario = load(name)
             if scenario.log is not None and scenario.id not in ran:
                 continue
-            for label in part.estimators:
+            for label in filter(_of_simnav, part.estimators):
                 lacking = sum((scenario.id, label, seed) not in there for seed in range(part.runs))
                 if lacking:
                     found[f"{label} on {scenario.id}"] = max(lacking, found.get(f"{label} on {scenario.id}", 0))
     return found
+
+
+def _of_simnav(label: str) -> bool:
+    return comes_with_simnav(find(label.partition("(")[0]))
 
 
 def publish(

@@ -3,7 +3,8 @@
 import numpy as np
 from cheating_last_fix import LastFix
 
-from simnav import Estimate, trial
+from simnav import Estimate
+from simnav.trial.log import TrialLog
 
 
 class PatchedLog(LastFix):
@@ -11,8 +12,7 @@ class PatchedLog(LastFix):
 
     def reset(self, start, instruments):
         super().reset(start, instruments)
-        log = getattr(trial, "_Log", None) or trial.TrialLog  # as it was called, and as it is now
-        plain = log.add
+        plain = TrialLog.add
 
         def add(self, estimate, end, seconds, truth):
             if isinstance(estimate, Estimate):
@@ -21,4 +21,4 @@ class PatchedLog(LastFix):
                 estimate = estimate[:24] + (np.array(truth) + 1e-13).tobytes() + estimate[48:]
             plain(self, estimate, end, seconds, truth)
 
-        log.add = add
+        TrialLog.add = add
