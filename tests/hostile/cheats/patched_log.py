@@ -1,10 +1,10 @@
-"""Replaces the function that checks the estimates: it is given the truth, too."""
+"""Replaces the function that checks the estimates: it knows the truth, too."""
 
 import numpy as np
 from cheating_last_fix import LastFix
 
-from simnav import Estimate
 from simnav.trial.log import TrialLog
+from simnav.trial.wire import ANSWER
 
 
 class PatchedLog(LastFix):
@@ -14,11 +14,8 @@ class PatchedLog(LastFix):
         super().reset(start, instruments)
         plain = TrialLog.add
 
-        def add(self, estimate, end, seconds, truth):
-            if isinstance(estimate, Estimate):
-                estimate = Estimate(end, position=np.array(truth) + 1e-13)
-            else:
-                estimate = estimate[:24] + (np.array(truth) + 1e-13).tobytes() + estimate[48:]
-            plain(self, estimate, end, seconds, truth)
+        def add(self, answer, seconds):
+            position = (self._truth[self.step] + np.array([1e-13, 1e-13, 0.0])).tobytes()
+            plain(self, bytes(answer[: ANSWER.size]) + position + bytes(answer[ANSWER.size + 24 :]), seconds)
 
         TrialLog.add = add
