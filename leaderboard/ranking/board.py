@@ -152,6 +152,8 @@ class Row:
     score, low, high : float
         Geometric mean of the ratio of the error to the reference figure, with its 95 % interval (NaN with fewer than
         six seeds). The interval takes the share of failures as it was observed.
+    adjustment : float
+        Factor in the score for seeds that others have run and it has not; 1 without such seeds.
     worst, p95 : float
         Largest ratio of a run, and the one that 95 % of the runs do not exceed.
     runs, failed : int
@@ -182,6 +184,7 @@ class Row:
     score: float
     low: float = math.nan
     high: float = math.nan
+    adjustment: float = 1.0
     worst: float = math.nan
     p95: float = math.nan
     runs: int = 0

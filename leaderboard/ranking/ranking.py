@@ -11,7 +11,9 @@ dropped.
 **Tracks.** There are ranks within a track only. A row is ranked if it has run all scenarios of the track that are on
 the board. One that needs other instruments is listed as unsuitable, whatever it does elsewhere.
 
-**Runs that count.** Seeds count in order up to the first that a row has not run, so that nobody can choose seeds.
+**Runs that count.** Seeds count in order up to the first that a row has not run, so that nobody can choose seeds. The
+score of a row with fewer seeds than others is adjusted for how hard the missing ones are
+(`simnav.leaderboard.ranking.adjustment`).
 
 **Who is told from whom.** Sign flips over all pairs of rows at once, by seed. On recorded tracks the unit is the
 recording: each one counts the same, whatever its scenario, and seeds over one recording are averaged.
@@ -24,12 +26,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.ranking.adjustment import adjustments
 from simnav.leaderboard.ranking.board import (
     Consistency,
     Ranking,
@@ -128,16 +131,24 @@ class _Cell:
         The seed or recording of each.
     logs : (n,) array
         Logarithms of the ratios to the reference figure; infinite where a run failed.
+    adjustment : float
+        What the score adds to them for the seeds that are missing.
     """
 
     runs: Runs
     units: list[Any]
     logs: Array
+    adjustment: float = 0.0
 
     @property
     def capped(self) -> Array:
-        """The logarithms as they count."""
+        """The logarithms as they count in a comparison by seed."""
         return np.minimum(self.logs, _CAP)
+
+    @property
+    def adjusted(self) -> Array:
+        """The logarithms as they count in the score."""
+        return np.minimum(self.logs + self.adjustment, _CAP)
 
     @property
     def failed(self) -> NDArray[np.bool_]:
@@ -159,7 +170,10 @@ class _Scenario:
         ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
         seeds = sorted({x.seed for r in ranked for x in r.tried})
         self._logs = {n: self._logs_of(r) for n, r in entries.items()}
-        self.cells = {n: self._cell(r, seeds) for n, r in entries.items()}
+        cells = {n: self._cell(r, seeds) for n, r in entries.items()}
+        references = [n for n, c in cells.items() if c.runs.reference]
+        added = adjustments({n: _by_unit(c) for n, c in cells.items()}, references)
+        self.cells = {n: replace(c, adjustment=added[n]) for n, c in cells.items()}
 
     def _cell(self, runs: Runs, seeds: Sequence[int]) -> _Cell:
         there = {r.seed: r for r in runs.tried}
@@ -279,7 +293,7 @@ def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
             **row,
             covered=len(mine),
             scenarios=len(used),
-            ratios={s: math.exp(float(c.capped.mean())) for s, c in mine.items()},
+            ratios={s: math.exp(float(c.adjusted.mean())) for s, c in mine.items()},
         ))  # fmt: skip
     for n, (kind, why) in standing.items():
         if n not in shown:
@@ -315,6 +329,7 @@ class _Figures:
     strata: list[str]
     clusters: list[Any]
     logs: Array
+    adjusted: Array
     failed: NDArray[np.bool_]
 
     @property
@@ -326,7 +341,7 @@ def _figures(tables: Sequence[_Scenario], cells: Mapping[str, _Cell]) -> _Figure
     """Simulated: a figure a scenario and seed. Recorded: one a recording, each counting the same."""
     strata: list[str] = []
     clusters: list[Any] = []
-    logs, failed = [], []
+    logs, adjusted, failed = [], [], []
     for t in tables:
         if t.name not in cells:
             continue
@@ -336,8 +351,9 @@ def _figures(tables: Sequence[_Scenario], cells: Mapping[str, _Cell]) -> _Figure
         strata += ["recordings" if t.recorded else t.name] * len(units)
         clusters += [(t.name, u) if t.recorded else u for u in units]
         logs.append(values)
+        adjusted.append(np.minimum(values + cells[t.name].adjustment, _CAP))
         failed += [u in lost for u in units]
-    return _Figures(strata, clusters, np.concatenate(logs), np.array(failed, dtype=bool))
+    return _Figures(strata, clusters, np.concatenate(logs), np.concatenate(adjusted), np.array(failed, dtype=bool))
 
 
 def _rows(
@@ -345,7 +361,7 @@ def _rows(
 ) -> tuple[list[dict[str, Any]], Separation | None]:
     """The fields that all rows have, in the order of a table, and which ranked rows are told apart."""
     figures = {n: _figures(tables, c) for n, c in cells.items()}
-    scores = {n: score(f.logs, f.strata, f.clusters, f.failed) for n, f in figures.items()}
+    scores = {n: score(f.adjusted, f.strata, f.clusters, f.failed) for n, f in figures.items()}
     ranked = sorted((n for n in cells if standing[n][0] == "ranked"), key=lambda n: (scores[n].value, n))
     separation, places = _places(ranked, {n: figures[n] for n in ranked}, {n: scores[n].value for n in ranked})
     order: dict[str, int] = {
@@ -370,6 +386,7 @@ def _rows(
             "score": scores[n].value,
             "low": scores[n].low,
             "high": scores[n].high,
+            "adjustment": math.exp(float(np.mean([c.adjustment for c in mine]))),
             "worst": math.exp(float(every.max())),
             "p95": math.exp(weighted_quantile(every, weights, 0.95)),
             "runs": runs,

@@ -36,6 +36,12 @@ def remarks(
     ranked = [r for r in rows if r.ranked]
     if any(r.provisional for r in ranked):
         found.append(f"Provisional: fewer than ten {unit}s.")
+    fewer = [r for r in ranked if r.adjustment != 1.0]
+    if fewer:
+        found.append(
+            f"{len(fewer)} of {len(ranked)} rows have run fewer {unit}s than others. Their scores are adjusted for how "
+            f"hard the missing {unit}s are."
+        )
     if separation is not None and len(ranked) > 1:
         count = separation.clusters
         if smallest_p_value(count) > _LEVEL:

@@ -206,6 +206,49 @@ def test_seeds_count_up_to_the_first_that_is_missing():
     assert row(ranked(results), "good").standing == "incomplete"
 
 
+def harder_later(seeds: int = 12) -> list[Result]:
+    """Errors that all rows have three times as large in the second half of the seeds."""
+    factors = [3.0 if k >= seeds // 2 else 1.0 for k in range(seeds)]
+    return [
+        r if r.reference else replace(r, scores=r.scores | {"horizontal_rmse": r.scores["horizontal_rmse"] * f})
+        for r in campaign(SIMPLE, seeds)
+        for f in [factors[r.seed]]
+    ]
+
+
+def test_who_runs_the_easy_seeds_only_gains_nothing():
+    results = harder_later()
+    every = {n: row(ranked(results), n) for n in ("good", "fair", "poor")}
+    fewer = ranked([r for r in results if not (r.estimator == "fair" and r.seed >= 6)])
+    fair = row(fewer, "fair")
+    assert fair.score == pytest.approx(every["fair"].score, rel=0.05)
+    assert fair.adjustment == pytest.approx(math.sqrt(3.0), rel=0.05)
+    assert fair.ratios == pytest.approx(every["fair"].ratios, rel=0.1)
+    for name in ("good", "poor"):  # they have all seeds, and their scores depend on nobody
+        assert (row(fewer, name).score, row(fewer, name).adjustment) == (every[name].score, 1.0)
+    assert "1 of 3 rows have run fewer seeds than others" in " ".join(fewer.track("sea").remarks)
+    # What is shown of single runs is as it was.
+    assert row(fewer, "fair", "one-v1").worst == pytest.approx(max(row(fewer, "fair", "one-v1").ratios.values()))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    count=st.integers(1, 11),
+    seed=st.integers(0, 10),
+    factor=st.floats(1.0, 1e6),
+    status=st.sampled_from(["ok", "error"]),
+)
+def test_a_worse_run_does_not_improve_an_adjusted_score(count: int, seed: int, factor: float, status: str):
+    results = [r for r in harder_later() if not (r.estimator == "fair" and r.seed >= count)]
+    before = row(ranked(results), "fair")
+    k = next(i for i, r in enumerate(results) if r.estimator == "fair" and r.seed == seed % count)
+    worse = results[k].scores | {"horizontal_rmse": results[k].scores["horizontal_rmse"] * factor}
+    results[k] = replace(results[k], scores=worse, status=status)
+    after = row(ranked(results), "fair")
+    assert after.score >= before.score * (1.0 - 1e-12)
+    assert after.score <= FAILURE * (1.0 + 1e-12)
+
+
 def test_a_run_that_nobody_could_start_is_nobodys_failure():
     results = [*campaign(SIMPLE), *(result("one-v1", n, 99, math.nan, status="no-recording") for n in SIMPLE["one-v1"])]
     assert row(ranked(results), "good", "one-v1").runs == 12
