@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["BOARD_COLUMNS", "bar_scale", "board_columns", "board_row", "overview"]
 
 _WIDEST = 100.0  # largest ratio on the scale of the bars
+_INSIDE = 0.9  # share of the rows whose scores the scale must hold
 
 _NAME = Column(
     "name",
@@ -81,10 +82,17 @@ BOARD_COLUMNS = tuple(c for c in (*_BEFORE, *_AFTER) if c is not _NAME)
 
 
 def bar_scale(rows: Sequence[Row]) -> tuple[float, float]:
-    """Ends of the logarithmic scale on which scores are drawn."""
+    """Ends of the logarithmic scale on which scores are drawn.
+
+    A few rows that are far behind do not decide the scale; they are drawn at its end.
+    """
     ends = [v for r in rows for v in (r.score, r.low, r.high) if v > 0.0 and math.isfinite(v)]
-    low = min(ends, default=1.0)
-    return low, max(min(max(ends, default=2.0), low * _WIDEST), low * 1.5)
+    if not ends:
+        return 1.0, 2.0
+    low = min(ends)
+    scores = sorted(r.score for r in rows if r.score > 0.0 and math.isfinite(r.score))
+    most = scores[math.ceil(_INSIDE * len(scores)) - 1] if scores else low
+    return low, max(min(max(ends), 1.5 * most, low * _WIDEST), low * 1.5)
 
 
 def board_columns(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from simnav.estimator import EstimatorError, describe
@@ -25,7 +24,6 @@ _MAIN = "aided-ins"
 _ROWS = 12  # of the table of the main track
 _DRAWN = 24  # of the picture
 _BEST = 4  # rows that a cell names
-_ALIKE = 0.9  # of the most runs of a row
 
 
 def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -> str:
@@ -49,9 +47,10 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     when = f", computed from {days[0]} to {days[-1]}" if len(days) > 1 else f", computed on {days[0]}" if days else ""
     benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
     tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
-    few = f"**Preliminary: {len(results)} of {of} runs.** " if of is not None and len(results) < of else ""
+    preliminary = of is not None and len(results) < of
+    count = f"**Preliminary:** {len(results)} of {of}" if preliminary else f"{len(results)}"
     parts = [
-        f"{few}{len(results)} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the "
+        f"{count} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the "
         "horizontal error, divided by the scenario's reference figure: the error of an oracle that knows the true "
         "noise and every fault, or of a plain filter on recorded voyages. Smaller is better."
     ]
@@ -63,18 +62,17 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     main = _main(ranking)
     if main is not None:
         parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
-        full = _full(main)
-        fewer = sum(r.ranked for r in main.rows) - len(full)
-        least = min(r.runs for r in full)
-        others = (
-            f", of those with {least} runs or more ({fewer} have fewer seeds, and are on the site)" if fewer else ""
+        ranked = [r for r in main.rows if r.ranked]
+        fewer = sum(r.adjustment != 1.0 for r in ranked)
+        adjusted = (
+            f" {fewer} of {len(ranked)} rows have run fewer seeds; their scores are adjusted for that." if fewer else ""
         )
-        parts.append(f"The first {min(_ROWS, len(full))} rows of the track *{main.title}*{others}:")
+        parts.append(f"The first {min(_ROWS, len(ranked))} rows of the track *{main.title}*.{adjusted}")
         parts.append("\n".join([
             "| rank | estimator | method | score, 95 % interval | worst run | failed runs |",
             "|---|---|---|---|---|---|",
             *(f"| {r.ranks} | `{r.estimator}` | {_method(r)} | {ratio(r.score)}{_interval(r)} | {ratio(r.worst)} "
-              f"| {r.failed} of {r.runs} |" for r in full[:_ROWS]),
+              f"| {r.failed} of {r.runs} |" for r in ranked[:_ROWS]),
         ]))  # fmt: skip
     return "\n\n".join(parts)
 
@@ -94,15 +92,7 @@ def draw(ranking: Ranking, path: Path) -> Path | None:
     if main is None:
         return None
     path.parent.mkdir(parents=True, exist_ok=True)
-    full = _full(main)
-    shown = tuple(r for r in main.rows if not r.ranked or r in full)
-    return save(ranking_figure(replace(main, rows=shown), most=_DRAWN), path, formats=("png",))[0]
-
-
-def _full(track: TrackRanking) -> list[TrackRow]:
-    """The ranked rows whose scores can be compared: those with about as many runs as any, since seeds differ."""
-    ranked = [r for r in track.rows if r.ranked]
-    return [r for r in ranked if r.runs >= _ALIKE * max(r.runs for r in ranked)]
+    return save(ranking_figure(main, most=_DRAWN), path, formats=("png",))[0]
 
 
 def _method(row: TrackRow) -> str:
@@ -125,7 +115,7 @@ def _track(track: TrackRanking) -> str:
     plain = next((ratio(r.score) for r in ranked if r.estimator == "ekf"), "")
     runs = sorted({r.runs for r in ranked})
     count = f"{runs[0]} to {runs[-1]}" if len(runs) > 1 else str(runs[0])
-    leader = _full(track)[0]
+    leader = ranked[0]
     first = f"`{leader.estimator}` {ratio(leader.score)}"
     return f"| {track.title} | {len(track.scenarios)} | {count} | {len(ranked)} | {first} | {may} | {plain} |"
 

@@ -16,11 +16,13 @@ import pytest
 
 from simnav.estimator import find, names
 from simnav.leaderboard.campaign.request import comes_with_simnav
+from simnav.leaderboard.ranking.board import TrackRow
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
 from simnav.leaderboard.site import charts, site
 from simnav.leaderboard.site.facts import estimator_facts
+from simnav.leaderboard.site.overview import bar_scale
 from simnav.leaderboard.site.scenario_page import ScenarioData
 from simnav.scoring import SCORES
 
@@ -148,6 +150,16 @@ def test_the_board_has_a_table_a_track_and_shows_identical_oracles_once(folder, 
     shown = Page(folder / "index.html").text
     assert f"--scenario made-up-one.toml,made-up-two.toml,{catalogued}" in shown
     assert "ekf:gate=3.5" in shown
+
+
+def test_one_row_far_behind_does_not_decide_the_scale_of_the_bars():
+    rows = [TrackRow(estimator=str(k), standing="ranked", score=1.0 + 0.1 * k) for k in range(19)]
+    assert bar_scale(rows) == (1.0, 2.8)
+    assert bar_scale([*rows, TrackRow(estimator="inertial", standing="ranked", score=707.0)]) == (
+        1.0,
+        pytest.approx(4.05),
+    )
+    assert bar_scale([]) == (1.0, 2.0)
 
 
 def test_the_results_are_said_to_come_from_where_they_were_computed(folder):
