@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, prepare, seed_words
+from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, close_server, prepare, seed_words
+from simnav.leaderboard.campaign.confinement.session import NoAnswerError
 from simnav.leaderboard.campaign.isolation import isolate
 
 if TYPE_CHECKING:
@@ -56,7 +57,11 @@ def try_estimator(
         trial: Trial | None = outcome.value if outcome.status == "ok" else None
         status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
         return Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
-    return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+    try:
+        return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+    except NoAnswerError:  # the estimator was not there yet, so this is not a result of it
+        close_server()
+        return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
 
 
 def _in_a_fork(entrant: Entrant, recording: Recording) -> Trial:

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["Unit", "run_unit"]
 
 _prepared = False
+_PATIENCE = 5.0  # for a result that is being stored when the worker must end [s]
+_results = threading.Lock()  # held while a result is stored, and for good by who ends the worker
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +155,14 @@ def _end_with(parent: int) -> None:
     """End this worker within seconds of the campaign's process, whatever killed that."""
     while os.getppid() == parent:
         time.sleep(1.0)
+    _results.acquire(timeout=_PATIENCE)  # estimators that lose their server now have not failed
     close_server()
     os._exit(1)
+
+
+def _store(folder: Path, result: Result) -> None:
+    with _results:
+        store.write(folder, result)
 
 
 def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
@@ -169,12 +177,12 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     except NoRecordingError as error:
         reason = f"no recording: {error}"
         for entrant, key in unit.entrants:
-            store.write(unit.folder, unit.result(entrant, key, "no-recording", reason))
+            _store(unit.folder, unit.result(entrant, key, "no-recording", reason))
             statuses["no-recording"] += 1
     if recording is not None:
         for entrant, key in unit.entrants:
             result = _try(unit, entrant, key, recording)
-            store.write(unit.folder, result)
+            _store(unit.folder, result)
             statuses[result.status] += 1
     return index, statuses
 

@@ -151,6 +151,8 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
     ------
     ServerError
         If the server does not start.
+    NoAnswerError
+        If the server started no estimator process.
     """
     server.wait_until_ready()
     begun, trial = time.monotonic(), None
@@ -185,6 +187,8 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
 
     Raises
     ------
+    ServerError
+        If the server started no estimator process.
     ValueError
         If it cannot be found, imported or asked for like this: one sentence.
     """

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.trial.log import TrialLog
 
-__all__ = ["EstimatorServer", "Limits", "RemoteSession", "ServerError", "StoppedError"]
+__all__ = ["EstimatorServer", "Limits", "NoAnswerError", "RemoteSession", "ServerError", "StoppedError"]
 
 #: Environment variables that an estimator process inherits; all others are left out.
 _ENVIRONMENT = (
@@ -54,6 +54,10 @@ _SIZE = struct.Struct("<8xI")  # of an answer: bytes after the header
 
 class ServerError(Exception):
     """The server cannot be started."""
+
+
+class NoAnswerError(ServerError):
+    """The server is gone, or forks nothing: so no estimator has been started, and none is to blame."""
 
 
 class StoppedError(LostError):
@@ -225,6 +229,8 @@ class EstimatorServer:
 
         Raises
         ------
+        NoAnswerError
+            If there is no process, since the server did not start one.
         StoppedError
             If the process is no more there; also where it ended after its last answer.
         """
@@ -251,7 +257,7 @@ class EstimatorServer:
                 os.close(down)
                 os.close(up)
             if told is None or "forked" not in told:
-                raise StoppedError("error", "the process for estimators did not answer")
+                raise NoAnswerError("the process for estimators did not answer")
             session = RemoteSession(write, read, limits)
             try:
                 yield session

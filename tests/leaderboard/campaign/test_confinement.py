@@ -13,9 +13,17 @@ import numpy as np
 import pytest
 
 from simnav.estimator import make
+from simnav.leaderboard.campaign import attempts
 from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, seccomp
-from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, chosen_confinement, seed_words
-from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits
+from simnav.leaderboard.campaign.confinement.attempt import (
+    Attempt,
+    attempt,
+    chosen_confinement,
+    close_server,
+    prepare,
+    seed_words,
+)
+from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, NoAnswerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.recording import Recording
 from simnav.scenario import load
@@ -214,6 +222,35 @@ def test_how_a_process_ended_is_told(server: EstimatorServer, recording: Recordi
     assert status == "out-of-memory"
     assert reason
     assert end("") == ("ok", "")  # and the server is as before
+
+
+@pytest.mark.parametrize("losses", [1, 2])
+def test_who_has_not_been_started_has_not_failed(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch, losses: int
+) -> None:
+    """A server that is lost between two estimators is replaced, once."""
+    lost: list[EstimatorServer] = []
+
+    def losing(*arguments: Any, **more: Any) -> EstimatorServer:
+        server = prepare(*arguments, **more, loaded=len(lost) == losses)  # nobody uses the kernels of the others
+        server.wait_until_ready()
+        if len(lost) < losses:
+            lost.append(server)
+            server.close()
+        return server
+
+    monkeypatch.setattr(attempts, "prepare", losing)
+    close_server()
+    try:
+        if losses == 1:
+            found = attempts.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+            assert (found.status, found.reason) == ("ok", "")
+        else:
+            with pytest.raises(NoAnswerError, match="did not answer"):
+                attempts.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+    finally:
+        close_server()
+    assert len(lost) == losses
 
 
 def test_time_is_measured_outside(server: EstimatorServer, recording: Recording, tmp_path: Path) -> None:
