@@ -26,6 +26,16 @@ and the separation of the filter without a compass counts less, because its turn
 A datasheet may be wrong. Whatever is said here of a NIS is said of its ratio to the mean of the last ``horizon``
 seconds, where this is above 1.
 
+With an IMU, the start may be wrong, too: for the first `_ALIGNMENT` seconds one more filter runs, with all
+measurements and with `_WRONG_START` times the sigmas that were told for the start. Where a test fails in this time, and
+this filter agrees with all instruments and is apart from the main one, it takes its place, since a fault rarely begins
+with the run. Until it agrees with all instruments, nothing is excluded.
+
+Filters that know the heading to no better than `_KNOWN_HEADING` differ by their linearisation. So a sub-filter that
+knows no more is not compared, and begins anew. While the main filter knows no more, and for `_ALIGNMENT` seconds of a
+run that begins so, nothing is tested, and all begin anew from the main filter; there also as long as the main filter
+disagrees with an instrument, for ``horizon`` seconds at most.
+
 Single gross errors are none of this: a measurement that the main filter finds improbable (`_NOT_GROSS`) is left out of
 all filters, unless its instrument goes on so for `_PATIENCE` seconds.
 
@@ -58,9 +68,9 @@ algorithm and possible improvements*, IEEE Trans. Aerospace and Electronic Syste
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from math import exp, hypot, sqrt
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from math import exp, hypot, radians, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -71,6 +81,7 @@ from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.models.suitable import ModelChoice
+from simnav.estimators.solvers.iterated import Iteration
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.state_difference import difference
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
@@ -105,6 +116,18 @@ _COASTING = 60.0
 _DEAD_RECKONING = 180.0
 #: An instrument that has said nothing for so long, or for three periods, is silent [s].
 _SILENCE = 5.0
+#: By these factors the sigmas of the start are larger in the filter that does not believe it: position and attitude,
+#: velocity. With a velocity that is as uncertain as the heading, the measurements of a log make a filter surer of its
+#: heading than it is.
+_WRONG_START, _WRONG_VELOCITY = 30.0, 3.0
+#: Its attitude is known at least so well, for otherwise a filter is not linear [rad].
+_TILT, _HEADING = radians(5.0), radians(45.0)
+#: It iterates its measurements while its heading is known worse than this [deg], and runs for this time [s].
+_ITERATED_DEG, _ALIGNMENT = 1.0, 60.0
+#: Standard deviation of the heading from which on filters are compared [rad].
+_KNOWN_HEADING = radians(5.0)
+#: Name of the start among the suspects.
+_START = "initial state"
 #: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
 _NOT_GROSS, _PATIENCE = 0.99999, 5.0
 #: Of a good measurement to agree with the main filter.
@@ -119,6 +142,7 @@ class _Exclusion(Adaptation):
         self.agrees_since: dict[str, float] = {}
         self.gross: set[tuple[str, float]] = set()
         self.usual: dict[str, float] = {}
+        self.linear = True  # False while the heading is not known: an improbable measurement is no gross error then
         self._failing: dict[str, float] = {}
         self._agrees, self._gross = chi_square_limits(_AGREES), chi_square_limits(_NOT_GROSS)
 
@@ -134,7 +158,7 @@ class _Exclusion(Adaptation):
             else:
                 self.agrees_since.pop(name, None)
             return None
-        if nis <= self._gross[m]:
+        if nis <= self._gross[m] or not self.linear:
             self._failing.pop(name, None)
         elif time - self._failing.setdefault(name, time) < _PATIENCE:
             self.gross.add((name, time))
@@ -163,7 +187,7 @@ class _Watched(KalmanEstimator):
 
 @dataclass
 class _Without:
-    """A sub-filter: the instrument that it does without, when it started, and its estimate."""
+    """A sub-filter: the instrument (or start) that it does without, when it started, and its estimate."""
 
     name: str
     filter: _Watched
@@ -171,11 +195,20 @@ class _Without:
     estimate: Estimate | None = None
 
 
+def _doubted(start: InitialState) -> InitialState:
+    """The same start with larger sigmas."""
+    told = np.sqrt(np.diag(start.covariance))
+    larger = told * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
+    larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), told[6:]))
+    factor = np.divide(larger, told, out=np.ones(9), where=told > 0.0)
+    return replace(start, covariance=start.covariance * np.outer(factor, factor))
+
+
 class SolutionSeparation(Solver):
     """The solver of the module.
 
     Diagnostics: ``protection_level`` [m]; ``separation.<instrument>``, the largest separation over its threshold;
-    ``excluded.<instrument>``, 1 where it is excluded.
+    ``excluded.<instrument>``, 1 where it is excluded; ``separation.initial state`` for the start.
 
     Parameters
     ----------
@@ -224,10 +257,11 @@ class SolutionSeparation(Solver):
         self.horizon, self.horizon_without_imu = horizon, horizon_without_imu
         self.risk, self.fault_probability = risk, fault_probability
 
-    def _filter(self, exclusion: _Exclusion | None = None) -> _Watched:
-        one = _Watched(copy.deepcopy(self._choice), exclusion)
+    def _filter(self, exclusion: _Exclusion | None = None, start: InitialState | None = None) -> _Watched:
+        one = _Watched(copy.deepcopy(self._choice), exclusion, None if start is None else Iteration(_ITERATED_DEG))
         one.row, one.mean_nis = self.label, {}
-        one.reset(*self._begin_with)
+        told, instruments = self._begin_with
+        one.reset(start or told, instruments)
         return one
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -259,6 +293,13 @@ class SolutionSeparation(Solver):
         self._count = dict.fromkeys(self._names, 0)
         self._alternatives: dict[str, _Without] = {}
         self._time = start.time
+        told = np.sqrt(np.diag(start.covariance))
+        self._unbelieving: _Without | None = None
+        if self._inertial and told[8] <= _KNOWN_HEADING:
+            self._unbelieving = _Without(_START, self._filter(start=_doubted(start)), start.time)
+        self._searching = self._inertial and self._unbelieving is None
+        if self._searching:  # a filter that finds its heading may think too early that it has
+            self._settled = start.time + _ALIGNMENT
 
     @property
     def model(self) -> object:
@@ -279,6 +320,7 @@ class SolutionSeparation(Solver):
         """Take one step's measurements, each at its own time."""
         out, gross = self._exclusion.excluded, self._exclusion.gross
         gross.clear()
+        self._exclusion.linear = measurements.time >= self._settled
         estimate = self._main.update(measurements)
         fading = exp(-max(measurements.time - self._time, 0.0) / _RECENT)
         self._main.watch(estimate, self._components, fading)
@@ -286,7 +328,7 @@ class SolutionSeparation(Solver):
         slow = min((measurements.time - self._time) / min(self._horizon, since + _PRIOR), 1.0)
         for name in self._names:
             nis = float(estimate.diagnostics.get(f"nis.{name}", np.nan)) / self._components[name]
-            if nis == nis:
+            if nis == nis and self._exclusion.linear:
                 before = self._exclusion.usual.get(name, 1.0)
                 self._exclusion.usual[name] = before + slow * (min(nis, _UNUSUAL * before) - before)
         self._time = measurements.time
@@ -300,9 +342,14 @@ class SolutionSeparation(Solver):
             sub.filter.watch(sub.estimate, self._components, fading)
         flagged = list(estimate.flagged)
         ratios = {name: self._separation(name, estimate) for name in self._names if name not in out}
-        most = max(ratios.values(), default=0.0)
+        most = max(ratios.values(), default=0.0)  # the start is blamed only where instruments contradict each other
+        ratios |= self._doubt_of_the_start(measurements, estimate, fading)
+        aligning = self._unbelieving is not None and _START not in ratios
+        lost = self._searching and since < self._horizon and self._disagreement(self._main) > _AGREEMENT
+        if lost or not self._linear(estimate):
+            self._settled = max(self._settled, measurements.time + _RECENT)
         diagnostics = dict(estimate.diagnostics)
-        if most > 1.0 and measurements.time >= self._settled:
+        if most > 1.0 and measurements.time >= self._settled and not aligning:
             faulty = self._most_probable([name for name, ratio in ratios.items() if ratio > _SUSPECT * most], ratios)
             if faulty is not None:
                 estimate = self._exclude(faulty)
@@ -313,14 +360,25 @@ class SolutionSeparation(Solver):
         for name in self._names:
             diagnostics[f"separation.{name}"] = ratios.get(name, np.nan)
             diagnostics[f"excluded.{name}"] = float(name in self._exclusion.excluded)
+        diagnostics[f"separation.{_START}"] = ratios.get(_START, np.nan)
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 
-    def _disagreement(self, sub: _Without, out: Collection[str]) -> float:
-        """The largest mean NIS of an instrument in a sub-filter, over what is usual for it."""
+    def _doubt_of_the_start(self, measurements: Measurements, estimate: Estimate, fading: float) -> dict[str, float]:
+        """The separation of the filter that does not believe the start, if it agrees with all instruments."""
+        sub = self._unbelieving
+        if sub is None:
+            return {}
+        sub.estimate = sub.filter.update(measurements)
+        sub.filter.watch(sub.estimate, self._components, fading)
+        if measurements.time - sub.start >= _ALIGNMENT:
+            self._unbelieving = None
+        return {_START: self._apart([sub], estimate)} if self._disagreement(sub.filter) <= _AGREEMENT else {}
+
+    def _disagreement(self, one: _Watched, out: Collection[str] = ()) -> float:
+        """The largest mean NIS of an instrument that a filter uses, over what is usual for it."""
         usual = self._exclusion.usual
-        means = sub.filter.mean_nis.items()
-        return max((v / max(usual.get(n, 1.0), 1.0) for n, v in means if n != sub.name and n not in out), default=1.0)
+        return max((v / max(usual.get(n, 1.0), 1.0) for n, v in one.mean_nis.items() if n not in out), default=1.0)
 
     def _most_probable(self, suspects: list[str], ratios: Mapping[str, float]) -> str | None:
         """Of the suspects and the instruments on probation, the one to exclude; None where none can be spared."""
@@ -328,10 +386,12 @@ class SolutionSeparation(Solver):
             name for name, since in self._readmitted.items() if self._time - since < self._horizon and name in ratios
         }
         out = self._exclusion.excluded
+        if _START in suspects:
+            return _START
         spared = [name for name in {*suspects, *probation} if self._can_spare(name)]
         if not spared:
             return None
-        apart = {name: self._disagreement(self._elder(name), out) for name in spared}
+        apart = {name: self._disagreement(self._elder(name).filter, {name, *out}) for name in spared}
         least = max(min(apart.values()), _AGREEMENT)
         tied = [name for name in self._names if apart.get(name, np.inf) <= _TIED * least]
         return min(tied, key=lambda n: (n not in probation, not self._group.get(n, False), -ratios[n]))
@@ -348,10 +408,16 @@ class SolutionSeparation(Solver):
     def _mistaken(self, name: str) -> bool:
         """Whether it was this instrument that should have been excluded, and not the one that was."""
         before = self._alternatives.get(name)
-        return before is not None and self._disagreement(before, ()) <= _AGREEMENT
+        return before is not None and self._disagreement(before.filter, {before.name}) <= _AGREEMENT
 
     def _elder(self, name: str) -> _Without:
         return min(self._pairs[name], key=lambda sub: sub.start)
+
+    def _linear(self, estimate: Estimate | None) -> bool:
+        """Whether a filter knows its heading well enough to be compared; one without an IMU has a compass for that."""
+        if not self._inertial or estimate is None or estimate.covariance is None:
+            return True
+        return float(estimate.covariance[8, 8]) <= _KNOWN_HEADING**2
 
     def _sigmas(self, sub: _Without, estimate: Estimate) -> tuple[Array, Array]:
         """Variances of a sub-filter's nine components, and of its separation."""
@@ -366,19 +432,28 @@ class SolutionSeparation(Solver):
         return own, apart
 
     def _separation(self, name: str, estimate: Estimate) -> float:
-        """The largest separation over its threshold, of all tested components and both sub-filters."""
+        """The largest separation over its threshold, of both sub-filters without an instrument."""
+        largest = self._apart(self._pairs[name], estimate)
+        return largest if self._inertial or name in self._group else largest / _TURNING
+
+    def _apart(self, subs: Iterable[_Without], estimate: Estimate) -> float:
+        """The largest separation over its threshold, of all tested components."""
         mask, largest = estimate.mask(), 0.0
-        for sub in self._pairs[name]:
+        for sub in subs:
             assert sub.estimate is not None
+            if not self._linear(sub.estimate):
+                continue
             apart = difference(sub.estimate, estimate).tolist()
             _, variance = self._sigmas(sub, estimate)
             for q in _TESTED:
                 if mask[q] and variance[q] > 0.0:
                     largest = max(largest, abs(apart[q]) / (self._threshold * sqrt(variance[q])))
-        return largest if self._inertial or name in self._group else largest / _TURNING
+        return largest
 
     def _exclude(self, name: str) -> Estimate:
         """Take the sub-filter without an instrument for the main filter; all others begin anew from it."""
+        if name == _START:
+            return self._start_again()
         excluded, before = self._exclusion.excluded, self._alternatives.get(name)
         chosen = self._elder(name)
         if before is not None and self._mistaken(name):
@@ -396,9 +471,23 @@ class SolutionSeparation(Solver):
         self._count[name] += 1
         self._exclusion.agrees_since.pop(name, None)
         excluded.add(name)
+        return self._go_on_from(chosen)
+
+    def _start_again(self) -> Estimate:
+        """Take the filter that does not believe the start for the main one, with all instruments."""
+        assert self._unbelieving is not None
+        chosen, self._unbelieving, self._alternatives = self._unbelieving, None, {}
+        self._exclusion.excluded.clear()
+        self._exclusion.agrees_since.clear()
+        self._exclusion.usual.clear()
+        return self._go_on_from(chosen)
+
+    def _go_on_from(self, chosen: _Without) -> Estimate:
+        """Take a sub-filter for the main one; all others begin anew from it."""
+        assert chosen.estimate is not None
         self._main.take_over(chosen.filter)
-        for other in self._names:
-            for k, sub in enumerate(self._pairs[other]):
+        for name in self._names:
+            for k, sub in enumerate(self._pairs[name]):
                 self._begin(sub, self._time - 0.5 * self._horizon * k, chosen.estimate)
         return copy.copy(chosen.estimate)
 
@@ -436,7 +525,8 @@ class SolutionSeparation(Solver):
         """Begin sub-filters anew that have come of age."""
         for name in self._names:
             for sub in self._pairs[name]:
-                if (time - sub.start >= self._horizon or time < self._settled) and name not in self._exclusion.excluded:
+                old = time - sub.start >= self._horizon or time < self._settled or not self._linear(sub.estimate)
+                if old and name not in self._exclusion.excluded:
                     self._begin(sub, time, None)
         self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.start < 2.0 * self._horizon}
 

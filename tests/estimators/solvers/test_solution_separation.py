@@ -125,6 +125,52 @@ def test_a_dvl_that_says_zero_is_excluded(recording_of):
     assert np.all(error <= level)
 
 
+def begun(recording, error, sigma):
+    """The recording with a start that is off by nine errors [m, m/s, rad], and told nine sigmas."""
+    truth = recording.data.truth
+    error, sigma = np.asarray(error), np.asarray(sigma)
+    start = replace(
+        recording.start,
+        position=earth.displace(truth.position[0], error[:3]),
+        velocity=truth.velocity[0] + error[3:6],
+        attitude=truth.attitude[0] + error[6:],
+        covariance=np.diag(sigma**2),
+    )
+    return replace(recording, start=start)
+
+
+@pytest.mark.parametrize("factor", [5.0, 20.0])
+def test_a_wrong_start_is_not_blamed_on_the_instruments(recording_of, factor: float):
+    sigma = np.array([3.0, 3.0, 2.0, 0.05, 0.05, 0.05, *np.radians([0.05, 0.05, 1.0])])
+    error = factor * sigma * np.array([1.0, -1.0, 0.5, 0.0, 0.0, 0.0, 0.5, -0.5, 1.0])
+    error_of, _, excluded = run(begun(recording_of(4, 200.0, aids=(GNSS, DVL)), error, sigma))
+    assert not any(excluded)
+    assert error_of[100:].max() < 6.0
+
+
+@pytest.mark.parametrize("degrees", [40.0, 130.0])
+def test_an_unknown_heading_is_not_blamed_on_the_instruments(recording_of, degrees: float):
+    sigma = np.array([3.0, 3.0, 2.0, 0.05, 0.05, 0.05, *np.radians([0.05, 0.05, degrees])])
+    error = np.zeros(9)
+    error[8] = 0.7 * np.radians(degrees)
+    recording = begun(recording_of(4, 200.0, aids=(GNSS, DVL)), error, sigma)
+    error_of, _, excluded = run(recording)
+    assert not any(excluded)
+    plain = make("ekf")
+    plain.reset(recording.start, recording.instruments)
+    for packet in recording.steps():
+        last = plain.update(packet)
+    end = np.hypot(*earth.relative_position(last.position, recording.data.truth.position[-1])[:2])
+    assert error_of[-1] == pytest.approx(end, abs=0.1)
+
+
+def test_a_filter_that_has_lost_its_heading_excludes_nothing():
+    """Without fixes the heading of this MEMS unit is lost in a minute, and the filter without them with it."""
+    recording = record(load("clean-voyages"), 404)
+    _, _, excluded = run(recording)
+    assert not any(excluded)
+
+
 def test_single_gross_errors_are_left_out_and_flagged(recording_of):
     recording = recording_of(4, 60.0, aids=AIDS)
     gnss = recording.data.aids["gnss"]
