@@ -36,7 +36,7 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     results : sequence of Result
         That it is made from.
     of : int, optional
-        How many runs there should be: with fewer, the tables are called preliminary.
+        How many results there should be: with fewer, the tables are called preliminary.
     """
     known = distinct(r.provenance for r in results)
     commits = (
@@ -48,11 +48,11 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
     tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
     preliminary = of is not None and len(results) < of
-    count = f"**Preliminary:** {len(results)} of {of}" if preliminary else f"{len(results)}"
+    few = f"**Preliminary: {len(results)} of {of} results.** " if preliminary else ""
     parts = [
-        f"{count} runs of {benchmark} with commit {commits}{when}. A score is the geometric mean of the "
-        "horizontal error, divided by the scenario's reference figure: the error of an oracle that knows the true "
-        "noise and every fault, or of a plain filter on recorded voyages. Smaller is better."
+        f"{few}{sum(r.tried for r in results)} runs of {benchmark} with commit {commits}{when}. A score is the "
+        "geometric mean of the horizontal error, divided by the scenario's reference figure: the error of an oracle "
+        "that knows the true noise and every fault, or of a plain filter on recorded voyages. Smaller is better."
     ]
     if tracks:
         parts.append("\n".join([

@@ -118,7 +118,7 @@ def test_a_change_of_one_row_runs_that_row_only(home: Path, tmp_path: Path, monk
     early = publish(tmp_path, tmp_path / "work", preliminary=True)
     assert early.edition == 0
     assert not (tmp_path / "history.csv").exists()
-    assert readme.marked(tmp_path / "README.md").startswith("**Preliminary:** 2 of 4 runs of")
+    assert readme.marked(tmp_path / "README.md").startswith("**Preliminary: 2 of 4 results.** 2 runs of")
     done = run(home, tmp_path / "work")
     assert (done.summary.skipped, done.summary.computed, done.summary.left) == (2, 2, 0)
     made = publish(home, tmp_path / "work")
