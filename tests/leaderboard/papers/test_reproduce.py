@@ -22,7 +22,7 @@ from simnav.leaderboard.figures.panels import Bar, bars, broken
 from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.papers import ALIASES, PAPERS, key_of, mao_2025, sequential, stored
 from simnav.leaderboard.papers import paper as papers
-from simnav.leaderboard.papers.comparison import judge, judge_gain
+from simnav.leaderboard.papers.comparison import GAIN, TOLERANCE, judge, judge_gain
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.figures import ERRORS
 from simnav.leaderboard.papers.measures import measure, value_of
@@ -318,6 +318,21 @@ def test_stored_results_come_back(pond_paper, tmp_path):
     for a, b in zip(after.findings, before.findings, strict=True):
         assert (a.ours.value, a.ours.low, a.failed) == pytest.approx((b.ours.value, b.ours.low, b.failed), rel=1e-6)
     assert [p.cpu for p in stored.provenance(paper, tmp_path)] == ["fast"]
+
+
+@pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
+def test_what_is_undecided_in_the_stored_results_is_so_for_no_lack_of_runs(paper):
+    """Its interval is narrower than the band of figures that agree, and lies across one end of it."""
+    for f in stored.load(paper).findings:
+        if f.verdict != "undecided":
+            continue
+        assert f.ours is not None
+        if isinstance(f.row, Gain):
+            width, band = math.log(f.ours.high / f.ours.low), (GAIN - 1.0 / GAIN) * abs(math.log(f.row.paper))
+        else:
+            least, most = f.row.paper if isinstance(f.row.paper, tuple) else (f.row.paper, f.row.paper)
+            width, band = f.ours.high - f.ours.low, most * (1.0 + TOLERANCE) - least / (1.0 + TOLERANCE)
+        assert width < band or f.ours.runs >= sequential.LIMIT, (f.table, f.row, f.ours)
 
 
 def test_stored_results_that_are_missing_or_damaged_get_a_sentence(tmp_path):
