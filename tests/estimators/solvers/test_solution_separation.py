@@ -171,6 +171,59 @@ def test_a_filter_that_has_lost_its_heading_excludes_nothing():
     assert not any(excluded)
 
 
+def test_the_start_is_doubted_in_the_first_minute_only(recording_of):
+    recording = recording_of(4, 70.0, aids=AIDS)
+    estimator = make("solution-separation")
+    estimator.reset(recording.start, recording.instruments)
+    doubt = {p.time: estimator.update(p).diagnostics["separation.initial state"] for p in recording.steps()}
+    assert np.all(np.isfinite([value for time, value in doubt.items() if 20.0 < time < 60.0]))
+    assert np.all(np.isnan([value for time, value in doubt.items() if time > 60.0]))
+
+
+def disturbed(recording, first: float, last: float, force: float = 0.0, rate: float = 0.0):
+    """The recording with accelerometers and gyroscopes that are off by a constant [m/s^2], [rad/s] on all axes."""
+    imu = recording.data.imu
+    during = ((imu.time >= first) & (imu.time < last))[:, None]
+    moved = replace(
+        imu, specific_force=imu.specific_force + force * during, angular_rate=imu.angular_rate + rate * during
+    )
+    return replace(recording, data=replace(recording.data, imu=moved))
+
+
+@pytest.mark.parametrize(("force", "rate"), [(0.4, 0.0), (0.0, 0.01)], ids=["accelerometers", "gyroscopes"])
+@pytest.mark.parametrize("aids", [AIDS, (GNSS, DVL)], ids=["with a compass", "without"])
+def test_a_disturbed_imu_is_excluded_and_believed_again(recording_of, aids, force: float, rate: float):
+    recording = disturbed(recording_of(4, 260.0, aids=aids), 80.0, 120.0, force, rate)
+    error, level, excluded = run(recording)
+    assert not any(excluded[:80])
+    assert {"imu"} in [set(e) for e in excluded[80:120]]
+    assert not excluded[-1]
+    assert error.max() < 12.0
+    assert np.all(error <= level)
+
+
+def test_a_poor_imu_does_without_a_noisy_receiver_for_no_minute():
+    """A MEMS unit and a receiver alone: fixes that are five times noisier are better than none."""
+    recording = record(load("training-gnss-faults"), 304)
+    error, _, _ = run(recording)
+    assert error.max() < 30.0
+
+
+@pytest.mark.parametrize("seed", [319, 331])
+def test_bad_fixes_after_an_outage_are_not_blamed_on_another_instrument(seed: int):
+    """The position has grown uncertain, so that the filter without the log or the compass follows the bad fixes."""
+    recording = record(load("training-outages"), seed)
+    error, _, excluded = run(recording)
+    assert set().union(*excluded) <= {"gnss"}
+    assert error[-50:].max() < 3.0
+
+
+def test_what_is_used_again_for_want_of_others_is_not_excluded_at_once():
+    """IMU and fixes are wrong at once. If fixes were excluded in the step after, nobody would ever find back."""
+    error, _, _ = run(record(load("training-motion"), 330))
+    assert np.sqrt(np.mean(error**2)) < 700.0  # else 1550 m
+
+
 def test_single_gross_errors_are_left_out_and_flagged(recording_of):
     recording = recording_of(4, 60.0, aids=AIDS)
     gnss = recording.data.aids["gnss"]

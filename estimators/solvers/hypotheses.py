@@ -1,0 +1,158 @@
+"""The filters of solution separation: one for each hypothesis of what is wrong.
+
+A hypothesis is that an instrument, the start or the IMU is wrong. Its filter does without the instrument, believes the
+start less, or believes the IMU less. Each filter keeps how well it agrees with the instruments that it uses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from math import radians
+
+import numpy as np
+
+from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.noise import normalised_square
+from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.types import Array, Estimate, InitialState, Instruments
+
+__all__ = ["Exclusion", "Hypothesis", "ImuHypothesis", "WatchedFilter", "disturbed_imu", "uncertain_start"]
+
+#: By these factors the sigmas of the start are larger in the filter that does not believe it: position and attitude,
+#: velocity. With a velocity that is as uncertain as the heading, the measurements of a log make a filter surer of its
+#: heading than it is.
+_WRONG_START, _WRONG_VELOCITY = 30.0, 3.0
+#: Its attitude is known at least so well, for otherwise a filter is not linear [rad].
+_TILT, _HEADING = radians(5.0), radians(45.0)
+#: White noise of an IMU that is not believed, of gyroscopes [rad/s/sqrt(Hz)] and accelerometers [m/s^2/sqrt(Hz)].
+_DISTURBED_RATE, _DISTURBED_FORCE = radians(0.5), 0.5
+#: Factor by which the variances of position and velocity grow where the motion is not believed.
+_LOOSENED = 100.0
+#: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
+_NOT_GROSS, _PATIENCE = 0.99999, 5.0
+#: Of a good measurement to agree with the filter.
+_AGREES = 0.999
+
+
+class Exclusion(Adaptation):
+    """Leaves the excluded instruments and single gross errors out; notes since when an excluded one has agreed.
+
+    Attributes
+    ----------
+    excluded : set of str
+        Names of the instruments that are left out.
+    agrees_since : dict of str to float
+        Time since which an excluded instrument has agreed with the filter [s].
+    gross : set of (str, float)
+        Instrument and time of the gross errors of a step.
+    usual : dict of str to float
+        What the normalised innovation squared of an instrument is usually, by component; it counts where it is above 1.
+    linear : bool
+        False while the heading is not known: an improbable measurement is no gross error then.
+    """
+
+    def __init__(self) -> None:
+        self.excluded: set[str] = set()
+        self.agrees_since: dict[str, float] = {}
+        self.gross: set[tuple[str, float]] = set()
+        self.usual: dict[str, float] = {}
+        self.linear = True
+        self._failing: dict[str, float] = {}
+        self._agrees, self._gross = chi_square_limits(_AGREES), chi_square_limits(_NOT_GROSS)
+
+    def begin_again(self, excluded: Collection[str] = ()) -> None:
+        """Forget what was learned of the instruments, and leave other ones out."""
+        self.excluded = set(excluded)
+        self.agrees_since.clear()
+        self.usual.clear()
+
+    def contradicting(self, time: float) -> set[str]:
+        """The instruments whose measurements have been improbable for so long that they are no gross errors."""
+        return {name for name, since in self._failing.items() if time - since >= _PATIENCE}
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """The nominal noise, or None."""
+        name, time = innovation.measurement.instrument, innovation.measurement.time
+        nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
+        nis /= max(self.usual.get(name, 1.0), 1.0)
+        m = len(innovation.residual)
+        if name in self.excluded:
+            if nis <= self._agrees[m]:
+                self.agrees_since.setdefault(name, time)
+            else:
+                self.agrees_since.pop(name, None)
+            return None
+        if nis <= self._gross[m] or not self.linear:
+            self._failing.pop(name, None)
+        elif time - self._failing.setdefault(name, time) < _PATIENCE:
+            self.gross.add((name, time))
+            return None
+        return innovation.noise
+
+
+class WatchedFilter(KalmanEstimator):
+    """The filter, with the fading mean of the normalised innovation squared by component of each instrument."""
+
+    mean_nis: dict[str, float]
+
+    def take_over(self, other: WatchedFilter) -> None:
+        """Go on from the state of another one."""
+        self.model.take_over(other.model)
+        self.covariance[...] = other.covariance
+        self.mean_nis = dict(other.mean_nis)
+
+    def watch(self, estimate: Estimate, components: Mapping[str, int], fading: float) -> None:
+        """Take a step into the means; components by instrument."""
+        for name, m in components.items():
+            nis = float(estimate.diagnostics.get(f"nis.{name}", np.nan))
+            if nis == nis:
+                self.mean_nis[name] = fading * self.mean_nis.get(name, 1.0) + (1.0 - fading) * nis / m
+
+    def doubt_motion(self) -> None:
+        """Believe position, velocity and attitude less; the attitude within the limits of a linear filter."""
+        first = self._first_variances.copy()
+        attitude = self.model.moving[1]
+        first[attitude] = np.maximum(first[attitude], _TILT**2)
+        self.model.loosen(self.covariance, _LOOSENED, first)
+
+
+@dataclass
+class Hypothesis:
+    """That an instrument or the start is wrong: its name, the filter without it, when it began, and its estimate."""
+
+    name: str
+    filter: WatchedFilter
+    start: float
+    estimate: Estimate | None = None
+
+
+@dataclass
+class ImuHypothesis(Hypothesis):
+    """That the IMU is wrong (or right, once it is excluded); ``exclusion`` has the instruments that are wrong, too."""
+
+    exclusion: Exclusion = field(default_factory=Exclusion)
+
+
+def uncertain_start(start: InitialState) -> InitialState:
+    """The same start with larger sigmas."""
+    told = np.sqrt(np.diag(start.covariance))
+    larger = told * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
+    larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), told[6:]))
+    factor = np.divide(larger, told, out=np.ones(9), where=told > 0.0)
+    return replace(start, covariance=start.covariance * np.outer(factor, factor))
+
+
+def disturbed_imu(instruments: Instruments) -> Instruments:
+    """The same instruments with white noise of the IMU that covers a disturbance; its biases are what they were."""
+    imu = instruments.imu
+    if imu is None:
+        return instruments
+    rate, force = imu.gyroscope, imu.accelerometer
+    noisy = replace(
+        imu,
+        gyroscope=replace(rate, random_walk=max(rate.random_walk, _DISTURBED_RATE)),
+        accelerometer=replace(force, random_walk=max(force.random_walk, _DISTURBED_FORCE)),
+    )
+    return Instruments(list(instruments.values()), noisy, instruments.step)
