@@ -71,9 +71,9 @@ def _panel(ax: Axes, label: str, diagram: Stanford) -> None:
     for line in (ax.axvline, ax.axhline):
         line(limit, color=GREY, lw=0.8, ls=(0, (4, 2)))
     shares = diagram.shares
-    told = [("available", shares["normal"] + shares["misleading"] + shares["hazardously misleading"])]
-    told += [("misleading", shares["misleading"]), ("hazardous", shares["hazardously misleading"])]
-    text = "\n".join(f"{name} {100.0 * share:.3g} %" for name, share in told)
+    words = [("available", shares["normal"] + shares["misleading"] + shares["hazardously misleading"])]
+    words += [("misleading", shares["misleading"]), ("hazardous", shares["hazardously misleading"])]
+    text = "\n".join(f"{name} {100.0 * share:.3g} %" for name, share in words)
     ax.text(0.97, 0.05, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=7.5, color=INK)
     ax.set(xlim=(0.0, end), ylim=(0.0, end), title=label)
     ax.set_xlabel("horizontal error [m]")

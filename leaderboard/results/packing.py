@@ -98,11 +98,11 @@ def pack(
 
 def shortened(results: Iterable[Result]) -> list[Result]:
     """Results with scores in single precision, and with the draws of a run at its first estimator only."""
-    told, found = set[tuple[str, int]](), []
+    kept, found = set[tuple[str, int]](), []
     for r in results:
         scores = {name: float(np.float32(value)) for name, value in r.scores.items()}
-        draws = {} if (r.scenario, r.seed) in told else r.draws
-        told.add((r.scenario, r.seed))
+        draws = {} if (r.scenario, r.seed) in kept else r.draws
+        kept.add((r.scenario, r.seed))
         found.append(replace(r, scores=scores, draws=draws))
     return found
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.results.ahead import made_ahead
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.stored_scores import StoredScores
 from simnav.scoring.consistency import ending
@@ -218,8 +219,9 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         there = [n for n in wanted if n in found.names]
         groups = range(file.num_row_groups)
         heavy = columns is None or not _HEAVY.isdisjoint(columns)
-        for group in ([k] for k in groups) if heavy else filter(None, [list(groups)]):
-            table = file.read_row_groups(group, columns=there, use_threads=False)
+        parts = ([k] for k in groups) if heavy else filter(None, [list(groups)])
+        tables = (file.read_row_groups(part, columns=there, use_threads=False) for part in parts)
+        for table in made_ahead(tables) if heavy and len(groups) > 1 else tables:
             for name in (n for n in names if n in wanted and n not in there):
                 unknown = pa.array([_SINCE[name][1]] * len(table), schema().field(name).type)
                 table = table.append_column(schema().field(name), unknown)
@@ -287,7 +289,8 @@ def rows(
             columns[name] = listed(table.column(name))
     columns["scores"] = _scores(table.column("scores"), scores)
     if "series" in table.column_names:
-        columns["series"] = list(decoded_series(table.column("series")))
+        found = SeriesColumn(table.column("series"))
+        columns["series"] = [found[k] for k in range(len(found))]
     elif series is not None:
         columns["series"] = [series(k) for k in range(len(table))]
     names = list(columns)
@@ -337,13 +340,39 @@ def _scores(column: pa.ChunkedArray, wanted: Collection[str] | None) -> list[Sto
     return found
 
 
-def decoded_series(column: pa.ChunkedArray) -> Iterator[dict[str, Series]]:
-    """The series of each row, by name."""
-    lists = column.combine_chunks()
-    first = lists.offsets.to_numpy()
-    items = lists.values
-    names, shapes = items.field("name").to_pylist(), items.field("shape").to_pylist()
-    edges = items.field("values").offsets.to_numpy()
-    values = items.field("values").values.to_numpy(zero_copy_only=False)
-    for i in range(len(lists)):
-        yield {names[j]: values[edges[j] : edges[j + 1]].reshape(shapes[j]) for j in range(first[i], first[i + 1])}
+class SeriesColumn:
+    """The series of each row of a column, by name; a row is decoded when it is asked for.
+
+    Parameters
+    ----------
+    column : ChunkedArray
+        Of a file of results.
+    """
+
+    def __init__(self, column: pa.ChunkedArray):
+        lists = column.combine_chunks()
+        items = lists.values
+        self._first = lists.offsets.to_numpy()
+        encoded = items.field("name").dictionary_encode()
+        self._names, self._codes = encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False)
+        shapes = items.field("shape")
+        self._shapes, self._axes = shapes.values.to_numpy(zero_copy_only=False), shapes.offsets.to_numpy()
+        self._edges = items.field("values").offsets.to_numpy()
+        self._values = items.field("values").values.to_numpy(zero_copy_only=False)
+        self._rows: dict[int, dict[str, Series]] = {}
+
+    def __len__(self) -> int:
+        return len(self._first) - 1
+
+    def __getitem__(self, i: int) -> dict[str, Series]:
+        if i not in self._rows:
+            begin, end = int(self._first[i]), int(self._first[i + 1])
+            edges, axes = self._edges[begin : end + 1].tolist(), self._axes[begin : end + 1].tolist()
+            names, shapes, values = self._names, self._shapes, self._values
+            self._rows[i] = {
+                names[code]: values[low:high] if b - a == 1 else values[low:high].reshape(shapes[a:b])
+                for code, low, high, a, b in zip(
+                    self._codes[begin:end].tolist(), edges, edges[1:], axes, axes[1:], strict=False
+                )
+            }
+        return self._rows[i]

@@ -6,15 +6,17 @@ so that they stay on disk until then; a few row groups are kept in memory.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
-from simnav.leaderboard.results.result import Series, decoded_series
+from simnav.leaderboard.results.result import Series, SeriesColumn
 
 __all__ = ["StoredSeries", "read_ahead"]
 
 _KEPT = 8  # row groups in memory, of a few hundred results each
+_AHEAD = 2  # row groups that are read beside the work on another
 
 
 class StoredSeries(Mapping[str, Series]):
@@ -33,6 +35,10 @@ class StoredSeries(Mapping[str, Series]):
     def __init__(self, path: str, group: int, row: int):
         self.path, self.group, self.row = path, group, row
 
+    def held(self) -> Mapping[str, Series]:
+        """The same series in memory: several of them are had more quickly in this way."""
+        return _group(self.path, self.group)[self.row]
+
     def __getitem__(self, name: str) -> Series:
         return _group(self.path, self.group)[self.row][name]
 
@@ -47,26 +53,31 @@ class StoredSeries(Mapping[str, Series]):
 
 
 @lru_cache(maxsize=_KEPT)
-def _group(path: str, group: int) -> list[dict[str, Series]]:
+def _group(path: str, group: int) -> SeriesColumn:
     import pyarrow.parquet as pq
 
     with open(path, "rb") as source:
-        table = pq.ParquetFile(source, page_checksum_verification=True).read_row_group(group, ["series"])
-    return list(decoded_series(table.column("series")))
+        table = pq.ParquetFile(source, page_checksum_verification=True).read_row_group(
+            group, ["series"], use_threads=False
+        )
+    return SeriesColumn(table.column("series"))
 
 
-def read_ahead(series: Iterable[Mapping[str, Series]]) -> Iterator[Mapping[str, Series]]:
-    """The same series in the order of their places in the files, while a thread reads the next row group."""
+def read_ahead(series: Iterable[Mapping[str, Series]]) -> Iterator[tuple[Mapping[str, Series], Mapping[str, Series]]]:
+    """Pairs of each of these series and the same series in memory.
+
+    Stored ones come in the order of their places in the files, while threads read the next row groups.
+    """
     stored = sorted((s for s in series if isinstance(s, StoredSeries)), key=lambda s: (s.path, s.group, s.row))
     groups = list(dict.fromkeys((s.path, s.group) for s in stored))
-    with ThreadPoolExecutor(1) as pool:
-        waiting = [pool.submit(_group, *place) for place in groups[:1]]
+    with ThreadPoolExecutor(_AHEAD) as pool:
+        waiting = deque(pool.submit(_group, *place) for place in groups[:_AHEAD])
         current = -1
         for s in stored:
             if current < 0 or groups[current] != (s.path, s.group):
-                waiting.pop().result()
+                waiting.popleft().result()
                 current += 1
-                if current + 1 < len(groups):
-                    waiting.append(pool.submit(_group, *groups[current + 1]))
-            yield s
-    yield from (s for s in series if not isinstance(s, StoredSeries))
+                if current + _AHEAD < len(groups):
+                    waiting.append(pool.submit(_group, *groups[current + _AHEAD]))
+            yield s, s.held()
+    yield from ((s, s) for s in series if not isinstance(s, StoredSeries))

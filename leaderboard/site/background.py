@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -26,12 +25,11 @@ from simnav.leaderboard.site.library import cache
 if TYPE_CHECKING:
     from simnav.recording import Recording
 
-__all__ = ["BOUND_RUNS", "Background", "background", "backgrounds", "track_of"]
+__all__ = ["BOUND_RUNS", "Background", "background", "background_of", "prepare", "track_of"]
 
 #: Seeds over which the bound is averaged.
 BOUND_RUNS = 2
 
-_WORTH_PROCESSES = 3  # scenarios
 _MOST_KEPT = 400  # files in the cache
 _TRACK_POINTS = 300
 _UNITS = {"m_s": ("m/s", 1.0), "deg": ("°", float(np.degrees(1.0)))}
@@ -65,35 +63,23 @@ class Background:
     runs: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def backgrounds(tasks: Sequence[tuple[str, Sequence[int]]], workers: int = 1) -> Iterator[Background]:
-    """Of several scenarios, in order: from the cache, or made by other processes while this one goes on.
+def prepare() -> None:
+    """Digest the code that a background depends on: other processes that are forked after it need not."""
+    _code()
+
+
+def background_of(identity: str, seeds: Sequence[int]) -> Background:
+    """Of a scenario: from the cache, or made.
 
     Parameters
     ----------
-    tasks : sequence of (str, sequence of int)
-        Versioned ids of scenarios, with the seeds whose recordings are wanted.
-    workers : int
-        Number of processes.
+    identity : str
+        Versioned id of the scenario.
+    seeds : sequence of int
+        Of the runs whose recordings are wanted.
     """
-    kept = [_kept(*task) for task in tasks]
-    missing = [task for task, found in zip(tasks, kept, strict=True) if found is None]
-    made = _made(missing, workers)
-    for task, found in zip(tasks, kept, strict=True):
-        yield found if found is not None else _keep(*task, next(made))
-
-
-def _made(tasks: Sequence[tuple[str, Sequence[int]]], workers: int) -> Iterator[Background]:
-    if workers < 2 or len(tasks) < _WORTH_PROCESSES:
-        return (background(*task) for task in tasks)
-    from joblib import Parallel, delayed
-
-    before = os.environ.get("PYTHONSAFEPATH")
-    os.environ["PYTHONSAFEPATH"] = "1"  # a folder of ours where the user stands must not be imported
-    try:
-        parallel = Parallel(n_jobs=min(workers, len(tasks)), return_as="generator")
-        return iter(parallel(delayed(background)(*task) for task in tasks))
-    finally:
-        os.environ.pop("PYTHONSAFEPATH") if before is None else os.environ.update(PYTHONSAFEPATH=before)
+    kept = _kept(identity, seeds)
+    return kept if kept is not None else _keep(identity, seeds, background(identity, seeds))
 
 
 def background(identity: str, seeds: Iterable[int]) -> Background:
@@ -200,23 +186,25 @@ def truth_of(east: Any, north: Any, time: Any) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
-def _code() -> str:
-    """Digest of the code that makes a background, besides the simulator."""
+def _code() -> tuple[str, str]:
+    """Version of the simulator, and a digest of the other code that makes a background."""
+    from simnav.leaderboard.campaign.fingerprint import simulator_version
     from simnav.leaderboard.campaign.sources import digest, followed
 
     found = followed([__name__, "simnav.estimators.bound"])
-    return digest(*(part for item in found.items() for part in item))
+    return simulator_version(), digest(*(part for item in found.items() for part in item))
 
 
 def _file(identity: str, seeds: Sequence[int]) -> Path | None:
     """Where it is kept; None for what is not in the catalogue, or plays a log, whose files may change."""
-    from simnav.leaderboard.campaign.fingerprint import digest, recording_digest, simulator_version
+    from simnav.leaderboard.campaign.fingerprint import digest, recording_digest
 
     scenario = catalogued(identity)
     if scenario is None or scenario.recorded:
         return None
+    simulator, code = _code()
     words = scenario.model_dump_json() + str(BOUND_RUNS) + ",".join(map(str, seeds))
-    return cache() / "site" / f"{digest(recording_digest(scenario, simulator_version()), _code(), words)}.json"
+    return cache() / "site" / f"{digest(recording_digest(scenario, simulator), code, words)}.json"
 
 
 def _kept(identity: str, seeds: Sequence[int]) -> Background | None:

@@ -18,7 +18,8 @@ class Column:
     key, title, help : str
         ``help`` is shown on hover.
     kind : str
-        How a value is written, as ``write`` in ``core.js`` has it; or ``name``, ``bar``, ``badge``, ``interval``.
+        How a value is written, as ``write`` in ``core.js`` has it; or ``name``, ``bar``, ``badge``,
+        ``interval``; ``words`` is text that may take several lines.
     hidden : bool
         Shown when the reader chooses it.
     fixed : bool

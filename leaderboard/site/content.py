@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +11,7 @@ from simnav.leaderboard.results.citation import Citation
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.site.facts import EstimatorFacts
 
-__all__ = ["EstimatorEntry", "ExtraPage", "Fact", "ScenarioEntry", "SiteFacts", "slug"]
+__all__ = ["EstimatorEntry", "ExtraPage", "Fact", "ScenarioEntry", "SiteFacts"]
 
 
 @dataclass(frozen=True)
@@ -144,12 +142,3 @@ class SiteFacts:
     benchmark: str = ""
     provenance: Sequence[Provenance] = field(default_factory=tuple)
     citation: Citation | None = None
-
-
-def slug(text: str, taken: set[str]) -> str:
-    """A file name for a label: plain characters only, and none twice."""
-    plain = re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:60] or "unnamed"
-    if plain in taken or plain != text:
-        plain += "-" + hashlib.blake2b(text.encode(), digest_size=3).hexdigest()
-    taken.add(plain)
-    return plain

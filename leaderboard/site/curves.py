@@ -7,8 +7,9 @@ memory.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from simnav.scoring.integrity import RISK
 from simnav.scoring.plot_series import DIAGNOSTICS
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.results.result import Result, Series
 
 __all__ = ["BAND_RUNS", "QUANTITIES", "Curves", "Gathered", "band", "gather", "integrity", "one_run", "quantiles"]
 
@@ -41,6 +42,7 @@ BAND_RUNS = 40
 _POINTS = 120  # of a curve: more cannot be seen
 _RUN_POINTS = 150
 _TRACK_POINTS = 300
+_TRUTH = {"east": "truth_east", "north": "truth_north", "time": "time"}
 _FULL = 0.999  # a weight above this is as good as 1
 #: From three standard deviations to the protection level that follows from a covariance.
 _PROTECTION = math.sqrt(-2.0 * math.log(RISK)) / 3.0
@@ -76,12 +78,12 @@ class Gathered:
     ----------
     curves : dict of Result to Curves
         For the charts over all runs.
-    single : dict of Result to dict
-        As of `one_run`.
+    single : dict of Result to dict of str to array
+        Series at as many points as a chart of one run shows; `one_run` makes its data of them.
     """
 
     curves: dict[Result, Curves]
-    single: dict[Result, dict[str, Any]]
+    single: dict[Result, dict[str, Thin]]
 
 
 def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
@@ -100,46 +102,58 @@ def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
     every: dict[int, list[Result]] = {}
     for result in wanted | alone:
         every.setdefault(id(result.series), []).append(result)
-    for series in read_ahead([results[0].series for results in every.values()]):
+    for series, read in read_ahead([results[0].series for results in every.values()]):
+        if not _has(read, "time"):
+            continue
         for result in every[id(series)]:
-            if not _has(result, "time"):
+            if result.status != "ok":
                 continue
             if result in wanted:
-                found.curves[result] = _curves(result, times)
+                found.curves[result] = _curves(read, times)
             if result in alone:
-                found.single[result] = one_run(result)
+                found.single[result] = _thinned(read)
     return found
 
 
-def _has(result: Result, name: str) -> bool:
-    values = result.series.get(name) if result.status == "ok" else None
+def _has(s: Mapping[str, Series], name: str) -> bool:
+    values = s.get(name)
     return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
 
 
-def _thinned(n: int, points: int) -> NDArray[np.int64]:
+@lru_cache(maxsize=64)
+def _spaced(n: int, points: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, n - 1, min(n, points)).round().astype(np.int64))
 
 
-def _curves(result: Result, times: dict[bytes, Thin]) -> Curves:
-    s = result.series
-    keep = _thinned(len(s["time"]), _POINTS)
+def _curves(s: Mapping[str, Series], times: dict[bytes, Thin]) -> Curves:
+    keep = _spaced(len(s["time"]), _POINTS)
     time = s["time"][keep]
     time = times.setdefault(time.tobytes(), time)
     values = {name: np.abs(s[name][keep]) for name, *_ in QUANTITIES if name in s and np.isfinite(s[name]).any()}
-    if (level := _level(result)) is not None:
+    if (level := _level(s)) is not None:
         values["level"] = level[keep].astype(np.float32)
     weights = {n: s[n].copy() for n in s if n.startswith("weight.") and (s[n] < _FULL).any()}
     if weights:
         weights["time"] = times.setdefault(s["diagnostics_time"].tobytes(), s["diagnostics_time"].copy())
-    return Curves(time, values, s["quantiles"].copy() if _has(result, "quantiles") else None, weights)
+    return Curves(time, values, s["quantiles"].copy() if _has(s, "quantiles") else None, weights)
 
 
-def _level(result: Result) -> NDArray[Any] | None:
+def _thinned(s: Mapping[str, Series]) -> dict[str, Thin]:
+    keep = _spaced(len(s["time"]), _RUN_POINTS)
+    names = ("time", *(key for key, *_ in QUANTITIES), "three_sigma", "estimate_north", "estimate_east")
+    found = {name: s[name][keep] for name in names if name in s}
+    if "truth_north" in s:
+        known = np.flatnonzero(np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"]))
+        known = known[_spaced(len(known), _TRACK_POINTS)] if len(known) else known
+        found |= {f"truth_{to}": s[name][known] for to, name in _TRUTH.items()}
+    return found | {n: s[n].copy() for n in s if n == "diagnostics_time" or n.partition(".")[0] in DIAGNOSTICS}
+
+
+def _level(s: Mapping[str, Series]) -> NDArray[Any] | None:
     """Protection level over time: the estimator's own, or that of its covariance."""
-    s = result.series
     if "protection_level" in s:
         return s["protection_level"]
-    return _PROTECTION * s["three_sigma"] if _has(result, "three_sigma") else None
+    return _PROTECTION * s["three_sigma"] if _has(s, "three_sigma") else None
 
 
 def axis(curves: Iterable[Curves]) -> Array:
@@ -220,23 +234,20 @@ def integrity(curves: Sequence[Curves], limit: float) -> dict[str, list[Any]] | 
     return {**{name: shorts(values) for name, values in sides.items()}, "epochs": counts[i, j].tolist()}
 
 
-def one_run(result: Result) -> dict[str, Any]:
-    """Errors, stated uncertainty, tracks and diagnostics of one run that has series."""
-    s = {name: np.asarray(values, dtype=np.float64) for name, values in result.series.items()}
-    keep = _thinned(len(s["time"]), _RUN_POINTS)
+def one_run(thinned: Mapping[str, Thin]) -> dict[str, Any]:
+    """Errors, stated uncertainty, tracks and diagnostics of one run, from what `gather` kept of its series."""
+    s = {name: np.asarray(values, dtype=np.float64) for name, values in thinned.items()}
+    time = shorts(s["time"])
     found: dict[str, Any] = {}
     for name, _, _, factor in QUANTITIES:
         if name in s and np.isfinite(s[name]).any():
-            found[name] = {"time": shorts(s["time"][keep]), "middle": shorts(factor * np.abs(s[name][keep]))}
+            found[name] = {"time": time, "middle": shorts(factor * np.abs(s[name]))}
             if name == "horizontal" and np.isfinite(s.get("three_sigma", np.zeros(0))).any():
-                found[name]["bound"] = shorts(s["three_sigma"][keep])
+                found[name]["bound"] = shorts(s["three_sigma"])
     if "estimate_north" in s:
-        track = {"time": s["time"], "east": s["estimate_east"], "north": s["estimate_north"]}
-        found["track"] = {name: shorts(v[keep]) for name, v in track.items()}
-    if "truth_north" in s:
-        known = np.flatnonzero(np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"]))
-        known = known[_thinned(len(known), _TRACK_POINTS)] if len(known) else known
-        found["truth"] = [s[name][known] for name in ("truth_east", "truth_north", "time")]
+        found["track"] = {"time": time, "east": shorts(s["estimate_east"]), "north": shorts(s["estimate_north"])}
+    if "truth_time" in s:
+        found["truth"] = [s[f"truth_{name}"] for name in _TRUTH]
     for name, values in s.items():
         known = np.isfinite(values)
         plain = name.startswith("weight.") and not (values[known] < _FULL).any()  # nothing was ever weighted

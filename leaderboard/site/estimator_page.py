@@ -16,6 +16,7 @@ from simnav.leaderboard.site.background import Background
 from simnav.leaderboard.site.charts import short, shorts
 from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
 from simnav.leaderboard.site.content import Fact
+from simnav.leaderboard.site.losses import losses
 from simnav.leaderboard.site.scenario_page import inside_chart, track_from
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["PLAIN", "errors_data", "estimator_data", "facts_of", "runs_data", "worst_run"]
+__all__ = ["PLAIN", "errors_data", "estimator_data", "facts_of", "runs_data", "worst_runs"]
 
 #: The row that every estimator is compared with.
 PLAIN = "ekf"
@@ -127,7 +128,7 @@ def estimator_data(
 ) -> dict[str, Any]:
     """Everything that the page of an estimator shows.
 
-    ``worst`` is as from `worst_run`, and ``single`` what `simnav.leaderboard.site.curves.one_run` made of it.
+    ``worst`` is one of `worst_runs`, and ``single`` what `simnav.leaderboard.site.curves.one_run` made of it.
     """
     label = entry.label
     rows = []
@@ -165,6 +166,7 @@ def estimator_data(
         "plain": None
         if plain_row is None or label == PLAIN
         else {"label": PLAIN, "data": plain_row.data, "page": plain_row.page},
+        "losses": None if label == PLAIN else losses(label, PLAIN, ranking, scenarios),
         "table": {
             "name": "main",
             "title": f"{label} by scenario",
@@ -208,16 +210,15 @@ def _profile(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry
     return [charts.ratios_by_group("profile", {"points": points}, caption)]
 
 
-def worst_run(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> tuple[Result, float] | None:
-    """The run that ended well with the largest error as a multiple of the reference figure, and this multiple."""
+def worst_runs(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> list[tuple[Result, float]]:
+    """The runs that ended well with their errors as multiples of the reference figure, the largest first."""
     found = []
     for table, _ in _tables(label, ranking):
         for result in runs[table.scenario][label].good:
             ratio = result.scores.get("horizontal_rmse", math.nan) / table.reference.value
             if math.isfinite(ratio):
-                found.append((ratio, result))
-    found.sort(key=lambda f: -f[0])
-    return next(((result, ratio) for ratio, result in found if len(result.series.get("time", ()))), None)
+                found.append((result, ratio))
+    return sorted(found, key=lambda f: -f[1])
 
 
 def _worst_page(
@@ -227,7 +228,9 @@ def _worst_page(
     made = []
     if "track" in one:
         data = {"curves": {"rows": {label: one["track"]}}, **track_from([one])}
-        made.append(charts.track("worst-track", "Track of the worst run", data, "Black: the true track."))
+        made.append(
+            charts.track("worst-track", "Track of the worst run", data, "The line without a name is the true track.")
+        )
     for key, title, unit, _ in curves.QUANTITIES:
         if key not in one or key in ("vertical", "velocity"):
             continue

@@ -56,14 +56,25 @@ class ScenarioData:
     first: tuple[str, ...]
 
 
-def shown_first(ranking: ScenarioRanking) -> list[str]:
-    """Rows that charts show at first: the best, and the plain EKF, which everybody knows; of equal rows one."""
-    again = {name for names in same_results(ranking) for name in names[1:]}
-    ranked = [r.estimator for r in ranking.rows if not r.reference and r.estimator not in again]
+def shown_first(ranking: ScenarioRanking, drawn: Sequence[str]) -> list[str]:
+    """Rows that charts show at first: the best, and the plain EKF, which everybody knows; of equal rows one.
+
+    Parameters
+    ----------
+    ranking : ScenarioRanking
+        Of the scenario.
+    drawn : sequence of str
+        The rows of which curves are kept, in order of rank.
+    """
+    again: set[str] = set()
+    for names in same_results(ranking):
+        again.update([name for name in names if name in drawn][1:])
+    references = {r.estimator for r in ranking.rows if r.reference}
+    ranked = [name for name in drawn if name not in references | again]
     best = ranked[:_FIRST]
     if _PLAIN in ranked and _PLAIN not in best:
         best[-1] = _PLAIN
-    return best or [r.estimator for r in ranking.rows][:_FIRST]
+    return best or list(drawn)[:_FIRST]
 
 
 def same_results(ranking: ScenarioRanking) -> list[list[str]]:
@@ -102,13 +113,17 @@ def scenario_data(
         Over dials of the scenario.
     """
     rows = [r.estimator for r in ranking.rows]
-    first = shown_first(ranking)
     by = {n: [gathered.curves[r] for r in runs[n].good if r in gathered.curves] for n in rows}
+    drawn = [n for n in rows if by[n]]
+    first = shown_first(ranking, drawn or rows)
     made, inside, files = _over_all_runs(entry, ranking, runs, by, around)
     kinds: dict[str, None] = {}
     for seed in seeds:
         single = {
-            n: gathered.single[r] for n in rows for r in runs[n].results if r.seed == seed and r in gathered.single
+            n: curves.one_run(gathered.single[r])
+            for n in rows
+            for r in runs[n].results
+            if r.seed == seed and r in gathered.single
         }
         for one in single.values():
             kinds |= dict.fromkeys(k for k in one if k.partition(".")[0] in DIAGNOSTICS)
@@ -122,6 +137,7 @@ def scenario_data(
             n: {"reference": estimators[n].reference, "page": estimators[n].page, "data": estimators[n].runs}
             for n in rows
         },
+        "drawn": drawn,
         "first": first,
         "table": _table(ranking, runs, estimators),
         "failures": _failures(ranking, runs),
@@ -155,7 +171,7 @@ def _same(names: Sequence[str]) -> str:
 def seeds_to_show(ranking: ScenarioRanking, runs: Mapping[str, Runs], seeds: Sequence[int], count: int) -> list[int]:
     """The first seed, then those on which the rows that are shown at first did worst."""
     worst: dict[int, float] = {}
-    for n in shown_first(ranking):
+    for n in shown_first(ranking, [r.estimator for r in ranking.rows]):
         for r in runs[n].results:
             value = r.scores.get("horizontal_rmse", math.nan)
             if value > 0.0 and math.isfinite(value):
@@ -242,9 +258,8 @@ def _over_all_runs(
         ends = [t for t in around.happening["end"] if t is not None]
         duration = max([float(time[-1]) if len(time) else 0.0, *ends])
         made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}.", duration))
-    count = min(len(entry.seeds), curves.BAND_RUNS)
-    seeds = "one seed" if len(entry.seeds) < 2 else f"{'the first ' * (count < len(entry.seeds))}{count} seeds"
-    words = f"Median over {seeds}, and the band from the 5th to the 95th percentile. Shaded: faults of seed {first}."
+    drawn = _counted([len(c) for c in by.values() if c], len(entry.seeds))
+    words = f"Median over {drawn}, and the band from the 5th to the 95th percentile. Shaded: faults of seed {first}."
     for key, title, unit, factor in curves.QUANTITIES:
         found = {n: b for n, c in by.items() if (b := curves.band(c, key, factor, time)) is not None}
         if not found:
@@ -254,19 +269,19 @@ def _over_all_runs(
             " Dashed: the posterior Cramer-Rao bound on the RMS error, faults known." if bound["time"] else ""
         )
         made.append(charts.over_time(key, title, unit, _timed(time, found, faults, bound), caption))
-    cdf = {n: q for n, c in by.items() if (q := curves.quantiles(c)) is not None}
-    if cdf:
-        caption = f"Over all epochs of {seeds}, of runs that ended well."
-        made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": {"rows": cdf}}, caption))
     spreads = (
         ("horizontal_rmse", "rmse", "Horizontal RMSE of every run", "Horizontal RMSE [m]", ()),
         ("nees_horizontal", "nees", "Consistency of every run", "NEES by degree of freedom [-]", (0.7, 1.5)),
     )
     made += [c for words in spreads if (c := _spread(ranking, runs, *words))]
+    cdf = {n: q for n, c in by.items() if (q := curves.quantiles(c)) is not None}
+    if cdf:
+        caption = f"Over all epochs of {drawn}."
+        made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": {"rows": cdf}}, caption))
     limit = ALERT_LIMITS[0]
     cells = {n: q for n, c in by.items() if (q := curves.integrity(c, limit)) is not None}
     if cells:
-        made.append(charts.stanford("stanford", {"curves": {"rows": cells}}, limit, f"Epochs of {seeds}."))
+        made.append(charts.stanford("stanford", {"curves": {"rows": cells}}, limit, f"Epochs of {drawn}."))
     inside = []
     for name in sorted({n for found in by.values() for c in found for n in c.diagnostics if n != "time"}):
         axis = max((c.diagnostics["time"] for found in by.values() for c in found if name in c.diagnostics), key=len)
@@ -280,6 +295,16 @@ def _over_all_runs(
         )  # fmt: skip
     files = {f"{entry.data}-{c.name}": dict(c.data) for c in (*made, *inside)}
     return made, inside, files
+
+
+def _counted(runs: Sequence[int], seeds: int) -> str:
+    """How many runs the curves of a scenario are made of, from those of each row, and from all its seeds."""
+    least, most = min(runs, default=0), max(runs, default=0)
+    if most < 2:
+        return "one run"
+    first = "the first " if seeds > curves.BAND_RUNS else ""
+    count = f"{least} to {most} runs a row" if least < most else f"{most} runs"
+    return f"{first}{count} that ended well"
 
 
 def _timed(time: Any, rows: Mapping[str, Any], faults: Any, bound: Any) -> dict[str, Any]:
@@ -377,7 +402,7 @@ def _run_charts() -> list[Chart]:
             "track",
             "Track",
             {},
-            "Black: the true track, from its start (circle) to its end (square). Wide: where faults act. Grey: fixes.",
+            "With a circle at its start and a square at its end: the true track. Wide: where faults act. Grey: fixes.",
         )
     ]
     for key, title, unit, _ in curves.QUANTITIES:

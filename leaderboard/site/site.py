@@ -7,12 +7,17 @@ folder is built beside its place and swapped in at the end: a run that is killed
 
 from __future__ import annotations
 
+import gc
 import json
+import multiprocessing
 import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,18 +25,20 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.figures.style import save
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
-from simnav.leaderboard.ranking.runs import Runs, group
+from simnav.leaderboard.ranking.runs import group
+from simnav.leaderboard.ranking.statistics import FAILURE
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
-from simnav.leaderboard.site.background import backgrounds
+from simnav.leaderboard.site.background import background_of, prepare
 from simnav.leaderboard.site.columns import glossary
-from simnav.leaderboard.site.content import EstimatorEntry, ExtraPage, Fact, ScenarioEntry, SiteFacts, slug
-from simnav.leaderboard.site.curves import BAND_RUNS, Gathered, gather
-from simnav.leaderboard.site.estimator_page import errors_data, estimator_data, facts_of, runs_data, worst_run
-from simnav.leaderboard.site.facts import catalogued, estimator_facts, name_of, toml_of
+from simnav.leaderboard.site.content import ExtraPage, Fact, ScenarioEntry, SiteFacts
+from simnav.leaderboard.site.curves import BAND_RUNS, Gathered, gather, one_run
+from simnav.leaderboard.site.entries import argument_of, entries
+from simnav.leaderboard.site.estimator_page import errors_data, estimator_data, facts_of, runs_data, worst_runs
+from simnav.leaderboard.site.facts import catalogued, name_of
 from simnav.leaderboard.site.library import bundle
 from simnav.leaderboard.site.overview import BOARD_COLUMNS, overview
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
@@ -44,6 +51,7 @@ if TYPE_CHECKING:
 
 __all__ = ["build"]
 
+_WORTH_PROCESSES = 3  # scenarios
 _STALE = 3600.0  # a build of this age runs no more [s]
 _STATIC = (*STATIC, "core.js", "table.js", "charts.js", "compare.js", "page.js", "results.schema.json")
 
@@ -77,7 +85,7 @@ def build(
     progress : callable, optional
         Called with (done, total, note=...).
     workers : int
-        Processes that prepare the scenarios.
+        Processes that write the pages of scenarios, and the results in other formats.
     papers : sequence of ExtraPage, optional
         Reproductions of papers (`simnav.leaderboard.papers.page.find`).
     editions : sequence of ExtraPage, optional
@@ -106,6 +114,7 @@ def build(
     _refuse_strangers(output)
     output.parent.mkdir(parents=True, exist_ok=True)
     _sweep(output)
+    catalogued.cache_clear()
     draft = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent))
     try:
         draft.chmod(0o755)
@@ -149,17 +158,12 @@ def _swap(draft: Path, output: Path) -> None:
 
 def reproduce(results: Sequence[Result]) -> str:
     """The command that makes results like these."""
-    scenarios = [_argument(s) for s in dict.fromkeys(r.scenario for r in results)]
+    scenarios = [argument_of(s) for s in dict.fromkeys(r.scenario for r in results)]
     estimators = list(dict.fromkeys(_request(r) for r in results))
     seeds = [r.seed for r in results]
     first, runs = min(seeds), max(seeds) - min(seeds) + 1
     command = f"simnav campaign --scenario {','.join(scenarios)} --estimator {','.join(estimators)} --runs {runs}"
     return command + (f" --seed {first}" if first else "")
-
-
-def _argument(identity: str) -> str:
-    """A scenario as it is asked for: one that is not in the catalogue came from a file."""
-    return identity if catalogued(identity) is not None else f"{identity.rpartition('-v')[0]}.toml"
 
 
 def _request(result: Result) -> str:
@@ -174,8 +178,59 @@ def _request(result: Result) -> str:
     return name + ":" + ",".join(f"{k}={v}" for k, v in result.parameters.items())
 
 
+@contextmanager
+def _beside(site: _Site, method: str, arguments: Sequence[str]) -> Iterator[Iterator[None]]:
+    """Call a method of a build with each argument in forked processes, which share all that the build has in memory.
+
+    Where there is only one process, the calls are made as the iterator is read.
+    """
+    global _building
+    forks = "fork" in multiprocessing.get_all_start_methods() and len(site.scenarios) >= _WORTH_PROCESSES
+    if site.workers < 2 or not forks:
+        yield map(getattr(site, method), arguments)
+        return
+    _building = site
+    gc.freeze()  # so that a collection in another process does not copy the memory that it shares
+    try:
+        context = multiprocessing.get_context("fork")
+        with ProcessPoolExecutor(min(site.workers, len(arguments)), mp_context=context) as pool:
+            yield pool.map(_call, [method] * len(arguments), arguments)
+    finally:
+        gc.unfreeze()
+        _building = None
+
+
+_building: _Site | None = None  # what forked processes write
+
+
+def _call(method: str, argument: str) -> None:
+    getattr(_building, method)(argument)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What scenarios' pages show: runs one by one, by scenario; what was read of series; charts for print; sweeps."""
+
+    seeds: Mapping[str, Sequence[int]]
+    gathered: Gathered
+    figures: bool
+    sweeps: Sequence[SweepFile]
+
+
+def _with_series(ordered: Sequence[tuple[Result, float]], gathered: Gathered) -> tuple[Result, float] | None:
+    """The first of these runs that has series. They are nearly always those of the first, which are gathered."""
+    for result, ratio in ordered:
+        if result not in gathered.single:
+            gathered.single.update(gather((), [result]).single)
+        if result in gathered.single:
+            return result, ratio
+    return None
+
+
 class _Site:
     """One build: everything that the pages share."""
+
+    plan: _Plan
 
     def __init__(
         self,
@@ -190,29 +245,17 @@ class _Site:
     ):
         from importlib.metadata import version
 
-        catalogued.cache_clear()
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
         self.runs = group(self.results)
-        ranked = [row.estimator for track in ranking.tracks for row in track.rows]
-        labels = list(dict.fromkeys([*ranked, *sorted({r.estimator for r in self.results})]))
-        references = {r.estimator for r in self.results if r.reference}
-        taken = {"index", "compare", "about"}
-        self.estimators: dict[str, EstimatorEntry] = {}
-        for label in labels:
-            stem = slug(label, taken)
-            self.estimators[label] = EstimatorEntry(
-                label, f"estimator-{stem}.html", f"row-{stem}", f"runs-{stem}", label in references,
-                estimator_facts(label),
-            )  # fmt: skip
-        described = [_describe(s, by, f"{slug(s, taken)}.html") for s, by in self.runs.items()]
-        self.scenarios = {s.id: s for s in described}
+        self.pages = environment()
+        self.estimators, self.scenarios = entries(self.runs, ranking)
         provenances = [r.provenance for r in self.results]
         self.facts = SiteFacts(
             version=version("simnav"),
             generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
             total=len(self.results),
-            scenarios=described,
+            scenarios=list(self.scenarios.values()),
             estimators=list(self.estimators.values()),
             papers=papers,
             editions=editions,
@@ -224,43 +267,47 @@ class _Site:
 
     def write(self, runs_shown: int, figures: bool, sweeps: Sequence[SweepFile]) -> None:
         """Write all pages and data."""
-        pages = environment()
         (self.folder / "data").mkdir()
         seeds = {
             s: seeds_to_show(self.ranking.scenario(s), self.runs[s], entry.seeds, runs_shown)
             for s, entry in self.scenarios.items()
         }
-        around = backgrounds(list(seeds.items()), self.workers)  # other processes begin to work
-        worst = {label: worst_run(label, self.ranking, self.runs) for label in self.estimators}
-        gathered = self._gathered(seeds, [found[0] for found in worst.values() if found is not None])
-        steps = len(self.scenarios) + 1
-        self.progress(0, steps)
-        for k, (scenario, behind) in enumerate(zip(self.scenarios.values(), around, strict=True)):
-            mine = {n: self.estimators[n] for n in self.runs[scenario.id]}
-            found = scenario_data(scenario, self.ranking.scenario(scenario.id), self.runs[scenario.id], mine,
-                                  seeds[scenario.id], behind, gathered,
-                                  [s for s in sweeps if s.scenario == scenario.id])  # fmt: skip
-            for name, content in found.files.items():
-                self._data(name, content)
-            if figures:
-                self._print(scenario, found)
-            self._page(pages, "scenario.html", scenario.page, found.page, scenario=scenario)
-            self.progress(k + 1, steps, note=scenario.name)
+        ordered = {label: worst_runs(label, self.ranking, self.runs) for label in self.estimators}
+        prepare()
+        with _beside(self, "export", formats("results")) as exported:
+            gathered = self._gathered(seeds, [found[0][0] for found in ordered.values() if found])
+            worst = {label: _with_series(found, gathered) for label, found in ordered.items()}
+            self.plan = _Plan(seeds, gathered, figures, sweeps)
+            with _beside(self, "scenario", list(self.scenarios)) as written:
+                self._other_pages(worst)
+                steps = len(self.scenarios) + 1
+                self.progress(0, steps)
+                for k, (scenario, _) in enumerate(zip(self.scenarios.values(), written, strict=True)):
+                    self.progress(k + 1, steps, note=scenario.name)
+            list(exported)
+        self.progress(steps, steps)
+
+    def _other_pages(self, worst: Mapping[str, tuple[Result, float] | None]) -> None:
+        """The pages of estimators, with their worst runs, and those of the whole board."""
+        pages = self.pages
         for label, entry in self.estimators.items():
             self._data(entry.data, errors_data(label, self.ranking, self.scenarios))
             self._data(entry.runs, runs_data(label, self.ranking, self.runs))
             last = worst[label]
-            single = None if last is None else gathered.single.get(last[0])
-            data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, single)
+            shown = None if last is None else one_run(self.plan.gathered.single[last[0]])
+            data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, shown)
             parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
             self._page(pages, "estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
                        data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
         tracks = overview(self.ranking, self.estimators, self.scenarios, self.runs)
-        if figures:
+        if self.plan.figures:
             for track in self.ranking.tracks:
                 save(ranking_figure(track), self.folder / "figures" / f"board-{track.track}", formats=("svg", "png"))
+        headers = [t if k == 0 else {"key": t["key"], "file": f"track-{t['key']}"} for k, t in enumerate(tracks)]
+        for later in tracks[1:]:  # read when its tab is opened
+            self._data(f"track-{later['key']}", later)
         self._page(
-            pages, "index.html", "index.html", {"kind": "index", "tracks": tracks}, tracks=tracks, facts=self._counts()
+            pages, "index.html", "index.html", {"kind": "index", "tracks": headers}, tracks=tracks, facts=self._counts()
         )
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
         self._page(pages, "compare.html", "compare.html", {"kind": "compare", "rows": rows})
@@ -270,8 +317,6 @@ class _Site:
         for name in _STATIC:
             shutil.copyfile(TEMPLATES / name, self.folder / name)
         (self.folder / "vega.js").write_text(bundle(), encoding="utf-8")
-        self._export()
-        self.progress(steps, steps)
 
     def _gathered(self, seeds: Mapping[str, Sequence[int]], worst: Sequence[Result]) -> Gathered:
         """What charts need of the series, each part of a file read once."""
@@ -281,6 +326,20 @@ class _Site:
                 over_all += runs.good[:BAND_RUNS]
                 single += [r for r in runs.good if r.seed in seeds[scenario]]
         return gather(over_all, single)
+
+    def scenario(self, identity: str) -> None:
+        """Write the page of a scenario and its data."""
+        entry, runs, plan = self.scenarios[identity], self.runs[identity], self.plan
+        found = scenario_data(
+            entry, self.ranking.scenario(identity), runs, {n: self.estimators[n] for n in runs}, plan.seeds[identity],
+            background_of(identity, plan.seeds[identity]), plan.gathered,
+            [s for s in plan.sweeps if s.scenario == identity],
+        )  # fmt: skip
+        for name, content in found.files.items():
+            self._data(name, content)
+        if plan.figures:
+            self._print(entry, found)
+        self._page(self.pages, "scenario.html", entry.page, found.page, scenario=entry)
 
     def _counts(self) -> list[Fact]:
         tried = [r for r in self.results if r.tried]
@@ -292,7 +351,8 @@ class _Site:
             Fact("Failed runs", sum(r.status != "ok" for r in tried)),
         ]
 
-    def _export(self) -> None:
+    def export(self, name: str) -> None:
+        """Write the results in a format."""
         known = ("id", "name", "title", "description", "source", "seeds")
         document = Document(
             self.results,
@@ -301,8 +361,7 @@ class _Site:
             self.facts.command,
             self.facts.generated,
         )
-        for name in formats("results"):
-            write("results", name, document, self.folder / f"results.{name}")
+        write("results", name, document, self.folder / f"results.{name}")
 
     def _data(self, name: str, content: Mapping[str, Any]) -> None:
         text = f"simnav.data[{json.dumps(name)}] = {_json(content)};\n"
@@ -319,7 +378,7 @@ class _Site:
         cited = self.facts.citation.text if self.facts.citation is not None else ""
         values.setdefault("data", content)
         text = pages.get_template(template).render(
-            page=name, site=self.facts, page_data=_json({**content, "citation": cited}), **values
+            page=name, site=self.facts, page_data=_json({**content, "citation": cited, "failure": FAILURE}), **values
         )
         (self.folder / name).write_text(text, encoding="utf-8")
 
@@ -328,22 +387,3 @@ def _json(content: Mapping[str, Any]) -> str:
     """JSON that can stand in a page: nothing in it closes an element."""
     text = json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-
-
-def _describe(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry:
-    """What is known of a scenario, from the catalogue where it is in there."""
-    name, _, version = identity.rpartition("-v")
-    seeds = tuple(sorted({r.seed for runs in by.values() for r in runs.results}))
-    facts = [Fact("Version", version or "–"), Fact("Seeds", len(seeds))]
-    scenario = catalogued(identity)
-    if scenario is None:
-        return ScenarioEntry(identity, name or identity, page, seeds, _argument(identity), tuple(facts))
-    facts += [Fact("Duration", tables.duration(scenario.duration)), Fact("Step", tables.duration(scenario.step))]
-    if scenario.instruments:
-        facts.append(Fact("Instruments", len(scenario.instruments)))
-    if scenario.faults:
-        facts.append(Fact("Faults", len(scenario.faults)))
-    return ScenarioEntry(
-        identity, name or identity, page, seeds, _argument(identity), tuple(facts), scenario.title,
-        scenario.description, scenario.source, toml_of(identity), scenario.group,
-    )  # fmt: skip

@@ -128,7 +128,10 @@
       spec.datasets = Object.fromEntries(Object.entries(data).map(([name, d]) => [name, expand(d, rows)]));
       // A layer without data would only spoil the scales.
       if (spec.layer) spec.layer = spec.layer.filter((l) => !l.data?.name || spec.datasets[l.data.name]?.length);
-      if (spec.layer && !spec.layer.length) return this.place.replaceChildren("There is nothing to show.");
+      const empty = data.curves && !spec.facet && !spec.datasets.curves?.length && !data.truth;
+      const none = Boolean(empty || (spec.layer && !spec.layer.length));
+      this.place.classList.toggle("none", none);
+      if (none) return this.place.replaceChildren("Curves of these rows are not kept.");
       if (given.equal) equal(spec, data.frame, width);
       delete spec.datasets.frame;
       this.view?.finalize();

@@ -67,10 +67,11 @@ simnav.write = {
   percent: (x) => (known(x) ? `${(100 * x).toFixed(1)} %` : missing),
   duration: simnav.duration,
   size: simnav.size,
-  ratio: (x) => (known(x) && x >= 0.999 * simnav.page.worst ? "failed" : simnav.number(x)),
+  ratio: (x) => (known(x) && x >= 0.999 * simnav.page.failure ? "failed" : simnav.number(x)),
   p: (x) => (!known(x) ? missing : x < 0.001 ? "< 0.001" : x.toFixed(3)),
   text: (x) => (x === null || x === undefined || x === "" ? missing : String(x)),
 };
+simnav.write.words = simnav.write.text;
 
 // -- the state in the address -------------------------------------------------------------------------
 
@@ -119,4 +120,3 @@ simnav.reader = () => {
   if (element) simnav.page = JSON.parse(element.textContent);
 };
 simnav.reader();
-simnav.page.worst ??= 1e6;

@@ -9,10 +9,10 @@
 
   const drawn = new Set();
 
-  const drawTrack = (track) => {
-    const panel = document.getElementById(`track-${track.key}`);
-    if (drawn.has(track.key)) return;
-    drawn.add(track.key);
+  const drawTrack = async ({ key, file, ...rest }) => {
+    if (drawn.has(key)) return;
+    drawn.add(key);
+    const panel = document.getElementById(`track-${key}`), track = file ? await simnav.read(file) : { key, ...rest };
     simnav.table(at("table", panel), track.table);
     const charts = at("charts", panel);
     for (const chart of track.charts) simnav.chart(charts, chart);
@@ -72,8 +72,8 @@
         other.tabIndex = chosen ? 0 : -1;
         document.getElementById(other.getAttribute("aria-controls")).hidden = !chosen;
       }
-      drawTrack(page.tracks.find((t) => t.key === tab.dataset.track));
       if (focus) tab.focus();
+      return drawTrack(page.tracks.find((t) => t.key === tab.dataset.track));
     };
     tabs.forEach((tab, k) => {
       tab.addEventListener("click", () => { state.set("track", tab.dataset.track); show(tab); });
@@ -86,13 +86,14 @@
       });
     });
     simnav.shown.rows = [];
-    if (tabs.length) show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]);
+    return tabs.length ? show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]) : null;
   };
 
   // -- a scenario -------------------------------------------------------------------------------------
 
   const scenario = () => {
-    simnav.rowswitch(at("rows"), Object.keys(page.rows), page.first);
+    if (page.drawn.length) simnav.rowswitch(at("rows"), page.drawn, page.first);
+    else simnav.shown.rows = page.first;
     simnav.table(at("table"), page.table);
     const host = at("charts");
     for (const chart of page.charts) simnav.chart(host, chart);
@@ -199,9 +200,9 @@
 
   const verdict = (found, a, b) => {
     if (!found.overall) return `${a} and ${b} have no run in common.`;
-    const { ratio, p, runs, better } = found.overall, count = found.rows.length;
+    const { ratio, p, runs, better } = found.overall, count = found.rows.length, level = write.p(p);
     const words = ratio < 1 ? `${write.number(100 * (1 - ratio))} % smaller` : `${write.number(100 * (ratio - 1))} % larger`;
-    return `Over ${count} scenarios and ${runs} runs the error of ${a} is ${words} than that of ${b} (p = ${write.p(p)}). ${a} is better on ${better} of ${count} scenarios.`;
+    return `Over ${count} scenarios and ${runs} runs the error of ${a} is ${words} than that of ${b} (p ${level.startsWith("<") ? level : `= ${level}`}). ${a} is better on ${better} of ${count} scenarios.`;
   };
 
   const estimator = () => {
@@ -211,6 +212,7 @@
     for (const chart of page.charts) simnav.chart(host, chart);
     if (!page.charts.length) host.closest("section").remove();
     for (const chart of page.worst?.charts ?? []) simnav.chart(at("worst"), chart);
+    if (page.losses?.shown) simnav.table(at("losses"), page.losses.table);
     const beside = at("compare");
     if (beside) {
       compared(page.data, page.plain.data).then((found) => {
@@ -283,7 +285,6 @@
   };
 
   const kinds = { index, scenario, estimator, compare, about: () => {} };
-  kinds[page.kind]?.();
   at("print")?.addEventListener("click", () => simnav.print());
-  document.body.dataset.ready = "true";
+  Promise.resolve(kinds[page.kind]?.()).then(() => { document.body.dataset.ready = "true"; });
 }

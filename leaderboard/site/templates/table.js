@@ -135,7 +135,7 @@
 
     classes(column) {
       const right = ["number", "integer", "percent", "duration", "size", "ratio", "p"].includes(column.kind);
-      return [right ? "n" : "", column.kind === "name" ? "name" : ""].join(" ").trim() || null;
+      return [right ? "n" : "", column.kind === "name" ? "name" : "", column.kind === "words" ? "wrap" : ""].join(" ").trim() || null;
     }
 
     draw() {

@@ -7,11 +7,15 @@ import io
 import math
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.site import site
 
 playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 
@@ -107,6 +111,18 @@ def test_the_overview_opens_quickly_without_the_chart_library(browser, folder):
     visit.context.close()
 
 
+def test_runs_that_are_lost_against_the_plain_ekf_are_listed_and_lead_to_the_run(visit, hostile):
+    rows = visit.open("compare.html").evaluate("simnav.page.rows")
+    page = visit.open(rows[hostile]["page"])
+    assert "On 33 of 36 runs its error is more than 1.5 times that of ekf" in page.inner_text("body")
+    assert "on 3 it failed" in page.inner_text("body")
+    assert len(visit.names("[data-losses]")) == 25
+    page.click("[data-losses] tbody tr:first-child th a")
+    page.wait_for_selector("body[data-ready]")
+    assert "row=" in page.evaluate("location.hash")
+    assert page.evaluate("[simnav.write.ratio(1000), simnav.write.ratio(900)]") == ["failed", "900"]
+
+
 def test_tables_sort_filter_and_search_and_the_address_keeps_it(visit, hostile):
     page = visit.open("index.html#track=other")
     assert visit.names() == ["sw-fgo", "ekf", hostile, "inertial", "oracle"]
@@ -195,6 +211,21 @@ def test_a_page_is_printed_with_all_its_charts_in_the_colours_of_paper(browser, 
     visit.close()
 
 
+def test_where_no_curves_are_kept_the_charts_say_so(browser, results, tmp_path, catalogued):
+    few = [replace(r, series={}) for r in results]
+    site.build(few, rank(few), tmp_path / "site")
+    visit = Visit(browser, tmp_path / "site")
+    page = visit.open(f"{catalogued}.html")
+    assert page.get_by_text("Curves over time are kept of 0 of the").is_visible()
+    assert page.locator(".rowswitch .chip").count() == 0
+    page.locator("[data-run]").scroll_into_view_if_needed()
+    page.locator("#chart-run-horizontal").scroll_into_view_if_needed()
+    page.wait_for_selector("#chart-run-horizontal .vega.none")
+    assert page.inner_text("#chart-run-horizontal .vega") == "Curves of these rows are not kept."
+    chart(page, "track")
+    visit.close()
+
+
 def test_one_run_has_its_track_and_the_command_that_repeats_it(visit, catalogued):
     page = visit.open(f"{catalogued}.html#row=sw-fgo&seed=0")
     page.locator("[data-run]").scroll_into_view_if_needed()
@@ -266,7 +297,7 @@ def test_weights_of_scenarios_move_the_places(visit):
     page = visit.open("index.html#track=other")
     table = "#track-other [data-weights]"
     page.locator(f"{table} input[type=number]").nth(0).scroll_into_view_if_needed()
-    scores = page.evaluate("simnav.page.tracks.find((t) => t.key === 'other').ratios")
+    scores = page.evaluate("simnav.read('track-other').then((t) => t.ratios)")
     page.locator(f"{table} input[type=number]").nth(0).fill("0")
     expected = sorted(scores, key=lambda row: scores[row]["made-up-two-v3"])
     assert visit.names(table) == expected

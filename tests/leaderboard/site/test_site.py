@@ -36,11 +36,22 @@ def no_charts(monkeypatch):
 
     def nothing(entry, ranking, *_):
         page = {"kind": "scenario", "reference": "", "remarks": [], "unsuitable": [], "failures": [], "instruments": [],
-                "provisional": False, "sweeps": []}  # fmt: skip
+                "provisional": False, "sweeps": [], "rows": {}, "drawn": []}  # fmt: skip
         return ScenarioData(page, {}, (), ())
 
     monkeypatch.setattr(site, "scenario_data", nothing)
     monkeypatch.setattr(site, "bundle", lambda: "")
+
+
+def tracks_of(folder: Path) -> list[dict[str, Any]]:
+    """The tracks of the board: the first is in its page, each other in a file."""
+    first, *others = data_of(folder / "index.html")["tracks"]
+    return [first, *(file_data(folder, track["file"]) for track in others)]
+
+
+def file_data(folder: Path, name: str) -> dict[str, Any]:
+    """What a page reads from a file."""
+    return json.loads((folder / "data" / f"{name}.js").read_text().partition(" = ")[2].rstrip(";\n"))
 
 
 class Page(HTMLParser):
@@ -138,7 +149,7 @@ def test_static_tables_and_images_are_accessible(folder):
 
 
 def test_the_board_has_a_table_a_track_and_shows_identical_oracles_once(folder, catalogued, hostile):
-    tracks = {t["key"]: t for t in data_of(folder / "index.html")["tracks"]}
+    tracks = {t["key"]: t for t in tracks_of(folder)}
     assert len(tracks) == 2
     rows = {row["name"]["text"]: row for row in tracks["other"]["table"]["rows"]}
     assert list(rows)[:3] == ["sw-fgo", "ekf", hostile]
@@ -222,8 +233,7 @@ def test_every_chart_is_drawn_for_print(folder, results, tmp_path, catalogued):
     some = ("timeline", "horizontal", "rmse", "stanford")
     for chart in (c for c in data_of(folder / f"{catalogued}.html")["charts"] if c["name"] in some):
         if chart["data"] is None:
-            text = (folder / "data" / f"{chart.pop('file')}.js").read_text()
-            chart["data"] = json.loads(text.partition(" = ")[2].rstrip(";\n"))
+            chart["data"] = file_data(folder, chart.pop("file"))
         made = charts.Chart(**chart)
         svg, png = write_figure(filled(made, ["ekf", "sw-fgo"]), tmp_path / made.name)
         drawn = svg.read_text()
@@ -335,6 +345,43 @@ def test_where_everything_failed_there_is_still_a_site(results, tmp_path):
     (row,) = data_of(index)["tracks"][0]["table"]["rows"]
     assert row["failed"]["text"] == "12 of 12"
     assert "too slow" in Page(tmp_path / "site" / f"{SCENARIOS[0]}.html").text
+
+
+def test_charts_offer_only_rows_of_which_curves_are_kept(results, tmp_path):
+    few = [r for r in results if r.scenario == SCENARIOS[0]]
+    ranking = rank(few)
+    best = next(r.estimator for r in ranking.scenario(SCENARIOS[0]).rows if not r.reference)
+    without = [replace(r, series={}) if r.estimator == best else r for r in few]
+    site.build(without, ranking, tmp_path / "site")
+    page = data_of(tmp_path / "site" / f"{SCENARIOS[0]}.html")
+    assert best in page["rows"]
+    assert best not in {*page["drawn"], *page["first"]}
+    assert set(page["first"]) <= set(page["drawn"])
+    words = f"Curves over time are kept of {len(page['drawn'])} of the {len(page['rows'])} rows."
+    assert words in Page(tmp_path / "site" / f"{SCENARIOS[0]}.html").text
+
+
+def test_two_processes_write_the_same_site_as_one(results, tmp_path, monkeypatch):
+    monkeypatch.setattr(site, "_WORTH_PROCESSES", 1)
+    ranking = rank(results)
+    written = []
+    for workers in (1, 2):
+        site.build(results, ranking, tmp_path / str(workers), workers=workers)
+        files = sorted(p for p in (tmp_path / str(workers)).rglob("*") if p.suffix in (".html", ".js", ".csv"))
+        texts = {str(p.relative_to(tmp_path / str(workers))): p.read_text() for p in files}
+        written.append({n: re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC", "", text) for n, text in texts.items()})
+    assert written[0] == written[1]
+
+
+def test_a_scenario_that_fails_in_another_process_ends_the_build(results, tmp_path, monkeypatch):
+    def fails(*_):
+        raise RuntimeError("no page today")
+
+    monkeypatch.setattr(site, "_WORTH_PROCESSES", 1)
+    monkeypatch.setattr(site, "scenario_data", fails)
+    with pytest.raises(RuntimeError, match="no page today"):
+        site.build(results, rank(results), tmp_path / "site", workers=2)
+    assert not list(tmp_path.iterdir())
 
 
 def test_every_estimator_of_simnav_has_a_family():

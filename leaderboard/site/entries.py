@@ -1,0 +1,75 @@
+"""The estimators and scenarios of a site: what each is called, and where its page and its data are."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.site.content import EstimatorEntry, Fact, ScenarioEntry
+from simnav.leaderboard.site.facts import catalogued, estimator_facts, toml_of
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.ranking.runs import Runs
+
+__all__ = ["argument_of", "entries"]
+
+
+def entries(
+    runs: Mapping[str, Mapping[str, Runs]], ranking: Ranking
+) -> tuple[dict[str, EstimatorEntry], dict[str, ScenarioEntry]]:
+    """Of all results: estimators by label, the best first, and scenarios by id.
+
+    Parameters
+    ----------
+    runs : mapping of str to mapping
+        By scenario and estimator.
+    ranking : Ranking
+        Of the same results.
+    """
+    references = {label for by in runs.values() for label, found in by.items() if found.results[0].reference}
+    ranked = [row.estimator for track in ranking.tracks for row in track.rows]
+    taken = {"index", "compare", "about"}
+    estimators = {}
+    for label in dict.fromkeys([*ranked, *sorted({label for by in runs.values() for label in by})]):
+        stem = _slug(label, taken)
+        estimators[label] = EstimatorEntry(
+            label, f"estimator-{stem}.html", f"row-{stem}", f"runs-{stem}", label in references, estimator_facts(label)
+        )
+    return estimators, {s: _scenario(s, by, f"{_slug(s, taken)}.html") for s, by in runs.items()}
+
+
+def argument_of(identity: str) -> str:
+    """A scenario as it is asked for: one that is not in the catalogue came from a file."""
+    return identity if catalogued(identity) is not None else f"{identity.rpartition('-v')[0]}.toml"
+
+
+def _scenario(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry:
+    """What is known of a scenario, from the catalogue where it is in there."""
+    name, _, version = identity.rpartition("-v")
+    seeds = tuple(sorted({r.seed for runs in by.values() for r in runs.results}))
+    facts = [Fact("Version", version or "–"), Fact("Seeds", len(seeds))]
+    scenario = catalogued(identity)
+    if scenario is None:
+        return ScenarioEntry(identity, name or identity, page, seeds, argument_of(identity), tuple(facts))
+    facts += [Fact("Duration", tables.duration(scenario.duration)), Fact("Step", tables.duration(scenario.step))]
+    if scenario.instruments:
+        facts.append(Fact("Instruments", len(scenario.instruments)))
+    if scenario.faults:
+        facts.append(Fact("Faults", len(scenario.faults)))
+    return ScenarioEntry(
+        identity, name or identity, page, seeds, argument_of(identity), tuple(facts), scenario.title,
+        scenario.description, scenario.source, toml_of(identity), scenario.group,
+    )  # fmt: skip
+
+
+def _slug(text: str, taken: set[str]) -> str:
+    """A file name for a label: plain characters only, and none twice."""
+    plain = re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:60] or "unnamed"
+    if plain in taken or plain != text:
+        plain += "-" + hashlib.blake2b(text.encode(), digest_size=3).hexdigest()
+    taken.add(plain)
+    return plain
