@@ -125,7 +125,7 @@ def append(path: Path, ranking: Ranking, results: Sequence[Result]) -> int:
     before = read(path)
     last = max((line.edition for line in before), default=0)
     lines = lines_of(ranking, results, last + 1)
-    if _told(lines) == _told(line for line in before if line.edition == last):
+    if _facts(lines) == _facts(line for line in before if line.edition == last):
         return last
     write_whole(path, _text([*before, *lines]))
     return last + 1
@@ -139,7 +139,7 @@ def editions(lines: Iterable[Line]) -> dict[int, list[Line]]:
     return dict(sorted(found.items(), reverse=True))
 
 
-def _told(lines: Iterable[Line]) -> list[tuple[str, ...]]:
+def _facts(lines: Iterable[Line]) -> list[tuple[str, ...]]:
     """What lines say apart from the number of their edition."""
     return [tuple(_cells(line)[1:]) for line in lines]
 

@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from simnav.leaderboard import standard
 from simnav.leaderboard.profiles import load
+from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.site.entries import entries
+from simnav.leaderboard.site.overview import overview
 from simnav.leaderboard.standard import history, readme
 from simnav.leaderboard.standard.currency import outdated
 from simnav.leaderboard.standard.publication import missing
 
 ROOT = Path(__file__).parents[3]
+LARGEST_PAGE = 500_000  # bytes, without the library that draws the charts
 
 pytestmark = pytest.mark.skipif(not standard.shipped(), reason="no standard result has been published yet")
+
+
+@pytest.fixture(scope="module")
+def results() -> list[Result]:
+    return store.load(standard.RESULTS, series=False)
+
+
+@pytest.fixture(scope="module")
+def ranking(results: list[Result]) -> Ranking:
+    return rank(results)
 
 
 def test_no_code_that_decides_a_number_has_changed_since() -> None:
@@ -24,10 +41,8 @@ def test_no_code_that_decides_a_number_has_changed_since() -> None:
     assert not found, "\n".join([*found.sentences(), "'simnav standard run' does it, then 'simnav standard publish'"])
 
 
-def test_the_readme_and_the_history_are_made_from_it() -> None:
-    results = store.load(standard.RESULTS, series=False)
+def test_the_readme_and_the_history_are_made_from_it(results: list[Result], ranking: Ranking) -> None:
     lacking = sum(missing(load(standard.PROFILE), results).values())
-    ranking = rank(results)
     text = readme.marked(ROOT / "README.md")
     assert text == readme.tables(ranking, results, len(results) + lacking)
     assert ("Preliminary" in text) == bool(lacking)
@@ -38,3 +53,14 @@ def test_the_readme_and_the_history_are_made_from_it() -> None:
     assert [(x.track, x.row, x.ranks) for x in lines] == [
         (x.track, x.row, x.ranks) for x in history.lines_of(ranking, results, last)
     ]
+
+
+def test_no_track_of_its_overview_is_too_large(results: list[Result], ranking: Ranking) -> None:
+    """The first track is in the page itself, each of the others in a file that is read with its tab."""
+    runs = group(results)
+    estimators, scenarios = entries(runs, ranking)
+    tracks = overview(ranking, estimators, scenarios, runs)
+    assert len(tracks) == len(ranking.tracks) > 5
+    sizes = {track["key"]: len(json.dumps(track)) for track in tracks}
+    assert max(sizes.values()) < 0.8 * LARGEST_PAGE, sizes  # the rest of the page: menus, styles, the text
+    assert sum(sizes.values()) > LARGEST_PAGE  # so they have to be apart
