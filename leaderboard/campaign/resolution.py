@@ -20,7 +20,7 @@ from simnav.leaderboard.campaign.fingerprint import estimator_source, named_file
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav
 from simnav.leaderboard.campaign.session_class import carry, is_session
-from simnav.leaderboard.campaign.training_runs import ranges_of, told_of
+from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 __all__ = ["resolve", "variant_of"]
@@ -49,7 +49,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         if comes_with_simnav(cls):
             with mistakes(EstimatorError):
                 made = request.make()
-            reference, learned_from = is_own_reference(cls.name), ranges_of(told_of(made))
+            reference, learned_from = is_own_reference(cls.name), ranges_of(declared_ranges(made))
             return replace(entrant, reference=reference, source=estimator_source(cls), learned_from=learned_from)
         with contextlib.suppress(Exception):  # the other process says what is wrong
             source = estimator_source(cls)  # here, where the text of a session is known
@@ -90,8 +90,8 @@ def _describe(entrant: Entrant) -> dict[str, Any]:
     """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
     made = entrant.make()
     cls = type(made)
-    told = {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
-    return {**told, "learned_from": told_of(made)}
+    facts = {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
+    return {**facts, "learned_from": declared_ranges(made)}
 
 
 def _import_estimators() -> None:

@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.scenario import Scenario
 
-__all__ = ["ranges_of", "require_unseen", "told_of"]
+__all__ = ["declared_ranges", "ranges_of", "require_unseen"]
 
 _MOST_RANGES = 1000
 
 
-def told_of(estimator: Estimator) -> Any:
+def declared_ranges(estimator: Estimator) -> Any:
     """What an estimator tells as `simnav.estimator.Estimator.learned_from`, as lists; a text where it is wrong."""
     try:
         return [[int(n) for n in pair] for pair in estimator.learned_from]
@@ -25,21 +25,21 @@ def told_of(estimator: Estimator) -> Any:
         return f"{type(error).__name__}: {error}"
 
 
-def ranges_of(told: Any) -> tuple[tuple[int, int], ...]:
-    """What `told_of` gave, perhaps in another process, checked.
+def ranges_of(given: Any) -> tuple[tuple[int, int], ...]:
+    """What `declared_ranges` gave, perhaps in another process, checked.
 
     Raises
     ------
     ValueError
         If it is not pairs of integers: one sentence.
     """
-    if not isinstance(told, list) or len(told) > _MOST_RANGES or not all(_is_pair(pair) for pair in told):
-        text = repr(told)
+    if not isinstance(given, list) or len(given) > _MOST_RANGES or not all(_is_pair(pair) for pair in given):
+        text = repr(given)
         text = text if len(text) <= 100 else f"{text[:100]}..."
         raise ValueError(
             f"learned_from should hold at most {_MOST_RANGES} pairs of integers (first, last), but is {text}"
         )
-    return tuple((int(first), int(last)) for first, last in told)
+    return tuple((int(first), int(last)) for first, last in given)
 
 
 def _is_pair(pair: object) -> bool:

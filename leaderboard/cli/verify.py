@@ -44,10 +44,10 @@ def command(
             from simnav.leaderboard import publishing
 
             with out.progress("repeating") as progress:
-                told = publishing.verify_bundle(
+                facts = publishing.verify_bundle(
                     results, key=key, sample=sample, present=present, tolerance=tolerance, progress=progress
                 )
-            _print(out, told)
+            _print(out, facts)
             return
         from simnav.leaderboard import interface
 

@@ -193,14 +193,14 @@ def write_bundle(
     """
     files: dict[str, Path | bytes] = {f"source/{name}": place for name, place in source.items()}
     files |= {f"results/{p.relative_to(results).as_posix()}": p for p in sorted(results.rglob("*")) if p.is_file()}
-    told = {
+    facts = {
         name: File(sha256=digest_of(place), size=place.stat().st_size)
         for name, place in files.items()
         if isinstance(place, Path)
     }
     contents = Contents(
         format=_FORMAT, title=title, benchmark=benchmark, profile=profile, runs=dict(runs), main=main,
-        estimators=tuple(estimators), requires=tuple(requires), files=told,
+        estimators=tuple(estimators), requires=tuple(requires), files=facts,
     )  # fmt: skip
     files[_MANIFEST] = (json.dumps(contents.model_dump(), indent=1, sort_keys=True) + "\n").encode()
     part = path.with_name(f".{path.name}.part")
@@ -236,8 +236,8 @@ def open_bundle(path: Path, folder: Path) -> Bundle:
             raise RequestError(f"{path.name}: {name} is missing")
         if name not in contents.files or name in strange:
             raise RequestError(f"{path.name}: {name} does not belong to it: {_MANIFEST} does not name it")
-        file, told = unpacked[name], contents.files[name]
-        if file.stat().st_size != told.size or digest_of(file) != told.sha256:
+        file, listed = unpacked[name], contents.files[name]
+        if file.stat().st_size != listed.size or digest_of(file) != listed.sha256:
             raise RequestError(f"{path.name}: {name} was changed: its hash is not that of {_MANIFEST}")
     _check_rows(contents, path.name, unpacked)
     return Bundle(path, digest_of(path), contents, folder)
@@ -247,9 +247,9 @@ def _contents(manifest: Path, what: str) -> Contents:
     try:
         if manifest.stat().st_size > _LONGEST:
             raise RequestError(f"{what}: {_MANIFEST} is too long")
-        told: Any = json.loads(manifest.read_bytes())
-        if isinstance(told, dict) and told.get("format", _FORMAT) != _FORMAT:
-            raise RequestError(f"{what} has format {told['format']!r:.20}; this version of simnav reads {_FORMAT}")
+        facts: Any = json.loads(manifest.read_bytes())
+        if isinstance(facts, dict) and facts.get("format", _FORMAT) != _FORMAT:
+            raise RequestError(f"{what} has format {facts['format']!r:.20}; this version of simnav reads {_FORMAT}")
         return Contents.model_validate_json(manifest.read_bytes())
     except ValidationError as error:
         first = error.errors()[0]

@@ -85,9 +85,9 @@ class Asked:
     @classmethod
     def read(cls, text: str) -> Asked:
         """From what `text` gave."""
-        told: dict[str, Any] = json.loads(text)
-        rows = [EstimatorRequest(**{**row, "search": tuple(row["search"])}) for row in told.pop("estimators")]
-        return cls(estimators=rows, runs=[Wanted(**w) for w in told.pop("runs")], **told)
+        facts: dict[str, Any] = json.loads(text)
+        rows = [EstimatorRequest(**{**row, "search": tuple(row["search"])}) for row in facts.pop("estimators")]
+        return cls(estimators=rows, runs=[Wanted(**w) for w in facts.pop("runs")], **facts)
 
 
 @dataclass(frozen=True)
@@ -163,8 +163,8 @@ def main() -> None:
         out.write(f"P {json.dumps([done, total, note])}\n")
         out.flush()
 
-    told = answer(Asked.read(sys.stdin.readline()), progress)
-    out.write(f"R {json.dumps(told)}\n")
+    facts = answer(Asked.read(sys.stdin.readline()), progress)
+    out.write(f"R {json.dumps(facts)}\n")
     out.flush()
 
 

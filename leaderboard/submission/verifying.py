@@ -303,7 +303,7 @@ def _repeated(
 ) -> tuple[list[Again], Provenance]:
     """Run the repetition in another process; returns the runs, and the provenance there."""
     command = [str(python), "-m", "simnav.leaderboard.submission.repetition"]
-    told: dict[str, Any] = {}
+    facts: dict[str, Any] = {}
     variables = search_variables(clean)
     if clean:  # kernels are kept by the path of their file, and this one will not be there again
         variables["SIMNAV_CACHE_DIR"] = str(home / "kernels")
@@ -323,16 +323,16 @@ def _repeated(
                     done, total, note = json.loads(line[2:])
                     report(done, total, note=note)
                 elif line.startswith("R "):
-                    told = json.loads(line[2:])
+                    facts = json.loads(line[2:])
             process.wait()
         except BaseException:
             process.kill()
             raise
         errors.seek(0)
         said = errors.read()[-2000:].decode(errors="replace").strip().splitlines()
-    if not told:
+    if not facts:
         raise RequestError(f"the runs could not be repeated: {(said or ['the process ended'])[-1]}")
-    return [Again(**run) for run in told["runs"]], Provenance.from_dict(told["provenance"])
+    return [Again(**run) for run in facts["runs"]], Provenance.from_dict(facts["provenance"])
 
 
 def _versions(where: Provenance) -> str:

@@ -24,7 +24,7 @@ __all__ = ["rows"]
 
 SCENARIO = "gnss-outage"
 ROWS = ("ekf", "gated-ekf", "iae", "sw-fgo")
-RUNS, WAITS = 4, 6
+RUNS, WAITS = 16, 8
 IDLE = 5.0  # for which the scheduler is watched without work [s]
 
 #: Stands for an estimator that has a core of its own, on a machine that has none free.

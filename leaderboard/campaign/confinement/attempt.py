@@ -155,7 +155,7 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
         If the server started no estimator process.
     """
     server.wait_until_ready()
-    begun, trial = time.monotonic(), None
+    started, trial = time.monotonic(), None
     session: Any = None
     try:
         with own_core() as core, server.session(entrant, limits, core) as session:
@@ -170,7 +170,7 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
         status, reason, trial = error.status, error.reason, None
     except InvalidOutputError as error:
         status, reason, trial = "invalid-output", str(error), None
-    seconds = time.monotonic() - begun
+    seconds = time.monotonic() - started
     if status == "out-of-memory" and trial is None and "memory" not in reason:
         reason = f"more than {limits.memory >> 20} MiB of memory was wanted"
     return Attempt(status, reason, trial, seconds, session.peak_memory if session else 0, server.confinement)
@@ -194,12 +194,12 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     """
     try:
         with server.session(entrant, limits) as session:
-            told = session.describe_estimator(entrant)
+            facts = session.describe_estimator(entrant)
             session.end()
     except (StoppedError, FailureError, InvalidOutputError) as error:
         raise ValueError(str(error)) from None
-    source, failure = told.get("source"), told.get("failure")
+    source, failure = facts.get("source"), facts.get("failure")
     if not isinstance(source, str) or not isinstance(failure, str) or len(source) > 200:
         raise ValueError("it says nothing of itself that can be read")
-    known = {"reference": told.get("reference") is True, "source": source, "failure": failure[:1000]}
-    return {**known, "learned_from": told.get("learned_from", [])}
+    known = {"reference": facts.get("reference") is True, "source": source, "failure": failure[:1000]}
+    return {**known, "learned_from": facts.get("learned_from", [])}

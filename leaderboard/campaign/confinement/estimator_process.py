@@ -15,7 +15,7 @@ from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
 from simnav.kinds import INSTRUMENTS
 from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, read_message, write_all
 from simnav.leaderboard.campaign.fingerprint import estimator_source
-from simnav.leaderboard.campaign.training_runs import told_of
+from simnav.leaderboard.campaign.training_runs import declared_ranges
 from simnav.plugins import load_plugin
 from simnav.trial import describe_failure
 from simnav.trial.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
@@ -80,12 +80,12 @@ class _Session:
             _seed(words)
             self._estimator = entrant.make()
             cls = type(self._estimator)
-            told = {"name": cls.name or cls.__name__, "needs": self._estimator.needs}
+            facts = {"name": cls.name or cls.__name__, "needs": self._estimator.needs}
         except MemoryError:
             return _failure("out-of-memory", "more memory was wanted")
         except BaseException as error:  # SystemExit and KeyboardInterrupt, too: it is not the user who asks
             return _failure("error", _described(error))
-        return answer(Up.DONE, json.dumps(told, default=repr).encode())
+        return answer(Up.DONE, json.dumps(facts, default=repr).encode())
 
     def describe(self, body: bytes) -> bytes:
         """What the estimator is, and why it cannot be made: by a wrong request, or in its constructor."""
@@ -94,18 +94,18 @@ class _Session:
             sys.path[:] = [*entrant.search, *path]
             _seed(words)
             cls = entrant.find()
-            told: dict[str, Any] = {"reference": bool(cls.reference), "source": estimator_source(cls), "failure": ""}
+            facts: dict[str, Any] = {"reference": bool(cls.reference), "source": estimator_source(cls), "failure": ""}
             try:
-                told["learned_from"] = told_of(entrant.make())
+                facts["learned_from"] = declared_ranges(entrant.make())
             except EstimatorError as error:
                 if error.__cause__ is None or entrant.parameters:  # what was asked for does not fit
                     raise
-                told["failure"] = str(error)
+                facts["failure"] = str(error)
             except Exception as error:
-                told["failure"] = _described(error)
+                facts["failure"] = _described(error)
         except BaseException as error:
             return _failure("error", _described(error))
-        return answer(Up.DONE, json.dumps(told).encode())
+        return answer(Up.DONE, json.dumps(facts).encode())
 
     def reset(self, body: bytes) -> bytes:
         try:

@@ -152,13 +152,13 @@ def _fork(
                 break
             time.sleep(0.001)
         killed = ended == "SIGKILL" and out_of_memory_kills() > before
-        told = {"ended": ended, "peak": max(0, peak), "verdict": verdict or ("killed" if killed else "")}
+        facts = {"ended": ended, "peak": max(0, peak), "verdict": verdict or ("killed" if killed else "")}
     finally:
         with contextlib.suppress(OSError):
             os.kill(child, signal.SIGKILL)
         kill_descendants()
         shutil.rmtree(temporary, ignore_errors=True)
-    control.sendall(json.dumps(told).encode())
+    control.sendall(json.dumps(facts).encode())
 
 
 def _become_estimator(

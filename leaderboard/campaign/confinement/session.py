@@ -187,8 +187,8 @@ class EstimatorServer:
         ServerError
         """
         if not self._ready:
-            told = self._receive(_START)
-            if told is None or not told.get("ready"):
+            facts = self._receive(_START)
+            if facts is None or not facts.get("ready"):
                 self._process.kill()
                 words = (self._process.stderr.read() if self._process.stderr else b"").decode(errors="replace")
                 last = words.strip().splitlines()[-1:] or ["it ended, or was silent for 15 minutes"]
@@ -250,13 +250,13 @@ class EstimatorServer:
         try:
             try:
                 socket.send_fds(self._control, [json.dumps({"fork": asked}).encode()], [down, up])
-                told = self._receive(_END)
+                facts = self._receive(_END)
             except OSError:
-                told = None
+                facts = None
             finally:
                 os.close(down)
                 os.close(up)
-            if told is None or "forked" not in told:
+            if facts is None or "forked" not in facts:
                 raise NoAnswerError("the process for estimators did not answer")
             session = RemoteSession(write, read, limits)
             try:
@@ -275,15 +275,15 @@ class EstimatorServer:
 
     def _finish(self, session: RemoteSession, *, gone: bool) -> StoppedError:
         """Have the process killed with all that it started; how it ended."""
-        told = None
+        facts = None
         with contextlib.suppress(OSError):
             self._control.sendall(json.dumps({"finish": True, "gone": gone}).encode())
-            told = self._receive(_END)
-        if told is None:
+            facts = self._receive(_END)
+        if facts is None:
             self._process.kill()
             return StoppedError("error", "it ended the process that had started it")
-        session.peak_memory = max(0, int(told.get("peak", 0)))
-        ended, verdict = str(told.get("ended") or "it closed its pipe"), told.get("verdict")
+        session.peak_memory = max(0, int(facts.get("peak", 0)))
+        ended, verdict = str(facts.get("ended") or "it closed its pipe"), facts.get("verdict")
         mebibytes = session.limits.memory >> 20
         if verdict == "out-of-memory":
             return StoppedError("out-of-memory", f"stopped when it had taken more than {mebibytes} MiB of memory")
@@ -341,8 +341,8 @@ class RemoteSession:
         simnav.trial.FailureError
             If that fails.
         """
-        told = _told(self._ask(Down.MAKE, (entrant, _search_path(), words)))
-        name, needs = told.get("name"), told.get("needs")
+        facts = _facts(self._ask(Down.MAKE, (entrant, _search_path(), words)))
+        name, needs = facts.get("name"), facts.get("needs")
         self.needs = tuple(tuple(n) if isinstance(n, list) else n for n in needs) if isinstance(needs, list) else needs
         self.name = name[:200] if isinstance(name, str) else ""
 
@@ -354,7 +354,7 @@ class RemoteSession:
         simnav.trial.FailureError
             If it cannot be found.
         """
-        return _told(self._ask(Down.DESCRIBE, (entrant, _search_path(), [0])))
+        return _facts(self._ask(Down.DESCRIBE, (entrant, _search_path(), [0])))
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
         """Hand over start and datasheets."""
@@ -372,7 +372,7 @@ class RemoteSession:
         for first in range(0, len(packets), _STEPS):
             began, held = clock(), 0
             for packet in [b"".join(packets[k]) for k in range(first, min(first + _STEPS, len(packets)))]:
-                begun = clock()
+                started = clock()
                 try:
                     sent = write(self._write, packet)
                 except BlockingIOError:
@@ -391,7 +391,7 @@ class RemoteSession:
                 now = clock()
                 if reply[0] != ESTIMATE:
                     self._refuse(reply)
-                put(reply, now - begun)
+                put(reply, now - started)
                 held += len(reply)
                 if held > _BYTES or now - began > _STALL / 1e3:
                     log.settle()
@@ -419,7 +419,7 @@ class RemoteSession:
         if self._silent:
             return
         try:
-            names = _told(self._ask(Down.END, None)).get("libraries", [])
+            names = _facts(self._ask(Down.END, None)).get("libraries", [])
         except (FailureError, InvalidOutputError):
             return
         if isinstance(names, list):
@@ -506,15 +506,15 @@ def _search_path() -> list[str]:
     return [os.path.abspath(entry) for entry in sys.path]
 
 
-def _told(reply: bytes) -> dict[str, Any]:
+def _facts(reply: bytes) -> dict[str, Any]:
     """The JSON object in an answer."""
     try:
-        told = json.loads(reply[ANSWER.size :] or b"{}")
+        facts = json.loads(reply[ANSWER.size :] or b"{}")
     except (ValueError, RecursionError):
-        told = None
-    if not isinstance(told, dict):
+        facts = None
+    if not isinstance(facts, dict):
         raise InvalidOutputError("the answer is not in the form of an estimate")
-    return told
+    return facts
 
 
 def _trajectory(body: bytes) -> NavigationStates:

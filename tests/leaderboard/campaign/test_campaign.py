@@ -201,10 +201,10 @@ def test_killed_at_any_moment_it_ends_with_the_same_table(tmp_path: Path) -> Non
     estimator(tmp_path, "raises", "import time; time.sleep(0.002); assert measurements.time < 15.0")
     undisturbed, disturbed = tmp_path / "undisturbed", tmp_path / "disturbed"
     requests = [EstimatorRequest(str(tmp_path / f"{n}.py"), label=n) for n in ("last_fix", "raises")]
-    run_campaign([scenario()], requests, range(12), undisturbed, workers=1)
+    run_campaign([scenario()], requests, range(8), undisturbed, workers=1)
     chance = random.Random(20)
-    for kill in range(3):  # the audit kills a hundred times
-        process = start(tmp_path, disturbed, 12)
+    for kill in range(2):  # the audit kills a hundred times
+        process = start(tmp_path, disturbed, 8)
         if kill > 0:  # the first wherever it is in its start
             there = results_in(disturbed)
             wait_until(lambda there=there: results_in(disturbed) > there, process)  # type: ignore[misc]
@@ -212,8 +212,8 @@ def test_killed_at_any_moment_it_ends_with_the_same_table(tmp_path: Path) -> Non
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
         process.wait(60)
-    assert start(tmp_path, disturbed, 12).wait(200) == 0
-    assert len(rows(undisturbed)) == 24
+    assert start(tmp_path, disturbed, 8).wait(200) == 0
+    assert len(rows(undisturbed)) == 16
     assert rows(disturbed) == rows(undisturbed)
     assert not list((disturbed / "results").glob("*.parquet"))
 
@@ -260,7 +260,7 @@ def test_an_interrupt_of_the_user_ends_it_at_once_and_keeps_all(tmp_path: Path) 
     deaf = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); time.sleep(0.03)"
     estimator(tmp_path, "raises", deaf)
     out = tmp_path / "out"
-    process = start(tmp_path, out, 10)
+    process = start(tmp_path, out, 6)
     wait_until(lambda: results_in(out) >= 2, process)
     assert process.poll() is None
     os.killpg(process.pid, signal.SIGINT)
@@ -268,9 +268,9 @@ def test_an_interrupt_of_the_user_ends_it_at_once_and_keeps_all(tmp_path: Path) 
     assert process.wait(30) != 0
     assert time.monotonic() - begun < 10.0
     kept = len(rows(out))
-    assert 2 <= kept < 20
-    assert start(tmp_path, out, 10).wait(200) == 0
-    assert len(rows(out)) == 20
+    assert 2 <= kept < 12
+    assert start(tmp_path, out, 6).wait(200) == 0
+    assert len(rows(out)) == 12
 
 
 def test_a_folder_of_the_users_own_does_not_hide_ours(tmp_path: Path) -> None:

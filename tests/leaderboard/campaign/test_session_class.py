@@ -46,14 +46,14 @@ class LastFix(simnav.Estimator):
         return simnav.Estimate(measurements.time, self.position.copy())
 """)
 cell(3, """
-report = simnav.campaign("pond.toml", [LastFix, "gnss-only"], runs=2, output="out", workers=2, oracle=False)
+report = simnav.campaign("pond.toml", [LastFix, "gnss-only"], runs=2, output="out", workers=@WORKERS@, oracle=False)
 print(report.summary.computed, *sorted({(r.estimator, r.status) for r in report.results}))
 """)
 '''
 
 
-def notebook(folder: Path, gain: str = "1.0") -> str:
-    text = NOTEBOOK.replace("@GAIN@", gain)
+def notebook(folder: Path, gain: str = "1.0", workers: int = 1) -> str:
+    text = NOTEBOOK.replace("@GAIN@", gain).replace("@WORKERS@", str(workers))
     (folder / "pond.toml").write_text(POND)
     # From standard input: there is no file that a worker could import.
     done = subprocess.run([sys.executable, "-"], input=text, cwd=folder, capture_output=True, text=True)
@@ -63,7 +63,7 @@ def notebook(folder: Path, gain: str = "1.0") -> str:
 
 def test_a_class_of_a_notebook_takes_part_and_is_known_by_its_text(tmp_path: Path) -> None:
     good = "('gnss-only', 'ok') ('last-fix', 'ok')"
-    assert notebook(tmp_path) == f"4 {good}"
+    assert notebook(tmp_path, workers=2) == f"4 {good}"
     assert notebook(tmp_path) == f"0 {good}"  # another session, the same text
     assert notebook(tmp_path, gain="0.5") == f"2 {good}"  # a value that a function of the session uses
     rmse = {r.estimator: r.scores["horizontal_rmse"] for r in store.load(tmp_path / "out")}
@@ -182,11 +182,11 @@ def test_what_cannot_be_sent_is_told(session: Any) -> None:
 
 def test_a_class_of_a_module_beside_the_script_takes_part(tmp_path: Path):
     """Its folder is on the path as an empty entry, and the estimator runs in another folder."""
-    text = NOTEBOOK.replace("@GAIN@", "1.0")
+    text = NOTEBOOK.replace("@GAIN@", "1.0").replace("@WORKERS@", "1")
     parts = [part.strip() for part in text.split('"""')[1::2]]
     (tmp_path / "beside.py").write_text(f"{parts[0]}\n{parts[1]}\n")
     (tmp_path / "pond.toml").write_text(POND)
-    script = "import simnav\nfrom beside import LastFix\n" + parts[2].replace("workers=2", "workers=1")
+    script = "import simnav\nfrom beside import LastFix\n" + parts[2]
     done = subprocess.run([sys.executable, "-"], input=script, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "('last-fix', 'ok')" in done.stdout

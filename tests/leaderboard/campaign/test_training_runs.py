@@ -15,7 +15,7 @@ from simnav.leaderboard.campaign.campaign import run_campaign
 from simnav.leaderboard.campaign.confinement.estimator_process import _Session
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.training_runs import ranges_of, require_unseen, told_of
+from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, require_unseen
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scenario import load
 
@@ -62,7 +62,7 @@ def test_a_training_family_has_random_streams_of_its_own() -> None:
 def test_the_policy_that_comes_along_is_not_scored_on_its_training_voyages(tmp_path: Path) -> None:
     policy = EstimatorRequest("policy-ekf")
     family = load("training-gnss-faults")
-    assert ranges_of(told_of(make("policy-ekf")))[0][0] == family.root(training_seed(0))
+    assert ranges_of(declared_ranges(make("policy-ekf")))[0][0] == family.root(training_seed(0))
     with pytest.raises(RequestError, match=f"'policy-ekf' has learned from .* seed {FIRST_TRAINING_SEED} of"):
         run_campaign([family], [policy], [3, FIRST_TRAINING_SEED], tmp_path / "out", workers=1)
 
