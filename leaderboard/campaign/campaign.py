@@ -38,7 +38,7 @@ from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.resolution import resolve, variant_of
 from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.campaign.training_runs import require_unseen
-from simnav.leaderboard.campaign.worker import Unit, run_unit
+from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -305,7 +305,7 @@ def run_campaign(
 
     def unit(scenario: Scenario, seed: int, missing: tuple[tuple[Entrant, str], ...]) -> Unit:
         return Unit(
-            scenario, seed, missing, recordings[scenario.id], simulator, path, limit(scenario), memory, os.getpid(),
+            scenario, seed, missing, recordings[scenario.id], simulator, path, limit(scenario), memory,
             scores, scoring, keep_trials, covariance_interval, chosen, seal,
         )  # fmt: skip
 
@@ -439,7 +439,13 @@ def _parallel(
         stack.enter_context(warnings.catch_warnings())
         for message in (".*tasks which were still being processed.*", "A worker stopped while some jobs.*"):
             warnings.filterwarnings("ignore", message, UserWarning)
-        parallel = Parallel(return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
+        parallel = Parallel(
+            return_as="generator_unordered",
+            batch_size=1,
+            pre_dispatch="2*n_jobs",
+            initializer=start_worker,
+            initargs=(os.getpid(),),
+        )
         outcomes = parallel(delayed(run_unit)(index, unit) for index, unit in units)
         stack.callback(outcomes.close)
         yield from outcomes

@@ -52,7 +52,7 @@ def _run_remotely(index: int, unit: Unit) -> tuple[int, Counter[str], dict[str, 
     with _one_at_a_time:
         folder = _workspace()
         try:
-            _, statuses = run_unit(index, replace(unit, folder=folder, parent=0))
+            _, statuses = run_unit(index, replace(unit, folder=folder))
             files = [p for p in folder.rglob("*") if p.is_file() and p.parent != folder]
             return index, statuses, {p.relative_to(folder).as_posix(): p.read_bytes() for p in files}
         finally:

@@ -10,7 +10,6 @@ has neither; there only time is limited.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import faulthandler
 import math
 import multiprocessing
@@ -27,7 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from simnav.leaderboard.campaign.confinement.limits import out_of_memory_kills
+from simnav.leaderboard.campaign.confinement.limits import die_with_parent, out_of_memory_kills
 
 __all__ = ["Outcome", "isolate"]
 
@@ -206,7 +205,7 @@ def _serve(
 ) -> None:
     """The child's whole life."""
     os.setsid()  # Ctrl-C in the terminal is not for us, and we are killed with all that we start
-    _die_with_parent(parent)
+    die_with_parent(parent)
     signal.set_wakeup_fd(-1)
     faulthandler.disable()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
@@ -248,15 +247,6 @@ def _limit(timeout: float, memory: int) -> Callable[[], None]:
             resource.setrlimit(resource.RLIMIT_DATA, before)
 
     return lift
-
-
-def _die_with_parent(parent: int) -> None:
-    """A worker that is killed takes its child with it (Linux; elsewhere the limit of CPU time ends it)."""
-    if _LINUX:
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
-    if os.getppid() != parent:
-        os._exit(1)
 
 
 def _resident(process: int) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import os
 import signal
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
 
-__all__ = ["Unit", "run_unit"]
+__all__ = ["Unit", "run_unit", "start_worker"]
 
 _prepared = False
 _PATIENCE = 5.0  # for a result that is being stored when the worker must end [s]
@@ -56,8 +55,6 @@ class Unit:
         Of an estimator [s].
     memory : int
         Of an estimator [bytes].
-    parent : int
-        Process that runs the campaign and started the worker; 0 where something else started it.
     scores : OwnScores
         Scores of others that workers must be sent.
     scoring : str
@@ -80,7 +77,6 @@ class Unit:
     folder: Path
     timeout: float
     memory: int
-    parent: int
     scores: OwnScores = field(default_factory=OwnScores)
     scoring: str = ""
     keep_trials: bool = False
@@ -122,15 +118,25 @@ class Unit:
         )
 
 
+def start_worker(parent: int) -> None:
+    """Prepare a process that was started for a campaign, before it is given any run.
+
+    Ctrl-C is left to the campaign's process, and the worker ends when that process is gone. A campaign can die between
+    the start of a worker and the first run that it sends.
+
+    Parameters
+    ----------
+    parent : int
+        Process that runs the campaign.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
 def _prepare_worker(unit: Unit) -> None:
-    """Once a worker: Ctrl-C is the parent's business, and it ends when the parent is gone."""
+    """Start the server of estimators, and load the kernels of this process once."""
     global _prepared
     first, _prepared = not _prepared, True
-    if first and os.getpid() != unit.parent:  # before anything that takes time
-        with contextlib.suppress(ValueError):  # not in the main thread of a Dask worker
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-        if unit.parent:
-            threading.Thread(target=_end_with, args=(unit.parent,), daemon=True).start()
     if unit.confinement != "none":
         prepare(unit.confinement, unit.hidden)  # loads its kernels while the first recording is made
     if first:

@@ -167,8 +167,22 @@ main(*sys.argv[1:])
 """
 
 
-def start(folder: Path, results: Path, seeds: int) -> subprocess.Popen[bytes]:
-    (folder / "run.py").write_text(RUN)
+PAUSE = """
+import os, signal
+from joblib.externals.loky.process_executor import ProcessPoolExecutor
+
+start_workers = ProcessPoolExecutor._adjust_process_count
+
+def start_workers_and_stop(executor):
+    start_workers(executor)
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+ProcessPoolExecutor._adjust_process_count = start_workers_and_stop
+"""
+
+
+def start(folder: Path, results: Path, seeds: int, before: str = "") -> subprocess.Popen[bytes]:
+    (folder / "run.py").write_text(before + RUN)
     (folder / "tiny.toml").write_text(SHIP)
     return subprocess.Popen(
         [sys.executable, str(folder / "run.py"), str(folder), str(results), str(seeds)],
@@ -231,12 +245,14 @@ def _descendants(process: int) -> set[int]:
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are listed in /proc")
-@pytest.mark.parametrize("loading", [True, False], ids=["while workers load", "while estimators run"])
-def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path, loading: bool) -> None:
+@pytest.mark.parametrize("moment", ["before a run is sent", "while workers load", "while estimators run"])
+def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path, moment: str) -> None:
     estimator(tmp_path)
     estimator(tmp_path, "raises", "import time; time.sleep(1.0)")
-    process = start(tmp_path, tmp_path / "out", 12)
-    if loading:
+    process = start(tmp_path, tmp_path / "out", 12, PAUSE if moment == "before a run is sent" else "")
+    if moment == "before a run is sent":
+        wait_until(lambda: Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[0] == "T", process)
+    elif moment == "while workers load":
         wait_until(lambda: len(_descendants(process.pid)) >= 4, process)  # two workers, and what joblib starts
     else:
         wait_until(lambda: results_in(tmp_path / "out") >= 1, process)
