@@ -137,10 +137,10 @@ class ImuHypothesis(Hypothesis):
 
 def uncertain_start(start: InitialState) -> InitialState:
     """The same start with larger sigmas."""
-    sigma = np.sqrt(np.diag(start.covariance))
-    larger = sigma * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
-    larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), sigma[6:]))
-    factor = np.divide(larger, sigma, out=np.ones(9), where=sigma > 0.0)
+    told = np.sqrt(np.diag(start.covariance))
+    larger = told * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
+    larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), told[6:]))
+    factor = np.divide(larger, told, out=np.ones(9), where=told > 0.0)
     return replace(start, covariance=start.covariance * np.outer(factor, factor))
 
 

@@ -209,12 +209,6 @@ def test_a_poor_imu_does_without_a_noisy_receiver_for_no_minute():
     assert error.max() < 30.0
 
 
-def test_good_fixes_are_not_excluded_for_a_filter_that_does_not_know_its_heading():
-    """A MEMS unit without a compass: the filter without fixes is wrong by several of its own sigmas."""
-    _, _, excluded = run(record(load("training-mems"), 305))
-    assert not any(excluded)
-
-
 @pytest.mark.parametrize("seed", [319, 331])
 def test_bad_fixes_after_an_outage_are_not_blamed_on_another_instrument(seed: int):
     """The position has grown uncertain, so that the filter without the log or the compass follows the bad fixes."""
