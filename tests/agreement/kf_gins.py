@@ -41,9 +41,9 @@ def imu_and_fixes(scenario: Scenario) -> Scenario:
     Raises
     ------
     ValueError
-        If there is not one IMU and one receiver, or the fixes come with a time-correlated error that KF-GINS lacks.
+        If it has no IMU ``imu`` or no receiver ``gnss``.
     """
-    kept = {name: sheet for name, sheet in scenario.instruments.items() if name in ("imu", "gnss")}
+    kept = {name: spec for name, spec in scenario.instruments.items() if name in ("imu", "gnss")}
     if len(kept) != 2:
         raise ValueError(f"{scenario.name}: an IMU 'imu' and a receiver 'gnss' are needed")
     return scenario.model_copy(update={"instruments": kept})

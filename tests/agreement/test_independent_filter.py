@@ -20,11 +20,12 @@ from simnav.geometry import earth
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.types import Array, TriadDatasheet
+from tests.agreement.kf_gins import imu_and_fixes
 
 STATE = ["lat", "lon", "alt", "VN", "VE", "VD", "roll", "pitch", "heading"]
 
 
-def imu_and_fixes(duration: float) -> Scenario:
+def equal_in_all_directions(duration: float) -> Scenario:
     """``open-sea`` with IMU and fixes only, equally good in all directions: their filter takes one sigma for three."""
     scenario = load("open-sea").with_values(
         {
@@ -33,7 +34,7 @@ def imu_and_fixes(duration: float) -> Scenario:
             "instruments.gnss.sigma_m": [1.5, 1.5, 1.5],
         }
     )
-    return scenario.model_copy(update={"instruments": {k: scenario.instruments[k] for k in ("imu", "gnss")}})
+    return imu_and_fixes(scenario)
 
 
 def triad(sheet: TriadDatasheet) -> inertial_sensor.EstimationModel:
@@ -72,7 +73,7 @@ def theirs(recording: Recording, times: Array) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("seed", [1000, 1001])
 def test_the_filter_of_another_author_has_the_same_estimates(seed: int):
-    recording = simnav.record(imu_and_fixes(60.0), seed)
+    recording = simnav.record(equal_in_all_directions(60.0), seed)
     trial = simnav.run_trial(make("ekf"), recording)
     now = slice(0, -1)  # theirs ends before its last measurement
     times, ours = trial.time[now], trial.position[now]
