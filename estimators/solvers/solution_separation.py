@@ -40,13 +40,14 @@ A datasheet may be wrong. Whatever is said here of a NIS is said of its ratio to
 seconds, where this is above 1.
 
 With an IMU, the start may be wrong, too: for the first `_ALIGNMENT` seconds one more filter runs, with all
-measurements and with `_WRONG_START` times the sigmas that were told for the start. Where a test fails in this time, and
-this filter agrees with all instruments and is apart from the main one, it takes its place, since a fault rarely begins
-with the run. Until it agrees with all instruments, nothing is excluded.
+measurements and with `_WRONG_START` times the sigmas that are stated for the start. Where a test fails in this time,
+and this filter agrees with all instruments and is apart from the main one, it takes its place, since a fault rarely
+begins with the run. Until it agrees with all instruments, nothing is excluded.
 
-A sub-filter that does not know its heading is not compared (`KNOWN_HEADING`), and begins anew. While the main filter
-does not know it, and for `_ALIGNMENT` seconds of a run that begins so, nothing is tested, and all begin anew from the
-main filter; there also as long as the main filter disagrees with an instrument, for ``horizon`` seconds at most.
+A sub-filter that does not know its heading is not compared (`SUB_HEADING`, `KNOWN_HEADING`), and begins anew. While
+the main filter does not know it, and for `_ALIGNMENT` seconds of a run that begins so, nothing is tested, and all begin
+anew from the main filter; there also as long as the main filter disagrees with an instrument, for ``horizon`` seconds
+at most.
 
 Single gross errors are none of this: a measurement that the main filter finds improbable (`_NOT_GROSS`) is left out of
 all filters, unless its instrument goes on so for `_PATIENCE` seconds.
@@ -99,7 +100,7 @@ from simnav.estimators.solvers.hypotheses import (
     uncertain_start,
 )
 from simnav.estimators.solvers.iterated import Iteration
-from simnav.estimators.solvers.separation import KNOWN_HEADING, SeparationTest
+from simnav.estimators.solvers.separation import KNOWN_HEADING, SUB_HEADING, SeparationTest
 from simnav.estimators.solvers.state_difference import difference
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
 
@@ -199,8 +200,8 @@ class SolutionSeparation(Solver):
     ) -> WatchedFilter:
         one = WatchedFilter(copy.deepcopy(self._choice), exclusion, None if start is None else Iteration(_ITERATED_DEG))
         one.row, one.mean_nis = self.label, {}
-        told, instruments = self._begin_with
-        one.reset(start or told, disturbed_imu(instruments) if disturbed else instruments)
+        stated, instruments = self._begin_with
+        one.reset(start or stated, disturbed_imu(instruments) if disturbed else instruments)
         return one
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -231,9 +232,9 @@ class SolutionSeparation(Solver):
         self._count = dict.fromkeys(self._names, 0)
         self._alternatives: dict[str, Hypothesis] = {}
         self._time = start.time
-        told = np.sqrt(np.diag(start.covariance))
+        sigma = np.sqrt(np.diag(start.covariance))
         self._unbelieving: Hypothesis | None = None
-        if self._inertial and told[8] <= KNOWN_HEADING:
+        if self._inertial and sigma[8] <= KNOWN_HEADING:
             self._unbelieving = Hypothesis(_START, self._filter(start=uncertain_start(start)), start.time)
         self._disturbed = False
         witnesses = self._inertial and len(set(self._group.values())) > 1
@@ -289,7 +290,7 @@ class SolutionSeparation(Solver):
         ratios |= self._doubt_of_the_imu(measurements, estimate, fading)
         aligning = self._unbelieving is not None and _START not in ratios
         lost = self._searching and since < self._horizon and self._disagreement(self._main) > _AGREEMENT
-        if lost or self._disturbed or not self._test.applies(estimate):
+        if lost or self._disturbed or not self._test.applies(estimate, KNOWN_HEADING):
             self._settled = max(self._settled, measurements.time + _RECENT)
         diagnostics = dict(estimate.diagnostics)
         faulty = None
@@ -324,7 +325,9 @@ class SolutionSeparation(Solver):
             return {}
         sub.estimate = sub.filter.update(measurements)
         sub.filter.watch(sub.estimate, self._components, fading)
-        return {_START: self._test.largest([sub], estimate)} if self._disagreement(sub.filter) <= _AGREEMENT else {}
+        if self._disagreement(sub.filter) > _AGREEMENT:
+            return {}
+        return {_START: self._test.largest([sub], estimate, KNOWN_HEADING)}
 
     def _other_opinion_of_the_imu(self) -> ImuHypothesis:
         """The filter that does not believe the IMU or, while the main one does not, a filter that does."""
@@ -346,9 +349,9 @@ class SolutionSeparation(Solver):
         out, without = self._exclusion.excluded, imu.exclusion.excluded
         agrees = self._disagreement(imu.filter, without) <= _AGREEMENT
         more_is_wrong = without != out and not (agrees and without <= out) and self._time - self._trial >= _COASTING
-        if more_is_wrong or not self._test.applies(imu.estimate):
+        if more_is_wrong or not self._test.applies(imu.estimate, KNOWN_HEADING):
             self._begin_imu(imu, without=out)
-        return {_IMU: self._test.largest([imu], estimate)} if agrees else {}
+        return {_IMU: self._test.largest([imu], estimate, KNOWN_HEADING)} if agrees else {}
 
     def _begin_imu(self, imu: ImuHypothesis, without: Collection[str]) -> None:
         """Begin the filter of the other opinion anew from the main one, without some instruments."""
@@ -417,6 +420,8 @@ class SolutionSeparation(Solver):
         assert sub is not None
         assert sub.covariance is not None
         assert estimate.covariance is not None
+        if not self._test.applies(sub, SUB_HEADING):
+            return False
         without, with_it = (sqrt(float(p[0, 0] + p[1, 1])) for p in (sub.covariance, estimate.covariance))
         apart = difference(sub, estimate)
         return without <= max(hypot(float(apart[0]), float(apart[1])) / _TELLING, _WORSE * with_it)
@@ -444,7 +449,7 @@ class SolutionSeparation(Solver):
 
     def _separation(self, name: str, estimate: Estimate) -> float:
         """The largest separation over its threshold, of both sub-filters without an instrument."""
-        largest = self._test.largest(self._pairs[name], estimate)
+        largest = self._test.largest(self._pairs[name], estimate, SUB_HEADING)
         return largest if self._inertial or name in self._group else largest / _TURNING
 
     def _exclude(self, name: str) -> Estimate:
@@ -544,7 +549,8 @@ class SolutionSeparation(Solver):
         """Begin sub-filters anew that have come of age."""
         for name in self._names:
             for sub in self._pairs[name]:
-                old = time - sub.start >= self._horizon or time < self._settled or not self._test.applies(sub.estimate)
+                old = time - sub.start >= self._horizon or time < self._settled
+                old = old or not self._test.applies(sub.estimate, KNOWN_HEADING)
                 if old and name not in self._exclusion.excluded:
                     self._begin(sub, time, None)
         self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.start < 2.0 * self._horizon}
