@@ -10,8 +10,8 @@ What is learnt for each fix is ``ln(true variance / datasheet's)``, mean of nort
 white noise that the measurement really had, and of the faults that touched it the variance of multipath and the second
 moment of a gross error: their statistics, not the values that they took.
 
-While data are gathered, the ship's filter uses that true variance: so the innovations are those of a filter that is
-told well, which is where the network brings its own.
+While data are gathered, the ship's filter uses that true variance: so the innovations are those of a filter that knows
+its noise well, which is where the network brings its own.
 """
 
 from __future__ import annotations
@@ -207,14 +207,14 @@ class Data:
     outputs: Array
 
 
-def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> Data:
+def gather(seeds: Iterable[int], progress: Callable[[int], None] | None = None) -> Data:
     """Sail all training voyages on each seed, and gather.
 
     Parameters
     ----------
     seeds : iterable of int
         Seeds of the voyages.
-    told : callable, optional
+    progress : callable, optional
         Called after each run with the number of runs so far.
 
     Raises
@@ -245,8 +245,8 @@ def gather(seeds: Iterable[int], told: Callable[[int], None] | None = None) -> D
                 inputs[name] += rows
             outputs += teacher.outputs
             done += 1
-            if told is not None:
-                told(done)
+            if progress is not None:
+                progress(done)
     return Data({name: np.array(rows) for name, rows in inputs.items()}, np.array(outputs))
 
 
@@ -255,7 +255,7 @@ def train(
     data: Data,
     validation: Data,
     passes: int = 200,
-    told: Callable[[int, float, float], None] | None = None,
+    progress: Callable[[int, float, float], None] | None = None,
 ) -> tuple[Parameters, Learned]:
     """Learn the network of a set of features; nothing in it is random.
 
@@ -267,7 +267,7 @@ def train(
         Inputs and targets for training and for validation.
     passes : int
         At most so many.
-    told : callable, optional
+    progress : callable, optional
         As of `learn`.
 
     Returns
@@ -285,7 +285,7 @@ def train(
         Sugeno.grid(x.shape[1]),
     )
     checked = known.scale(validation.inputs[features]), validation.outputs
-    learned = learn(known.network, (known.scale(x), y), checked, passes=passes, told=told)
+    learned = learn(known.network, (known.scale(x), y), checked, passes=passes, progress=progress)
     record = {
         "passes": len(learned.training),
         "best": learned.best + 1,

@@ -141,7 +141,7 @@ def learn(
     passes: int = 200,
     step: float = 0.01,
     patience: int = 20,
-    told: Callable[[int, float, float], None] | None = None,
+    progress: Callable[[int, float, float], None] | None = None,
 ) -> Learned:
     """Learn by the hybrid rule; there is nothing random in it.
 
@@ -157,7 +157,7 @@ def learn(
         Length of the first step of the premises.
     patience : int
         It ends after so many passes without a better validation error.
-    told : callable, optional
+    progress : callable, optional
         Called after each pass with its number, training and validation error.
 
     Raises
@@ -177,8 +177,8 @@ def learn(
     for k in range(passes):
         errors.append(rmse(network, *data))
         checks.append(rmse(network, *validation))
-        if told is not None:
-            told(k, errors[-1], checks[-1])
+        if progress is not None:
+            progress(k, errors[-1], checks[-1])
         if checks[-1] < lowest * (1.0 - GAIN):
             best, at, lowest = network, k, checks[-1]
         if k - at >= patience:

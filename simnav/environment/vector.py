@@ -213,8 +213,8 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
                 self._over[i] = truncated[i]
                 if truncated[i] and self.autoreset_mode == AutoresetMode.SAME_STEP:
                     info = {**info, "final_obs": self._last[i], "final_info": info}
-                    self._last[i], begun = env.reset()
-                    info, self._over[i] = {**info, **begun}, False
+                    self._last[i], first = env.reset()
+                    info, self._over[i] = {**info, **first}, False
             elif self.autoreset_mode == AutoresetMode.NEXT_STEP:
                 self._last[i], info = env.reset()
                 self._over[i] = False

@@ -107,11 +107,11 @@ class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Obse
     def observation(self, observation: Observation) -> Observation:
         """The observation in the units of the class."""
         start, end = observation["interval"].tolist()
-        told = self._start
-        sigmas = np.sqrt(np.diag(told.covariance))
+        initial = self._start
+        sigmas = np.sqrt(np.diag(initial.covariance))
         out = {
             "interval": np.array([end / 3600.0, end - start]),
-            "start": np.concatenate([told.velocity / SPEED, told.attitude, sigmas]),
+            "start": np.concatenate([initial.velocity / SPEED, initial.attitude, sigmas]),
         }
         for name, entry in observation.items():
             if not isinstance(entry, dict):

@@ -153,7 +153,7 @@ def _time_a_round(
     running: dict[str, tuple[Estimator, list[Measurements]]] = {}
     for label, factory in estimators.items():
         try:
-            running[label] = (_begun(factory(), recording), [copy.deepcopy(packet) for packet in steps])
+            running[label] = (_reset(factory(), recording), [copy.deepcopy(packet) for packet in steps])
         except Exception as error:
             failed[label] = _failure(label, error)
     for first in range(0, len(steps), TURN):
@@ -161,15 +161,15 @@ def _time_a_round(
             estimator, packets = running[label]
             try:
                 for k in range(first, min(first + TURN, len(steps))):
-                    begun = process_time()
+                    started = process_time()
                     estimator.update(packets[k])
-                    least[label][k] = min(least[label][k], process_time() - begun)
+                    least[label][k] = min(least[label][k], process_time() - started)
             except Exception as error:
                 failed[label] = _failure(label, error)
                 del running[label]
 
 
-def _begun(estimator: Estimator, recording: Recording) -> Estimator:
+def _reset(estimator: Estimator, recording: Recording) -> Estimator:
     lack = lacking(estimator.needs, recording.instruments)
     if lack:
         raise UnsuitableScenario(lack)
