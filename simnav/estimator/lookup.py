@@ -72,6 +72,8 @@ def find(name_or_path: str) -> type[Estimator]:
     path = re.fullmatch(r"(.*\.py)(?::(\w+))?", name_or_path, flags=re.DOTALL)
     if path:
         return class_in_file(Path(path[1]), path[2])
+    if name_or_path.endswith(".toml"):
+        raise EstimatorError(f"{name_or_path!r} is a scenario and no estimator; an estimator is a name or a file my.py")
     return registered(name_or_path)
 
 

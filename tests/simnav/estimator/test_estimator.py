@@ -6,7 +6,6 @@ import importlib.metadata
 import subprocess
 import sys
 import textwrap
-import time
 import warnings
 from pathlib import Path
 from typing import Any, Literal
@@ -67,9 +66,7 @@ def test_the_reference_estimators_are_found_without_compiling_or_heavy_imports()
         "assert not heavy, heavy; assert {'ekf', 'ship-ekf', 'inertial', 'dead-reckoning', 'gnss-only', 'oracle'}"
         " <= set(found), found"
     )
-    begun = time.perf_counter()
     subprocess.run([sys.executable, "-c", code], check=True)
-    assert time.perf_counter() - begun < 5.0  # a second on a quiet machine
 
 
 def test_register_and_make():
@@ -184,6 +181,11 @@ def test_an_estimator_without_parameters_says_so():
 def test_unknown_names_suggest_the_nearest():
     with pytest.raises(EstimatorError, match=r"unknown estimator 'ship-ekv'; did you mean 'ship-ekf'"):
         find("ship-ekv")
+
+
+def test_a_scenario_is_no_estimator():
+    with pytest.raises(EstimatorError, match=r"'channel.toml' is a scenario and no estimator"):
+        find("channel.toml")
 
 
 def test_collisions_are_refused_and_placed():
