@@ -16,6 +16,7 @@ from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.noise import normalised_square
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.state_difference import difference
 from simnav.types import Array, Estimate, InitialState, Instruments
 
 __all__ = ["Exclusion", "Hypothesis", "ImuHypothesis", "WatchedFilter", "disturbed_imu", "uncertain_start"]
@@ -30,6 +31,8 @@ _TILT, _HEADING = radians(5.0), radians(45.0)
 _DISTURBED_RATE, _DISTURBED_FORCE = radians(0.5), 0.5
 #: Factor by which the variances of position and velocity grow where the motion is not believed.
 _LOOSENED = 100.0
+#: Index of the bias of the vertical gyroscope in the state of an inertial model.
+_VERTICAL_GYROSCOPE = 11
 #: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
 _NOT_GROSS, _PATIENCE = 0.99999, 5.0
 #: Of a good measurement to agree with the filter.
@@ -120,12 +123,69 @@ class WatchedFilter(KalmanEstimator):
 
 @dataclass
 class Hypothesis:
-    """That an instrument or the start is wrong: its name, the filter without it, when it began, and its estimate."""
+    """That an instrument or the start is wrong.
+
+    Attributes
+    ----------
+    name : str
+        Of the instrument, the start or the IMU.
+    filter : WatchedFilter
+        The filter without it.
+    start : float
+        When it began, from which its age counts [s].
+    estimate : Estimate or None
+        Its estimate.
+    origin : Estimate or None
+        The estimate with which it began.
+    drift : float
+        Variance of the bias of the vertical gyroscope with which it began [(rad/s)^2].
+    """
 
     name: str
     filter: WatchedFilter
     start: float
     estimate: Estimate | None = None
+    origin: Estimate | None = None
+    drift: float = 0.0
+
+    def begin(self, other: WatchedFilter, estimate: Estimate, start: float) -> None:
+        """Begin anew from the state of another filter, with its estimate."""
+        self.filter.take_over(other)
+        self.estimate = self.origin = estimate
+        self.start = start
+        variances = other.covariance.diagonal()
+        self.drift = float(variances[_VERTICAL_GYROSCOPE]) if len(variances) > _VERTICAL_GYROSCOPE else 0.0
+
+    def turn(self, noise: float) -> None:
+        """State the heading no better than gyroscopes alone know it, because nothing else measures it.
+
+        Without fixes and compass, measurements say nothing of the heading: the track since the filter began can be
+        turned about its first point. A Kalman filter that linearises along its own estimate still takes some noise for
+        information on it (G. P. Huang, A. I. Mourikis and S. I. Roumeliotis, *Observability-based rules for designing
+        consistent EKF SLAM estimators*, Int. J. of Robotics Research 29(5), 2010). So the variance of the heading is
+        at least that of dead reckoning since then, ::
+
+            P_psi(0) + P_bias(0) t^2 + N^2 t,
+
+        and what is missing is added along this turn, to position and velocity, too.
+
+        Parameters
+        ----------
+        noise : float
+            Of the vertical gyroscope: random walk of the angle, squared [rad^2/s].
+        """
+        one, origin = self.estimate, self.origin
+        assert one is not None
+        assert origin is not None
+        assert one.covariance is not None
+        assert origin.covariance is not None
+        age = one.time - origin.time
+        missing = origin.covariance[8, 8] + self.drift * age**2 + noise * age - one.covariance[8, 8]
+        if missing > 0.0:
+            since = difference(one, origin)
+            assert one.velocity is not None
+            turn = np.array([-since[1], since[0], 0.0, -one.velocity[1], one.velocity[0], 0.0, 0.0, 0.0, 1.0])
+            one.covariance = one.covariance + missing * np.outer(turn, turn)
 
 
 @dataclass
@@ -137,10 +197,10 @@ class ImuHypothesis(Hypothesis):
 
 def uncertain_start(start: InitialState) -> InitialState:
     """The same start with larger sigmas."""
-    told = np.sqrt(np.diag(start.covariance))
-    larger = told * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
-    larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), told[6:]))
-    factor = np.divide(larger, told, out=np.ones(9), where=told > 0.0)
+    stated = np.sqrt(np.diag(start.covariance))
+    larger = stated * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
+    larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), stated[6:]))
+    factor = np.divide(larger, stated, out=np.ones(9), where=stated > 0.0)
     return replace(start, covariance=start.covariance * np.outer(factor, factor))
 
 

@@ -9,10 +9,8 @@ which gives the threshold ``T_i = K_fa sqrt(P_i - P_0)`` of position, velocity a
 may not know its heading well. A heading error of ``K_fa`` sigmas changes a velocity v by ``v (K_fa sigma)^2 / 2`` at
 second order, which is in no covariance. So this is added to the threshold of the horizontal velocity.
 
-A filter that knows its heading to no better than a limit is not tested: filters differ by their linearisation there.
-The limit is `SUB_HEADING` for a filter without an instrument. Without fixes, nothing corrects the heading of a poor IMU
-on a vessel without a compass. Such a filter is less certain of its heading by the minute, and its error is several
-times what its covariance says. A filter that uses all instruments has the limit `KNOWN_HEADING`.
+A filter that knows its heading to no better than `KNOWN_HEADING` is not tested: filters differ by their linearisation
+there.
 """
 
 from __future__ import annotations
@@ -26,16 +24,14 @@ from simnav.estimators.solvers.hypotheses import Hypothesis
 from simnav.estimators.solvers.state_difference import difference
 from simnav.types import Array, Estimate
 
-__all__ = ["KNOWN_HEADING", "SUB_HEADING", "SeparationTest"]
+__all__ = ["KNOWN_HEADING", "SeparationTest"]
 
 #: Components whose separation is tested: position, velocity, heading.
 _TESTED = (0, 1, 2, 3, 4, 5, 8)
 #: Part of the main filter's sigma that a separation may have by linearisation alone.
 _LINEARISATION = 0.1
-#: Standard deviation of the heading up to which a filter with all instruments is compared with another one [rad].
+#: Standard deviation of the heading up to which a filter is compared with another one [rad].
 KNOWN_HEADING = radians(5.0)
-#: The same of a filter without an instrument [rad].
-SUB_HEADING = radians(1.5)
 
 
 class SeparationTest:
@@ -57,11 +53,11 @@ class SeparationTest:
         self.factor = float(norm.isf(0.5 * false_alarm / (max(filters, 1) * len(_TESTED))))
         self._inertial = inertial
 
-    def applies(self, estimate: Estimate | None, limit: float) -> bool:
-        """Whether a filter knows its heading well enough to be compared: no worse than a standard deviation [rad]."""
+    def applies(self, estimate: Estimate | None) -> bool:
+        """Whether a filter knows its heading well enough to be compared."""
         if not self._inertial or estimate is None or estimate.covariance is None:
             return True
-        return float(estimate.covariance[8, 8]) <= limit**2
+        return float(estimate.covariance[8, 8]) <= KNOWN_HEADING**2
 
     def variances(self, sub: Hypothesis, estimate: Estimate) -> tuple[Array, Array]:
         """Variances of a sub-filter's nine components, and of its separation from the main filter's estimate."""
@@ -75,7 +71,7 @@ class SeparationTest:
             apart[3:5] += (0.5 * self.factor * own[8] * estimate.velocity[:2]) ** 2
         return own, apart
 
-    def largest(self, subs: Iterable[Hypothesis], estimate: Estimate, limit: float) -> float:
+    def largest(self, subs: Iterable[Hypothesis], estimate: Estimate) -> float:
         """The largest separation over its threshold, of all tested components of the sub-filters.
 
         Parameters
@@ -84,13 +80,11 @@ class SeparationTest:
             The sub-filters.
         estimate : Estimate
             The main filter's estimate.
-        limit : float
-            Standard deviation of the heading up to which a sub-filter is compared [rad].
         """
         mask, largest = estimate.mask(), 0.0
         for sub in subs:
             assert sub.estimate is not None
-            if not self.applies(sub.estimate, limit):
+            if not self.applies(sub.estimate):
                 continue
             apart = difference(sub.estimate, estimate).tolist()
             _, variance = self.variances(sub, estimate)

@@ -44,10 +44,10 @@ measurements and with `_WRONG_START` times the sigmas that are stated for the st
 and this filter agrees with all instruments and is apart from the main one, it takes its place, since a fault rarely
 begins with the run. Until it agrees with all instruments, nothing is excluded.
 
-A sub-filter that does not know its heading is not compared (`SUB_HEADING`, `KNOWN_HEADING`), and begins anew. While
-the main filter does not know it, and for `_ALIGNMENT` seconds of a run that begins so, nothing is tested, and all begin
-anew from the main filter; there also as long as the main filter disagrees with an instrument, for ``horizon`` seconds
-at most.
+A sub-filter with neither a fix nor a compass states its heading no better than by dead reckoning (`Hypothesis.turn`).
+One that does not know its heading (`KNOWN_HEADING`) is not compared, and begins anew. While the main filter does not
+know it, and for `_ALIGNMENT` seconds of a run that begins so, nothing is tested, and all begin anew from the main
+filter; there also as long as the main filter disagrees with an instrument, for ``horizon`` seconds at most.
 
 Single gross errors are none of this: a measurement that the main filter finds improbable (`_NOT_GROSS`) is left out of
 all filters, unless its instrument goes on so for `_PATIENCE` seconds.
@@ -83,7 +83,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Iterable, Mapping
-from math import exp, hypot, sqrt
+from math import exp, hypot, radians, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -100,7 +100,7 @@ from simnav.estimators.solvers.hypotheses import (
     uncertain_start,
 )
 from simnav.estimators.solvers.iterated import Iteration
-from simnav.estimators.solvers.separation import KNOWN_HEADING, SUB_HEADING, SeparationTest
+from simnav.estimators.solvers.separation import KNOWN_HEADING, SeparationTest
 from simnav.estimators.solvers.state_difference import difference
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
 
@@ -136,6 +136,9 @@ _ITERATED_DEG, _ALIGNMENT = 1.0, 60.0
 #: With an IMU, an instrument is excluded only if the separation of the position is this multiple of the sigma of the
 #: filter without it, or if that sigma is at most the other multiple of the main filter's.
 _TELLING, _WORSE = 3.0, 10.0
+#: The last fix or log is excluded only if the filter without it knows its heading to this standard deviation [rad].
+#: Otherwise a poor IMU, which is left alone, is soon lost.
+_ALONE = radians(1.5)
 #: Where the filter that is chosen has a mean NIS above this, more is wrong than one instrument: perhaps the IMU.
 _NOTHING_AGREES = 2.5
 #: Names of the start and of the IMU among the suspects.
@@ -216,14 +219,18 @@ class SolutionSeparation(Solver):
         self._names = [name for name, sheet in instruments.items() if self._main.model.observes(sheet)]
         self._components = {name: len(KINDS[instruments[name].kind].errors) for name in self._names}
         self._pairs = {name: [Hypothesis(name, self._filter(), start.time) for _ in range(2)] for name in self._names}
-        for _, younger in self._pairs.values():
-            younger.start = start.time - 0.5 * self._horizon  # so that the two come of age in turns
         hypotheses = len(self._names) + 1
         self._test = SeparationTest(self.false_alarm, len(self._names), self._inertial)
         self._quiet = float(norm.isf(0.25 * self.risk / hypotheses))
         share = self.risk / (2.0 * hypotheses * self.fault_probability)
         self._missed = float(norm.isf(min(share, 0.5)))
         self._group = fixes_and_logs(instruments)
+        blind = {n for n in self._names if instruments[n].role in ("velocity", "depth") and not self._group.get(n)}
+        self._heading_sources = set(self._names) - blind
+        self._gyroscope_noise = instruments.imu.gyroscope.random_walk**2 if instruments.imu is not None else 0.0
+        for pair in self._pairs.values():
+            for sub, begin in zip(pair, (start.time, start.time - 0.5 * self._horizon), strict=True):
+                self._begin(sub, begin, None)
         self._coasting: float | None = None
         self._settled = start.time
         self._heard = dict.fromkeys(self._names, start.time)
@@ -283,6 +290,8 @@ class SolutionSeparation(Solver):
             packet = Measurements(measurements.start, measurements.time, measurements.imu, left)
             sub.estimate = sub.filter.update(packet)
             sub.filter.watch(sub.estimate, self._components, fading)
+            if self._inertial and self._heading_sources <= without:
+                sub.turn(self._gyroscope_noise)
         flagged = list(estimate.flagged)
         ratios = {name: self._separation(name, estimate) for name in self._names if name not in out}
         most = max(ratios.values(), default=0.0)  # the start is blamed only where instruments contradict each other
@@ -290,7 +299,7 @@ class SolutionSeparation(Solver):
         ratios |= self._doubt_of_the_imu(measurements, estimate, fading)
         aligning = self._unbelieving is not None and _START not in ratios
         lost = self._searching and since < self._horizon and self._disagreement(self._main) > _AGREEMENT
-        if lost or self._disturbed or not self._test.applies(estimate, KNOWN_HEADING):
+        if lost or self._disturbed or not self._test.applies(estimate):
             self._settled = max(self._settled, measurements.time + _RECENT)
         diagnostics = dict(estimate.diagnostics)
         faulty = None
@@ -327,7 +336,7 @@ class SolutionSeparation(Solver):
         sub.filter.watch(sub.estimate, self._components, fading)
         if self._disagreement(sub.filter) > _AGREEMENT:
             return {}
-        return {_START: self._test.largest([sub], estimate, KNOWN_HEADING)}
+        return {_START: self._test.largest([sub], estimate)}
 
     def _other_opinion_of_the_imu(self) -> ImuHypothesis:
         """The filter that does not believe the IMU or, while the main one does not, a filter that does."""
@@ -349,9 +358,9 @@ class SolutionSeparation(Solver):
         out, without = self._exclusion.excluded, imu.exclusion.excluded
         agrees = self._disagreement(imu.filter, without) <= _AGREEMENT
         more_is_wrong = without != out and not (agrees and without <= out) and self._time - self._trial >= _COASTING
-        if more_is_wrong or not self._test.applies(imu.estimate, KNOWN_HEADING):
+        if more_is_wrong or not self._test.applies(imu.estimate):
             self._begin_imu(imu, without=out)
-        return {_IMU: self._test.largest([imu], estimate, KNOWN_HEADING)} if agrees else {}
+        return {_IMU: self._test.largest([imu], estimate)} if agrees else {}
 
     def _begin_imu(self, imu: ImuHypothesis, without: Collection[str]) -> None:
         """Begin the filter of the other opinion anew from the main one, without some instruments."""
@@ -420,7 +429,8 @@ class SolutionSeparation(Solver):
         assert sub is not None
         assert sub.covariance is not None
         assert estimate.covariance is not None
-        if not self._test.applies(sub, SUB_HEADING):
+        carried = [n for n in self._speaking(self._group) if n not in {name, *self._exclusion.excluded}]
+        if float(sub.covariance[8, 8]) > (KNOWN_HEADING if carried else _ALONE) ** 2:
             return False
         without, with_it = (sqrt(float(p[0, 0] + p[1, 1])) for p in (sub.covariance, estimate.covariance))
         apart = difference(sub, estimate)
@@ -449,7 +459,7 @@ class SolutionSeparation(Solver):
 
     def _separation(self, name: str, estimate: Estimate) -> float:
         """The largest separation over its threshold, of both sub-filters without an instrument."""
-        largest = self._test.largest(self._pairs[name], estimate, SUB_HEADING)
+        largest = self._test.largest(self._pairs[name], estimate)
         return largest if self._inertial or name in self._group else largest / _TURNING
 
     def _exclude(self, name: str) -> Estimate:
@@ -550,16 +560,15 @@ class SolutionSeparation(Solver):
         for name in self._names:
             for sub in self._pairs[name]:
                 old = time - sub.start >= self._horizon or time < self._settled
-                old = old or not self._test.applies(sub.estimate, KNOWN_HEADING)
+                old = old or not self._test.applies(sub.estimate)
                 if old and name not in self._exclusion.excluded:
                     self._begin(sub, time, None)
         self._alternatives = {n: sub for n, sub in self._alternatives.items() if time - sub.start < 2.0 * self._horizon}
 
     def _begin(self, sub: Hypothesis, time: float, estimate: Estimate | None) -> None:
         """Begin a sub-filter from the main filter's state."""
-        sub.filter.take_over(self._main)
-        sub.start = time
-        sub.estimate = estimate if estimate is not None else self._main.model.estimate(self._main.covariance)
+        known = estimate if estimate is not None else self._main.model.estimate(self._main.covariance)
+        sub.begin(self._main, known, time)
 
     def _protection_level(self, estimate: Estimate) -> float:
         """The horizontal protection level [m]."""
