@@ -167,7 +167,8 @@ class Hypothesis:
 
             P_psi(0) + P_bias(0) t^2 + N^2 t,
 
-        and what is missing is added along this turn, to position and velocity, too.
+        with the variances of the heading and of the gyroscope's bias when it began, the time t since then, and the
+        random walk N of the angle. What is missing is added along this turn, to position and velocity, too.
 
         Parameters
         ----------

@@ -29,6 +29,11 @@ __all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here"]
 BENCHMARK = "simnav-bench 1.0"
 
 _LIBRARIES = ("simnav", "numpy", "numba", "gtsam")
+#: What of a checkout can decide a result: not its docs, its tests or the results that it publishes.
+_CODE = (
+    "pyproject.toml", "simnav", "estimators", "scenarios", "leaderboard",
+    ":(exclude)leaderboard/standard/results", ":(exclude)leaderboard/standard/history.csv",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,7 @@ class Provenance:
     commit : str
         Of the checkout of simnav; empty where simnav is installed without one.
     dirty : bool or None
-        Whether files of that checkout differed from the commit; None without a checkout.
+        Whether the code of that checkout differed from the commit; None without a checkout.
     simnav, python, numpy, numba, gtsam : str
         Versions.
     system : str
@@ -144,7 +149,7 @@ def _on(date: str, confinement: str, seal: str) -> Provenance:
 
 
 def _checkout(folder: Path) -> tuple[str, bool | None]:
-    """Commit of a checkout, and whether its files differ from it; ("", None) where the folder is none."""
+    """Commit of a checkout, and whether its code differs from it; ("", None) where the folder is none."""
     if not (folder / ".git").exists():
         return "", None
 
@@ -153,8 +158,8 @@ def _checkout(folder: Path) -> tuple[str, bool | None]:
         return subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=True).stdout
 
     try:
-        commit = git("rev-parse", "HEAD").strip()
-        return commit, bool(git("--no-optional-locks", "status", "--porcelain", "--untracked-files=no").strip())
+        changes = git("--no-optional-locks", "status", "--porcelain", "--untracked-files=no", "--", *_CODE)
+        return git("rev-parse", "HEAD").strip(), bool(changes.strip())
     except (OSError, subprocess.SubprocessError):
         return "", None
 

@@ -50,14 +50,22 @@ def test_a_checkout_is_named_by_its_commit_and_whether_it_was_changed(tmp_path: 
 
     assert provenance._checkout(tmp_path) == ("", None)
     git("init", "-q")
-    (tmp_path / "code.py").write_text("a = 1\n")
+    published = ("docs/page.md", "README.md", "leaderboard/standard/history.csv", "leaderboard/standard/results/a.json")
+    code = ("simnav/world/world.py", "estimators/rows/ekf.py", "leaderboard/campaign/runs.py", "pyproject.toml")
+    for name in (*published, *code):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("a = 1\n")
     git("add", ".")
     git("commit", "-qm", "first")
     assert provenance._checkout(tmp_path) == (git("rev-parse", "HEAD"), False)
     (tmp_path / "notes.txt").write_text("no part of it")
-    assert provenance._checkout(tmp_path)[1] is False
-    (tmp_path / "code.py").write_text("a = 2\n")
-    assert provenance._checkout(tmp_path)[1] is True
+    for name in published:
+        (tmp_path / name).write_text("a = 2\n")
+    assert provenance._checkout(tmp_path)[1] is False  # what decides no result
+    for name in code:
+        (tmp_path / name).write_text("a = 2\n")
+        assert provenance._checkout(tmp_path)[1] is True
+        git("checkout", "-q", name)
 
 
 def test_a_folder_keeps_each_provenance_once(folder: Path):
