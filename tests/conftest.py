@@ -46,3 +46,40 @@ def plugins(monkeypatch):
         registry_._classes = before
     for name in [name for name in sys.modules if is_file_module(name)]:
         del sys.modules[name]
+
+
+@pytest.fixture
+def windows(monkeypatch):
+    """The figures that a program opens in windows, in their order; the display only seems to be there.
+
+    A canvas counts how often it is asked to draw and to react.
+    """
+    from matplotlib import pyplot
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    class Canvas(FigureCanvasAgg):
+        required_interactive_framework = "none that there is"
+        asked = flushed = 0
+
+        def draw_idle(self):
+            self.asked += 1
+
+        def flush_events(self):
+            self.flushed += 1
+
+    class Window(Figure):
+        shown = False
+
+        def show(self, warn=True):
+            self.shown = True
+
+    opened = []
+
+    def figure():
+        opened.append(Window())
+        Canvas(opened[-1])
+        return opened[-1]
+
+    monkeypatch.setattr(pyplot, "figure", figure)
+    return opened

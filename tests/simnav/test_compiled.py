@@ -137,13 +137,11 @@ def test_no_place_to_write_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert compiled.cache_directory() is None
     compiled._cache_directory.cache_clear()
 
-    @compiled.kernel("f8(f8)")
     def twice(x: float) -> float:
         return 2.0 * x
 
     monkeypatch.setattr(compiled, "cache_directory", lambda: None)
-    assert twice(4.0) == 8.0
-    compiled._kernels.remove(twice)
+    assert compiled.Kernel(twice, "f8(f8)", False)(4.0) == 8.0
 
 
 def test_a_full_disk_does_not_stop_a_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,12 +153,10 @@ def test_a_full_disk_does_not_stop_a_kernel(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
 
-    @compiled.kernel("f8(f8)")
     def thrice(x: float) -> float:
         return 3.0 * x
 
-    assert thrice(4.0) == 12.0
-    compiled._kernels.remove(thrice)
+    assert compiled.Kernel(thrice, "f8(f8)", False)(4.0) == 12.0
 
 
 def test_prune_keeps_what_is_in_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,12 +179,10 @@ def at_module_level(x: float) -> float:
 
 def test_a_kernel_in_a_closure_and_its_pickle() -> None:
     def make(inner: compiled.Kernel, scale: float) -> compiled.Kernel:
-        @compiled.kernel("f8(f8)")
         def made(x: float) -> float:
             return float(scale * inner(x))
 
-        compiled._kernels.remove(made)
-        return made
+        return compiled.Kernel(made, "f8(f8)", False)
 
     assert make(at_module_level, 2.0)(3.0) == 8.0
     assert make(at_module_level, 3.0)(3.0) == 12.0

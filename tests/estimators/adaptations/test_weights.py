@@ -207,8 +207,13 @@ def test_a_gate_passes_what_it_should_and_opens_again():
 
 def test_gate_limits_are_chi_square():
     adaptation = ChiSquareGate(0.99)
-    adaptation.reset(SHEETS)
-    np.testing.assert_allclose(adaptation._limits[1:], chi2.ppf(0.99, [1, 2, 3]))
+    for d in (1, 2, 3):
+        covariance, noise = 0.75 * np.eye(d), 0.25 * np.eye(d)
+        for factor, passes in ((0.999, True), (1.001, False)):
+            v = np.sqrt(factor * chi2.ppf(0.99, d) / d) * np.ones(d)
+            adaptation.reset(SHEETS)
+            found = adaptation.adapt(innovation(v, noise=noise, covariance=covariance, jacobian=np.eye(d)))
+            assert (found is not None) is passes
 
 
 def test_correntropy_is_a_fixed_point():

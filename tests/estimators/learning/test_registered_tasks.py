@@ -13,6 +13,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FrameStackObservation, RecordEpisodeStatistics, RecordVideo
+from matplotlib.figure import Figure
 
 import simnav  # noqa: F401 (it registers)
 from simnav.environment import charted
@@ -43,9 +44,9 @@ def test_every_scenario_has_every_task():
 @pytest.fixture(scope="module")
 def chart():
     """A seventh as wide as usual."""
-    chart = Chart("every id", 60.0)
-    chart._figure.set_dpi(14)
-    return chart
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "set_dpi", lambda figure, dpi: setattr(figure, "dpi", 14))
+        return Chart("every id", 60.0)
 
 
 @pytest.fixture
@@ -118,17 +119,21 @@ def test_many_at_once_a_film_a_pickle_and_a_window(task, tmp_path):
     assert list(tmp_path.glob("films/*.mp4"))
 
 
-def test_a_frame_shows_the_track_a_fault_the_error_and_the_ellipse():
+def test_a_frame_shows_the_track_a_fault_the_error_and_the_ellipse(windows):
     env = FilterTaskEnv("gnss-noise-step", render_mode="rgb_array")
+    env.reset(seed=1)
+    assert env.render().shape == (720, 720, 3)
+    env.close()
+    env = FilterTaskEnv("gnss-noise-step", render_mode="human")
     env.reset(seed=1)
     for _ in range(200):
         env.step(np.zeros(2, np.float32))
-    frame = env.render()
-    assert frame.shape == (720, 720, 3)
-    chart = env._chart
-    outline = np.array(chart._outline.get_data())
-    assert outline.shape == (2, 49)
+    track, error, close_up = (axes.lines for axes in windows[0].axes)
+    named = {line.get_label(): line.get_xydata() for line in track}
+    assert len(named["truth"]) == len(named["estimate"]) == 200
+    assert len(named["fix, faulty"]) > 30
+    assert max(len(line.get_xydata()) for line in error) > 100
+    (outline,) = (line.get_xydata() for line in close_up if len(line.get_xydata()) == 49)
     assert np.isfinite(outline).all()
-    assert len(chart._faults) > 30
-    assert len(chart._error) > 100
+    np.testing.assert_allclose(outline[-1], outline[0])
     env.close()

@@ -329,6 +329,11 @@ class Failing(FixedLagEstimator):
         super().__init__(window=5)
         self.fails, self.calls = fails, 0
 
+    def update(self, measurements):
+        estimate = super().update(measurements)
+        self.diagnostics = estimate.diagnostics
+        return estimate
+
     def _solve(self, factors, values):
         self.calls += 1
         if self.fails(self.calls):
@@ -342,8 +347,8 @@ def test_a_solver_that_fails_begins_again(clean: Recording, run_over):
     for failures, skipped in (((30,), 0.0), ((30, 31), 6.0)):
         estimator = Failing(failures.__contains__)
         errors, covariances = run_over(estimator, clean)
-        assert estimator._restarts == 1
-        assert estimator._admission.skipped == skipped
+        assert estimator.diagnostics["restarts"] == 1
+        assert estimator.diagnostics["skipped"] == skipped
         assert np.abs(errors[-1, :3] - expected[-1, :3]).max() < 0.1
         assert np.isfinite(covariances).all()
 

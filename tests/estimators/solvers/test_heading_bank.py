@@ -12,7 +12,7 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.heading_bank import HeadingBank, initial_headings
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.geometry.rotation import wrap_angle
-from simnav.types import Datasheet
+from simnav.types import Datasheet, Measurements
 
 DEG = np.pi / 180.0
 GNSS = Datasheet("gnss", "gnss_position", 1.0, np.array([1.5, 1.5, 3.0]), lever_arm=np.array([2.0, -1.0, -8.0]))
@@ -56,9 +56,10 @@ def test_it_finds_a_heading_that_is_far_off(recording_of, run_over, off: float):
     recording = unknown(recording_of(7, 60.0, aids=(GNSS, DVL)), off * DEG, 104.0 * DEG)
     estimator = make("heading-bank")
     errors, P = run_over(estimator, recording)
+    hypotheses = estimator.update(Measurements(60.0, 60.0, None, [])).diagnostics["hypotheses"]
     assert abs(errors[-1, 8]) < 3.0 * DEG
     assert abs(errors[-1, 8]) < 4.0 * np.sqrt(P[-1, 8, 8])
-    assert len(estimator._hypotheses) == 1
+    assert hypotheses == 1.0
     assert np.hypot(*errors[-1, :2]) < 5.0
 
 

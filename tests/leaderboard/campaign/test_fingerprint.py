@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import shutil
 import subprocess
@@ -174,7 +175,8 @@ record(load({scenario!r}), 0)
 print(json.dumps([name for name in sys.modules if name.partition(".")[0] == "simnav"]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = {name for name in json.loads(done.stdout) if not (sources._place(name) or Path()).match("__init__.py")}
+    found = {name: importlib.util.find_spec(name) for name in json.loads(done.stdout)}
+    loaded = {name for name, spec in found.items() if spec is None or spec.submodule_search_locations is None}
     assert len(loaded) > 20
     assert loaded - {"simnav.scenario.reading"} <= set(followed(SIMULATOR))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import time
 
 from rich.console import Console
 
@@ -20,17 +21,24 @@ def test_progress_without_a_terminal_says_how_long(capsys, monkeypatch):
     assert "1:15 left" in said.err
 
 
+def wait_for(text: str, screen: io.StringIO) -> None:
+    """Until the bar, which is drawn five times a second, shows a text."""
+    end = time.monotonic() + 60.0
+    while text not in screen.getvalue():
+        assert time.monotonic() < end, screen.getvalue()
+        time.sleep(0.02)
+
+
 def test_progress_on_a_terminal_begins_each_stage_anew():
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=True, width=100)
     with ProgressBar(console, "starting") as progress:
         progress.begin("compiling")
         progress(7, 16, "a kernel", 30.0)
-        progress._bar.refresh()
-        assert "7/16" in screen.getvalue()
+        wait_for("7/16", screen)
         assert "0:30" in screen.getvalue()
         screen.truncate(0)
         progress.begin("running")
-        progress._bar.refresh()
+        wait_for("running", screen)
     assert "running" in screen.getvalue()
     assert "16" not in screen.getvalue()

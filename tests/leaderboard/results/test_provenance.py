@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import subprocess
 from dataclasses import replace
@@ -43,12 +44,20 @@ def test_this_process_is_described():
     assert here("a wall").id == made.id != here("").id
 
 
-def test_a_checkout_is_named_by_its_commit_and_whether_it_was_changed(tmp_path: Path):
+def test_a_checkout_is_named_by_its_commit_and_whether_it_was_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A checkout in a folder of its own, as if this process ran its code."""
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "leaderboard" / "results" / "provenance.py"))
+    walls = (f"wall {k}" for k in itertools.count())  # what is known of one is not looked up again
+
+    def checkout() -> tuple[str, bool | None]:
+        made = here(next(walls))
+        return made.commit, made.dirty
+
     def git(*words: str) -> str:
         command = ["git", "-C", str(tmp_path), "-c", "user.name=x", "-c", "user.email=x@example.org", *words]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
 
-    assert provenance._checkout(tmp_path) == ("", None)
+    assert checkout() == ("", None)
     git("init", "-q")
     published = ("docs/page.md", "README.md", "leaderboard/standard/history.csv", "leaderboard/standard/results/a.json")
     code = ("simnav/world/world.py", "estimators/rows/ekf.py", "leaderboard/campaign/runs.py", "pyproject.toml")
@@ -57,14 +66,14 @@ def test_a_checkout_is_named_by_its_commit_and_whether_it_was_changed(tmp_path: 
         (tmp_path / name).write_text("a = 1\n")
     git("add", ".")
     git("commit", "-qm", "first")
-    assert provenance._checkout(tmp_path) == (git("rev-parse", "HEAD"), False)
+    assert checkout() == (git("rev-parse", "HEAD"), False)
     (tmp_path / "notes.txt").write_text("no part of it")
     for name in published:
         (tmp_path / name).write_text("a = 2\n")
-    assert provenance._checkout(tmp_path)[1] is False  # what decides no result
+    assert checkout()[1] is False  # what decides no result
     for name in code:
         (tmp_path / name).write_text("a = 2\n")
-        assert provenance._checkout(tmp_path)[1] is True
+        assert checkout()[1] is True
         git("checkout", "-q", name)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -194,6 +195,6 @@ def test_a_damaged_history_is_named(tmp_path: Path) -> None:
     (tmp_path / "history.csv").write_text("edition,row\n1,ekf\n")
     with pytest.raises(RequestError, match="the first line should be edition,date"):
         history.read(tmp_path / "history.csv")
-    (tmp_path / "history.csv").write_text(",".join(history._NAMES) + "\none,two\n")
+    (tmp_path / "history.csv").write_text(",".join(f.name for f in fields(history.Line)) + "\none,two\n")
     with pytest.raises(RequestError, match="line 2: 2 values where 13 are wanted"):
         history.read(tmp_path / "history.csv")

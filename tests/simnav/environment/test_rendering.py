@@ -7,7 +7,6 @@ import logging
 import numpy as np
 import pytest
 
-from simnav.environment import rendering
 from simnav.environment.rendering import Chart, Trace
 from simnav.geometry.earth import displace
 
@@ -22,6 +21,22 @@ def pixels(frame, colour, tolerance=12):
     """Rows and columns of the pixels of a colour (``#rrggbb``)."""
     rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
     return np.argwhere((np.abs(frame.astype(int) - rgb) <= tolerance).all(axis=2))
+
+
+def lines(axes):
+    """Points of the lines that have a name, (n, 2) each."""
+    return {line.get_label(): line.get_xydata() for line in axes.lines if not line.get_label().startswith("_")}
+
+
+def words(figure):
+    return [text.get_text() for text in figure.texts]
+
+
+@pytest.fixture
+def colours(windows):
+    """Of what the legend names (``#rrggbb``)."""
+    Chart("legend", 60.0, human=True)
+    return {line.get_label(): line.get_color() for line in windows.pop().axes[0].get_legend_handles_labels()[0]}
 
 
 def test_a_trace_thins_evenly_and_keeps_the_ends():
@@ -48,7 +63,7 @@ def test_a_trace_loses_no_peak():
         assert at <= peak < at + (t[1] - t[0])
 
 
-def test_the_frame_shows_truth_estimate_and_fixes_where_they_are():
+def test_the_frame_shows_truth_estimate_and_fixes_where_they_are(colours):
     chart = Chart("here", 600.0)
     for k in range(200):  # truth goes north, the estimate 400 m east of it; a fix to the west now and then
         if k % 10 == 0:
@@ -59,78 +74,95 @@ def test_the_frame_shows_truth_estimate_and_fixes_where_they_are():
     assert frame.ndim == 3
     assert frame.shape[2] == 3
     upper = frame[60 : int(0.6 * len(frame)), 90:]  # the chart, without its legend and numbers
-    truth = np.median(pixels(upper, rendering._TRUTH)[:, 1])
-    estimate = np.median(pixels(upper, rendering._ESTIMATE)[:, 1])
-    fault = np.median(pixels(upper, rendering._FAULT)[:, 1])
+    truth = np.median(pixels(upper, colours["truth"])[:, 1])
+    estimate = np.median(pixels(upper, colours["estimate"])[:, 1])
+    fault = np.median(pixels(upper, colours["fix, faulty"])[:, 1])
     fix = np.median(np.argwhere(upper[..., 2].astype(int) - upper[..., 0] > 60)[:, 1])  # the only blue
     assert fix == pytest.approx(fault, abs=2.0)
     assert estimate - truth == pytest.approx((truth - fault) * 400.0 / 300.0, abs=3.0)
     assert estimate - truth > 80.0
-    lower = pixels(frame[int(0.74 * len(frame)) :], rendering._ESTIMATE)
+    lower = pixels(frame[int(0.74 * len(frame)) :], colours["estimate"])
     assert np.median(np.abs(lower[:, 0] - np.median(lower[:, 0]))) < 3.0  # the error is constant
 
 
-def test_a_frame_after_thousands_of_steps_and_after_a_new_run():
-    chart = Chart("long", 6_000.0)
+def test_a_frame_after_thousands_of_steps_and_after_a_new_run(windows):
+    chart, shown = Chart("long", 6_000.0), Chart("long", 6_000.0, human=True)
+    (figure,) = windows
     empty = chart.frame()
     for k in range(6_000):
-        chart.add_fixes(place(k, 0.0)[None, :2], np.array([False]))
-        chart.add(float(k), place(k, 0.0), place(k + 3.0, 4.0))
+        for each in (chart, shown) if k < 3_000 else (chart,):
+            each.add_fixes(place(k, 0.0)[None, :2], np.array([False]))
+            each.add(float(k), place(k, 0.0), place(k + 3.0, 4.0))
         if k % 2000 == 0:
             chart.frame()
-    assert max(len(t) for t in (chart._truth, chart._estimate, chart._fixes, chart._error)) <= 2048
+    shown.show()
+    longest = {len(line.get_xydata()) for axes in figure.axes for line in axes.lines}
+    assert 1000 < max(longest) <= 2048
+    assert "0:49:59    5 m" in words(figure)
     assert not np.array_equal(chart.frame(), empty)
-    assert chart._now[1] == pytest.approx(5.0, rel=1e-2)
     chart.clear()
     np.testing.assert_array_equal(chart.frame(), empty)
 
 
-def test_the_close_up_is_centred_on_the_vessel_and_as_wide_as_the_error_asks():
-    chart = Chart("close", 600.0)
+def test_the_close_up_is_centred_on_the_vessel_and_as_wide_as_the_error_asks(windows):
+    chart = Chart("close", 600.0, human=True)
     for k in range(300):
         chart.add_fixes(place(5.0 * k, 2.0)[None, :2], np.array([False]))
         chart.add(float(k), place(5.0 * k, 0.0), place(5.0 * k + 12.0, -9.0))
-    chart.frame()
-    drawn = {artist.get_label(): np.array(artist.get_data()).T for artist in chart._on_close[:3]}
-    assert chart._width.get_text() == "close-up, 100 m"  # twice 50, the next after 1.5 times 15 m
+    chart.show()
+    (figure,) = windows
+    drawn = lines(figure.axes[2])
+    assert "close-up, 100 m" in words(figure)  # twice 50, the next after 1.5 times 15 m
     np.testing.assert_allclose(drawn["truth"][-1], [0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(drawn["estimate"][-1] * 50.0, [-9.0, 12.0], atol=1e-2)
     np.testing.assert_allclose(drawn["fix"][-2] * 50.0, [2.0, -5.0], atol=1e-2)
-    assert len(drawn["truth"]) == rendering._RECENT
+    np.testing.assert_allclose(np.diff(drawn["truth"], axis=0) * 50.0, [[0.0, 5.0]] * 199, atol=1e-2)  # 200 steps
 
 
 def test_steps_without_a_reference_leave_nothing_behind():
-    chart = Chart("gap", 600.0)
-    chart.add(0.0, place(0.0, 0.0), place(1.0, 0.0))
+    with_gap, without = Chart("gap", 600.0), Chart("gap", 600.0)
+    for chart in (with_gap, without):
+        chart.add(0.0, place(0.0, 0.0), place(1.0, 0.0))
+    empty = Chart("gap", 600.0).frame()
     for k in range(1, 50):
-        chart.add_fixes(place(5.0, 0.0)[None, :2], np.array([False]))
-        chart.add(float(k), np.full(3, np.nan), place(1.0, 0.0))
-    assert chart._pending == []
-    assert len(chart._truth) == 1
-    assert chart.frame().std() > 0.0
+        with_gap.add_fixes(place(5.0, 0.0)[None, :2], np.array([False]))
+        with_gap.add(float(k), np.full(3, np.nan), place(1.0, 0.0))
+    np.testing.assert_array_equal(with_gap.frame(), without.frame())
+    for chart in (with_gap, without):
+        chart.add(50.0, place(1.0, 0.0), place(2.0, 0.0))
+    np.testing.assert_array_equal(with_gap.frame(), without.frame())
+    assert not np.array_equal(with_gap.frame(), empty)
 
 
-@pytest.mark.parametrize(("length", "rounded"), [(0.3, 0.5), (1.0, 1.0), (7.5, 10.0), (1001.0, 2000.0)])
-def test_round_up(length, rounded):
-    assert rendering._round_up(length) == pytest.approx(rounded)
+@pytest.mark.parametrize(
+    ("error", "width"), [(0.0, "20 m"), (8.0, "40 m"), (1000.0 / 1.5, "2000 m"), (668.0, "4000 m"), (3000.0, "10000 m")]
+)
+def test_the_close_up_shows_half_as_much_again_as_the_error_rounded_up(windows, error, width):
+    """To 1, 2, 5, 10, 20, ... m on each side; an error of less than 5 m counts as one."""
+    chart = Chart("width", 60.0, human=True)
+    chart.add(0.0, START, place(error, 0.0))
+    chart.show()
+    assert f"close-up, {width}" in words(windows[0])
 
 
-def test_a_diverged_estimate_does_not_shrink_the_truth_to_a_dot():
-    chart = Chart("off", 600.0)
+def test_a_diverged_estimate_does_not_shrink_the_truth_to_a_dot(windows):
+    chart = Chart("off", 600.0, human=True)
     for k in range(100):
         chart.add(float(k), place(10.0 * k, 0.0), place(10.0 * k, 1e5 * k))
-    chart.frame()
-    (low, high) = chart._chart.get_ylim()
-    assert (high - low) / chart._scale < 5000.0
+    chart.show()
+    axes = windows[0].axes[0]
+    metres = 1000.0 if axes.get_ylabel().endswith("[km]") else 1.0
+    (low, high) = axes.get_ylim()
+    assert (high - low) * metres < 5000.0
 
 
-def test_both_axes_of_the_chart_have_one_scale():
-    chart = Chart("scale", 600.0)
+def test_both_axes_of_the_chart_have_one_scale(windows):
+    chart = Chart("scale", 600.0, human=True)
     for k in range(100):
         chart.add(float(k), place(2.0 * k, 30.0 * k), place(2.0 * k, 30.0 * k))
-    chart.frame()
-    box = chart._chart.bbox
-    x, y = np.ptp(chart._chart.get_xlim()) / box.width, np.ptp(chart._chart.get_ylim()) / box.height
+    chart.show()
+    axes = windows[0].axes[0]
+    x, y = np.ptp(axes.get_xlim()) / axes.bbox.width, np.ptp(axes.get_ylim()) / axes.bbox.height
     assert x == pytest.approx(y)
 
 
@@ -149,36 +181,24 @@ def test_without_a_display_there_is_one_sentence_and_no_error(monkeypatch, caplo
     ]
 
 
-def test_with_a_display_the_window_is_kept_up_to_date(monkeypatch):
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    class Canvas(FigureCanvasAgg):
-        drawn = flushed = 0
-
-        def draw_idle(self):
-            self.drawn += 1
-            self.draw()
-
-        def flush_events(self):
-            self.flushed += 1
-
-    def window():
-        figure = Figure()
-        Canvas(figure)
-        return figure
-
-    monkeypatch.setattr(rendering, "_open_window", window)
+def test_with_a_display_the_window_is_kept_up_to_date(windows, colours):
     chart = Chart("seen", 60.0, human=True)
-    canvas = chart._figure.canvas
+    (window,) = windows
+    assert window.shown
+    canvas = window.canvas
     for k in range(30):
         chart.add(float(k), place(k, 0.0), place(k, 5.0))
         chart.show()
-    assert canvas.drawn == canvas.flushed == 30
-    assert len(pixels(np.asarray(canvas.buffer_rgba())[..., :3], rendering._ESTIMATE)) > 50
+    assert canvas.asked == canvas.flushed == 30
+    canvas.draw()
+    assert len(pixels(np.asarray(canvas.buffer_rgba())[..., :3], colours["estimate"])) > 50
     chart.close()
     chart.show()
+    assert canvas.asked == 30
 
 
-def test_the_clock():
-    assert rendering._clock(3723.9) == "1:02:03"
+def test_the_clock(windows):
+    chart = Chart("clock", 7200.0, human=True)
+    chart.add(3723.9, START, START)
+    chart.show()
+    assert any(text.startswith("1:02:03 ") for text in words(windows[0]))

@@ -11,7 +11,9 @@ import pytest
 from simnav.geometry.earth import relative_position
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.log import LogSource, LogWarning
+from simnav.log.channel import read_channel, read_imu
 from simnav.log.nmea import read_nmea
+from simnav.log.reference import Reference
 from simnav.scenario import load
 from simnav.strapdown import integrate
 
@@ -23,6 +25,18 @@ needs_nbp1406 = pytest.mark.skipif(not (DATA / "nbp1406").is_dir(), reason=f"no 
 @pytest.fixture(autouse=True)
 def data(monkeypatch):
     monkeypatch.setenv("SIMNAV_DATA", str(DATA))
+
+
+def reference_of(source):
+    """The reference of a run, read anew from the log, and its time at the start of the run [s]."""
+    log = source.scenario.log
+    imu = None if log.imu is None else read_imu(log, log.imu, source.recording)
+    channels = {name: getattr(log.reference, name) for name in ("position", "velocity", "attitude")}
+    series = {n: None if c is None else read_channel(log, c, n, source.recording) for n, c in channels.items()}
+    reference = Reference(**series, max_gap=log.reference.max_gap, lever_arm=log.reference.lever_arm, imu=imu)
+    first = source.initial_truth.position
+    (begin,) = reference.time[(reference.states(reference.time).position == first).all(axis=1)]
+    return reference, begin
 
 
 @needs_akit
@@ -49,7 +63,8 @@ def test_the_dvl_agrees_with_the_reference(seed):
     source = LogSource(scenario, seed)
     dvl = source.advance(source.duration).aids["dvl"]
     assert len(dvl) >= 397
-    tap = source._reference.taps(source._begin + dvl.time)
+    reference, begin = reference_of(source)
+    tap = reference.taps(begin + dvl.time)
     body = np.einsum("nji,nj->ni", dcm_from_rpy(tap.attitude), tap.velocity)
     error = dvl.value - body - np.cross(tap.angular_rate, scenario.aids["dvl"].lever_arm)
     assert (np.abs(np.median(error, axis=0)) < 0.012).all()
@@ -63,7 +78,10 @@ def test_what_is_simulated_is_said():
     assert source.recording == "7"
     assert "simulated from the reference: depth, gyrocompass" in source.note
     depth = source.advance(398.0).aids["depth"]
-    assert np.std(depth.value[:, 0] + source._states(depth.time).position[:, 2]) == pytest.approx(0.1, rel=0.15)
+    reference, begin = reference_of(source)
+    assert np.std(depth.value[:, 0] + reference.states(begin + depth.time).position[:, 2]) == pytest.approx(
+        0.1, rel=0.15
+    )
 
 
 @needs_nbp1406
@@ -75,7 +93,8 @@ def test_the_ship():
     assert len(block.truth) == 620
     gnss = block.aids["gnss"]
     assert len(gnss) + len(gnss.dropped) == 620
-    tap = source._reference.taps(source._begin + gnss.time)
+    reference, begin = reference_of(source)
+    tap = reference.taps(begin + gnss.time)
     offset = relative_position(gnss.value, tap.position)
     lever = dcm_from_rpy(tap.attitude) @ [0.0, 0.0, -28.84]
     # The antenna is that high above the Seapath's point: the scatter falls by a factor, in the heave direction too.
@@ -83,11 +102,11 @@ def test_the_ship():
     assert np.hypot(*(offset - lever)[:, :2].std(axis=0)) < 0.5 * np.hypot(*offset[:, :2].std(axis=0))
     assert (np.abs((offset - lever)[:, :2].mean(axis=0)) < 1.0).all()
     heading = block.aids["gyrocompass"]
-    turn = np.angle(np.exp(1j * (heading.value[:, 0] - source._states(heading.time).attitude[:, 2])))
+    turn = np.angle(np.exp(1j * (heading.value[:, 0] - reference.states(begin + heading.time).attitude[:, 2])))
     assert np.degrees(abs(turn.mean())) < 0.05
     assert np.degrees(turn.std()) < 0.2
     log = block.aids["speed_log"]
-    state = source._states(log.time)
+    state = reference.states(begin + log.time)
     ahead = np.cos(state.attitude[:, 2]) * state.velocity[:, 0] + np.sin(state.attitude[:, 2]) * state.velocity[:, 1]
     inside = np.isfinite(ahead)
     assert (log.value[inside, 0] - ahead[inside]).mean() == pytest.approx(-0.59, abs=0.05)
