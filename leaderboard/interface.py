@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, requests
+from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
 from simnav.leaderboard.given import (
     ScenarioLike,
@@ -200,8 +200,7 @@ def bench(
     with mistakes():
         for r in mine:
             r.make()  # a mistake in a file's name or in a parameter is no result
-    labels = [r.label for r in mine]
-    beside = [r for r in requests(list(BESIDE) if against is None else against) if r.label not in labels]
+    beside = together([*mine, *requests(list(BESIDE) if against is None else against)])[len(mine) :]
     chosen = scenario_of(scenario)
     with mistakes(ValueError, FileNotFoundError):
         recording = record(chosen, seed)
@@ -294,8 +293,7 @@ def evaluate(
     if not estimators:
         raise RequestError("no estimator was asked for; name those that should be evaluated")
     mine = requests(estimators, parameters)
-    labels = [r.label for r in mine]
-    everyone = [*mine, *(r for r in requests(against) if r.label not in labels)]
+    everyone = together([*mine, *requests(against)])
     chosen, seeds = scenarios_of(scenarios), range(seed, seed + runs)
     with _folder(results) as folder:
         _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress)
@@ -306,10 +304,10 @@ def evaluate(
     return EvaluationReport(
         found,
         rank(found, tracks={s.id: s.track for s in chosen}),
-        tuple(labels),
+        tuple(r.label for r in mine),
         tuple(s.id for s in chosen),
         seeds,
-        tuple(standing(by, label, s) for label in labels for s, by in by_scenario.items()),
+        tuple(standing(by, r.label, s) for r in mine for s, by in by_scenario.items()),
         None if results is None else folder,
     )
 
@@ -541,6 +539,7 @@ def tune(
     RequestError
         If a scenario is not for training, or a parameter cannot be varied.
     """
+    from simnav.leaderboard.tuning.space import what_to_vary
     from simnav.leaderboard.tuning.tuning import TUNED, ranges_of, read, tune_row
 
     request = one_request(estimator)
@@ -550,7 +549,7 @@ def tune(
     if vary is None:
         path = TUNED / f"{request.name}.json"
         if not path.is_file():
-            raise RequestError(f"{request.label} ships without a tuning: say what to vary, like vary='dof=2:50:log'")
+            raise RequestError(what_to_vary(request))
         vary = ranges_of(read(path))
     ranges = [text for text in vary.split(",") if text.strip()] if isinstance(vary, str) else list(vary)
     if min(runs, unseen) < 2:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from simnav.estimator import Estimator, find, make, register
+from simnav.estimator import Estimator, find, make, names, register
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __all__ = [
     "request",
     "requests",
     "split_estimators",
+    "together",
 ]
 
 
@@ -140,13 +141,11 @@ def requests(
         On an unknown estimator or parameter, or a value that does not fit. Files are not imported here: whoever runs
         them does so, in a process of its own.
     """
-    from simnav.estimator import names
-
     items = _items(given)
     if not items:
         items = [EstimatorRequest(name) for name in names()]
     common, unused = dict(parameters or {}), set(parameters or ())
-    made: dict[str, EstimatorRequest] = {}
+    made: list[EstimatorRequest] = []
     for item in items:
         with mistakes():
             mine = common if len(items) == 1 or not common else _known(item, common)
@@ -154,11 +153,42 @@ def requests(
             found = request(item, mine)
             if ".py" not in found.name and not found.point and comes_with_simnav(found.cls or find(found.name)):
                 found.make()  # so that a mistake shows now; the code of others runs in a process of its own
-        made.setdefault(found.label, found)
+            _has_a_name_of_its_own(found)
+        made.append(found)
     if unused:
         raise RequestError(f"{min(unused)}: none of the estimators has this parameter; 'simnav list estimators' shows "
                            "what they have")  # fmt: skip
-    return list(made.values())
+    return together(made)
+
+
+def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
+    """Each request once, in the order given.
+
+    Raises
+    ------
+    RequestError
+        Where two estimators have one label: tables could not tell them apart.
+    """
+    by_label: dict[str, EstimatorRequest] = {}
+    for r in found:
+        other = by_label.setdefault(r.label, r)
+        if (_source(other), other.point) != (_source(r), r.point):
+            raise RequestError(
+                f"{other.name} and {r.name}: the rows of both would be called {r.label!r}; give one file another name"
+            )
+    return list(by_label.values())
+
+
+def _source(found: EstimatorRequest) -> str:
+    """The name, or the file with its whole path."""
+    return os.path.realpath(found.name) if ".py" in found.name else found.name
+
+
+def _has_a_name_of_its_own(found: EstimatorRequest) -> None:
+    """RequestError where a file is called as a row that comes with simnav: tables would show it as that row."""
+    stem = re.fullmatch(r"(.*)\.py", os.path.basename(found.name))
+    if stem and stem[1] in names() and comes_with_simnav(find(stem[1])):
+        raise RequestError(f"{found.name}: {stem[1]!r} is a row that comes with simnav; give the file another name")
 
 
 def _items(given: EstimatorLike | Iterable[EstimatorLike] | None) -> list[EstimatorLike]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, mistakes, printable
 from simnav.leaderboard.results.frame import frame
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def run_once(
         trial = run_trial(estimator, recording)
         seconds = time.perf_counter() - started
         scores = score(trial, recording) if len(trial) else {}
-        runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status, trial.reason,
-                                 seconds, scores, trial))  # fmt: skip
+        runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status,
+                                 printable(trial.reason), seconds, scores, trial))  # fmt: skip
     report(len(requests), len(requests))
     return RunReport(recording, simulated, tuple(runs))

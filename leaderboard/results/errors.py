@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-__all__ = ["RequestError", "mistakes", "sentence", "shortened"]
+__all__ = ["RequestError", "mistakes", "printable", "sentence", "shortened"]
 
 _MOST = 1000  # characters of a message
 
@@ -36,7 +36,16 @@ def sentence(error: BaseException) -> str:
         text = f"{error.filename}, line {error.lineno}: {error.msg}"
     else:
         text = str(error)
-    return shortened(" ".join(text.split())) or type(error).__name__
+    return shortened(printable(" ".join(text.split()))) or type(error).__name__
+
+
+def printable(text: str) -> str:
+    """A text of others without what a terminal or a browser would obey: colours, cursor, direction of writing.
+
+    >>> printable("red \\x1b[31m, reversed \\u202e")
+    'red \\\\x1b[31m, reversed \\\\u202e'
+    """
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def shortened(text: str) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.leaderboard.results.ahead import made_ahead
+from simnav.leaderboard.results.errors import printable
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.stored_scores import StoredScores
 from simnav.scoring.consistency import ending
@@ -132,6 +133,9 @@ class Result:
     estimator_digest: str = ""
     provenance: Provenance = field(default_factory=Provenance)
     draws: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "reason", printable(self.reason))  # it is what an estimator's exception says
 
     @property
     def variant(self) -> str:

@@ -12,7 +12,7 @@ from simnav.estimator import describe
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results.errors import RequestError
 
-__all__ = ["Range", "Scale", "read_range", "space_of"]
+__all__ = ["Range", "Scale", "read_range", "space_of", "what_to_vary"]
 
 Scale: TypeAlias = Literal["linear", "log", "integer"]
 
@@ -87,6 +87,22 @@ def read_range(text: str) -> Range:
         return Range(name, float(low), float(high), scales[scale or "linear"])
     except ValueError as error:
         raise error if isinstance(error, RequestError) else RequestError(help_) from None
+
+
+def what_to_vary(request: EstimatorRequest) -> str:
+    """One sentence for who has not said what to vary: how it is said, with the numbers that the row has."""
+    numbers = {
+        p.name: p.default
+        for p in describe(request.name).parameters
+        if isinstance(p.default, int | float) and not isinstance(p.default, bool) and p.name not in request.parameters
+    }
+    if not numbers:
+        return f"{request.label} has no number that could be varied"
+    name, value = next(((n, v) for n, v in numbers.items() if v > 0), ("name", 1.0))
+    return (
+        f"{request.label} ships without a tuning: say what to vary between which values, like "
+        f"--vary {name}={0.5 * value:g}:{2.0 * value:g} (vary= in Python); its numbers are: {', '.join(numbers)}"
+    )
 
 
 def space_of(request: EstimatorRequest, ranges: Sequence[str | Range]) -> tuple[tuple[Range, ...], Mapping[str, Any]]:

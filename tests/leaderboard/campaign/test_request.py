@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from simnav.leaderboard.campaign.request import split_estimators
+import simnav
+from simnav.estimators.rows.kalman import Ekf
+from simnav.leaderboard.campaign.request import requests, split_estimators
+from simnav.leaderboard.results.errors import RequestError
+
+STILL = """
+from simnav import Estimate, Estimator
+class Still(Estimator):
+    'Stays where it began.'
+    def reset(self, start, instruments): self.start = start
+    def update(self, measurements): return Estimate(measurements.time, self.start.position)
+"""
 
 
 def test_estimators_are_split_with_their_parameters():
@@ -15,3 +28,34 @@ def test_estimators_are_split_with_their_parameters():
     ]
     with pytest.raises(ValueError, match="parameters follow a name"):
         split_estimators(["a,x=1"])
+
+
+@pytest.mark.parametrize("asked", ["ekf.py", "ekf,ekf.py", "a/ekf.py:calibrate=no"])
+def test_a_file_that_is_called_as_one_of_our_rows_is_refused(asked, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Its results would stand beside the row's name."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a").mkdir()
+    for folder in (tmp_path, tmp_path / "a"):
+        (folder / "ekf.py").write_text(STILL)
+    with pytest.raises(
+        RequestError, match=r"ekf\.py: 'ekf' is a row that comes with simnav; give the file another name"
+    ):
+        requests(asked)
+
+
+def test_two_files_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "still.py").write_text(STILL)
+    with pytest.raises(RequestError, match=r"a/still\.py and b/still\.py: the rows of both would be called 'still'"):
+        requests("a/still.py,b/still.py")
+    with pytest.raises(RequestError, match="called 'still'"):
+        simnav.evaluate("a/still.py", "ship-straight", against=["b/still.py"], runs=1)
+
+
+def test_what_is_asked_for_twice_is_there_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "still.py").write_text(STILL)
+    asked = [Ekf, "ekf", "still.py", tmp_path / "still.py", "ekf:calibrate=no", ("ekf", {"calibrate": "no"})]
+    assert [r.label for r in requests(asked)] == ["ekf", "still", "ekf(calibrate=no)"]

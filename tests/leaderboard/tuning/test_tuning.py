@@ -183,8 +183,10 @@ def test_a_file_of_something_else_is_refused(tmp_path: Path):
 
 
 def test_a_row_without_a_file_asks_what_to_vary():
-    with pytest.raises(RequestError, match="say what to vary"):
+    with pytest.raises(RequestError, match=r"say what to vary .* --vary (\w+)=.*; its numbers are: .*\1"):
         simnav.tune("huber-kf", "training-clean")
+    with pytest.raises(RequestError, match=r"huber-kf\(k=2\) has no number that could be varied"):
+        simnav.tune(("huber-kf", {"k": 2}), "training-clean")
 
 
 # --- the whole ----------------------------------------------------------------------------------------
