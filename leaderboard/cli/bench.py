@@ -18,7 +18,7 @@ def command(
     ],
     scenario: Annotated[str, typer.Option("--scenario", "-s", help="A name or a TOML file.")] = "open-sea",
     against: Annotated[
-        list[str] | None, typer.Option(help="Rows beside them, separated by commas. [one of each family]")
+        list[str] | None, typer.Option(help="Rows beside them, separated by commas. Default: one of each family.")
     ] = None,
     epochs: Annotated[int, typer.Option(min=2, help="Epochs that are run.")] = 120,
     rounds: Annotated[int, typer.Option(min=1, help="Runs; an epoch counts with its least time.")] = 3,

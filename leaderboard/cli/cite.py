@@ -15,7 +15,7 @@ __all__ = ["command"]
 
 def command(
     results: Annotated[
-        Path | None, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote. [simnav itself]")
+        Path | None, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote. Default: simnav itself.")
     ] = None,
     text: Annotated[bool, typer.Option("--text", help="Print one line of text instead of BibTeX.")] = False,
     json: Json = False,

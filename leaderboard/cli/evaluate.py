@@ -31,14 +31,16 @@ def command(
     scenario: Annotated[list[str], typer.Option("--scenario", "-s", help="Names or TOML files, separated by commas.")],
     runs: Annotated[int, typer.Option("--runs", "-n", min=2, help="Seeds.")] = 20,
     against: Annotated[
-        list[str] | None, typer.Option(help="Baselines, separated by commas. [all that suit the scenario]")
+        list[str] | None, typer.Option(help="Baselines, separated by commas. Default: all that suit the scenario.")
     ] = None,
     set_: Set = None,
     seed: FirstSeed = 0,
     workers: Workers = 2,
     time_limit: TimeLimit = None,
     memory_limit: MemoryLimit = 2048,
-    results: Annotated[Path | None, typer.Option(help="Keep the results in this folder. [thrown away]")] = None,
+    results: Annotated[
+        Path | None, typer.Option(help="Keep the results in this folder. Default: they are not kept.")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:

@@ -38,11 +38,14 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, for
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, versioned id, or path of a TOML file.")]
 Scenarios = Annotated[
-    list[str] | None, typer.Option("--scenario", "-s", help="Names, tracks or TOML files, separated by commas. [all]")
+    list[str] | None,
+    typer.Option("--scenario", "-s", help="Names, tracks or TOML files, separated by commas. Default: all."),
 ]
 Estimators = Annotated[
     list[str] | None,
-    typer.Option("--estimator", "-e", help="Names or files, separated by commas; 'ekf:gate=3' sets a parameter. [all]"),
+    typer.Option(
+        "--estimator", "-e", help="Names or files, separated by commas; 'ekf:gate=3' sets a parameter. Default: all."
+    ),
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the run.")]
@@ -54,7 +57,7 @@ Minutes = Annotated[
 TimeLimit = Annotated[
     float | None,
     typer.Option(
-        "--time-limit", min=0.1, help="Seconds an estimator may take a run. [a fifth of real time, at least 60]"
+        "--time-limit", min=0.1, help="Seconds an estimator may take a run. Default: a fifth of real time, at least 60."
     ),
 ]
 MemoryLimit = Annotated[

@@ -22,7 +22,8 @@ def command(
     scenario: Scenarios = None,
     runs: Annotated[int, typer.Option("--runs", "-n", min=2, help="Seeds a scenario.")] = 200,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File of the figures. [the one that comes with simnav]")
+        Path | None,
+        typer.Option("--output", "-o", help="File of the figures. Default: the one that comes with simnav."),
     ] = None,
     results: Annotated[
         Path, typer.Option(help="Keep the runs in this folder; started again, it goes on there.")

@@ -20,10 +20,10 @@ __all__ = ["command"]
 def command(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help=f"{', '.join(PAPERS)}.")],
     runs: Annotated[
-        int | None, typer.Option("--runs", "-n", min=1, help="Runs of each scenario. [a few: takes minutes]")
+        int | None, typer.Option("--runs", "-n", min=1, help="Runs of each scenario. Default: a few, done in minutes.")
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option("--method", "-m", help="Only the rows about these methods. [all]")
+        list[str] | None, typer.Option("--method", "-m", help="Only the rows about these methods. Default: all.")
     ] = None,
     until_decided: Annotated[
         bool, typer.Option("--until-decided", help="More runs for undecided rows, until all are decided.")
@@ -32,13 +32,15 @@ def command(
         int, typer.Option(min=1, help="With --until-decided: largest number of runs of a scenario.")
     ] = 200,
     minutes: Annotated[
-        float | None, typer.Option(min=0.0, help="With --until-decided: start no run after this time. [no limit]")
+        float | None,
+        typer.Option(min=0.0, help="With --until-decided: start no run after this time. Default: no limit."),
     ] = None,
     stored: Annotated[
         bool, typer.Option("--stored", help="Show the results that come with simnav; nothing is run.")
     ] = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of results, tables, figures, page. [reproduced/PAPER]")
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of results, tables, figures, page. Default: reproduced/PAPER."),
     ] = None,
     workers: Workers = 2,
     json: Json = False,

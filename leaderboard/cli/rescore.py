@@ -17,7 +17,7 @@ __all__ = ["command"]
 def command(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder of 'simnav campaign --keep-trials'.")],
     score: Annotated[
-        list[str] | None, typer.Option("--score", help="Names of scores, separated by commas. [all]")
+        list[str] | None, typer.Option("--score", help="Names of scores, separated by commas. Default: all.")
     ] = None,
     scenario: Annotated[
         list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")

@@ -28,7 +28,8 @@ def command(
         Path | None, typer.Option(help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf.")
     ] = None,
     alert_limit: Annotated[
-        float, typer.Option(min=0.01, help="Alert limit of the Stanford diagrams [m]; IMO A.915(22): 25, in ports 2.5.")
+        float,
+        typer.Option(min=0.01, help="Alert limit of the Stanford diagrams in metres; IMO A.915(22): 25, in ports 2.5."),
     ] = 25.0,
     set_: Set = None,
     json: Json = False,

@@ -15,7 +15,7 @@ __all__ = ["register"]
 _app = typer.Typer(help="Run, check and publish the result that comes with simnav.", no_args_is_help=True)
 _Results = Annotated[Path, typer.Option("--results", help="Folder to work in.")]
 _Profile = Annotated[str, typer.Option(help="What is run: a profile of simnav, or a file.")]
-_Shipped = Annotated[Path | None, typer.Option(help="Folder of the packed results. [that of simnav]")]
+_Shipped = Annotated[Path | None, typer.Option(help="Folder of the packed results. Default: that of simnav.")]
 _WORKING = Path("results/standard")
 
 
@@ -53,7 +53,9 @@ def run(
 
 @_app.command()
 def check(
-    results: Annotated[Path | None, typer.Option("--results", help="Folder of results. [those of simnav]")] = None,
+    results: Annotated[
+        Path | None, typer.Option("--results", help="Folder of results. Default: those of simnav.")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -72,8 +74,10 @@ def publish(
     results: _Results = _WORKING,
     profile: _Profile = "standard",
     shipped: _Shipped = None,
-    history: Annotated[Path | None, typer.Option(help="File of the editions. [that of simnav]")] = None,
-    readme: Annotated[Path | None, typer.Option(help="Whose tables are written. [README.md, if it is here]")] = None,
+    history: Annotated[Path | None, typer.Option(help="File of the editions. Default: that of simnav.")] = None,
+    readme: Annotated[
+        Path | None, typer.Option(help="Whose tables are written. Default: README.md, if it is here.")
+    ] = None,
     site: Annotated[Path, typer.Option(help="Folder of the site.")] = Path("site"),
     workers: Workers = 2,
     preliminary: Annotated[bool, typer.Option("--preliminary", help="Publish also if runs are missing.")] = False,

@@ -18,8 +18,10 @@ def command(
         str, typer.Argument(metavar="FILE_OR_PACKAGE", help="my_filter.py, or an installed package with estimators.")
     ],
     profile: Annotated[str, typer.Option(help="What is run: a profile of simnav.")] = "standard",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The bundle. [NAME.simnav.zip]")] = None,
-    results: Annotated[Path | None, typer.Option(help="Keep the results in this folder. [results/submit-NAME]")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The bundle. Default: NAME.simnav.zip.")] = None,
+    results: Annotated[
+        Path | None, typer.Option(help="Keep the results in this folder. Default: results/submit-NAME.")
+    ] = None,
     requires: Annotated[
         list[str] | None, typer.Option(help="Package that a file needs beside simnav; repeatable.")
     ] = None,

@@ -45,7 +45,7 @@ def command(
     score: Annotated[str, typer.Option(help="A score that is better when lower.")] = "horizontal_rmse",
     plot: Annotated[Path | None, typer.Option(help="Draw it into this file: .png, .svg or .pdf.")] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of the results. [results/sweep-SCENARIO]")
+        Path | None, typer.Option("--output", "-o", help="Folder of the results. Default: results/sweep-SCENARIO.")
     ] = None,
     set_: Set = None,
     seed: FirstSeed = 0,

@@ -56,7 +56,7 @@ def _command(
     ] = 3,
     passes: Annotated[int, typer.Option(min=1, help="Most passes over the data.")] = 200,
     output: Annotated[
-        Path | None, typer.Option("--output", "--out", "-o", help="Parameter file. [anfis_FEATURES.json]")
+        Path | None, typer.Option("--output", "--out", "-o", help="Parameter file. Default: anfis_FEATURES.json.")
     ] = None,
     json: Json = False,
     debug: Debug = False,

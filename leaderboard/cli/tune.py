@@ -24,11 +24,15 @@ def command(
     estimator: Annotated[str, typer.Argument(metavar="ESTIMATOR", help="A name, or a file like my_filter.py.")],
     family: Annotated[
         list[str] | None,
-        typer.Option("--family", "-f", help="Training families, commas between. [training-voyages,training-clean]"),
+        typer.Option(
+            "--family", "-f", help="Training families, commas between. Default: training-voyages,training-clean."
+        ),
     ] = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=LOW:HIGH", help="What is varied; with :log or :integer behind. [as last time]"),
+        typer.Option(
+            metavar="NAME=LOW:HIGH", help="What is varied; with :log or :integer behind. Default: as last time."
+        ),
     ] = None,
     runs: Annotated[int, typer.Option("--runs", "-n", min=2, help="Voyages of each family for the search.")] = 20,
     unseen: Annotated[int, typer.Option(min=2, help="Voyages of each family for the comparison.")] = 20,

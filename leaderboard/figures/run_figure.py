@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from simnav.leaderboard.figures.plots import Curve, Track, run_chart
 from simnav.leaderboard.figures.style import Style
 from simnav.scoring import errors
 from simnav.sensors.faults import effect_of
+from simnav.spec import UNITS
 from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.trial import Trial
 
-__all__ = ["fixes", "outage_spans", "relative_track", "run_figure", "true_track"]
+__all__ = ["fixes", "innovation_unit", "outage_spans", "relative_track", "run_figure", "true_track"]
 
 _AXES = (
     ("North error [m]", 0, 1.0),
@@ -29,6 +31,9 @@ _AXES = (
     ("Heading error [deg]", 8, np.degrees(1.0)),
 )
 _MOST_DIAGNOSTICS = 10
+_WIDEST_LABEL = 20  # characters of a line of a label, so that it is no longer than its panel is high
+#: Of diagnostics of single instruments (`simnav.scoring.plot_series.DIAGNOSTICS`), but for innovations.
+_UNITS = {"nis": "-", "residual": "sigma", "weight": "-"}
 
 
 def _origin(recording: Recording) -> Array:
@@ -116,12 +121,34 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
         style,
         fixes=fixes(recording),
         outages=outage_spans(recording),
-        diagnostics=_diagnostics(shown),
+        diagnostics=_diagnostics(shown, recording),
         title=f"{recording.scenario}, seed {recording.seed}{note}",
     )
 
 
-def _diagnostics(shown: Sequence[tuple[str, Trial, Array]]) -> dict[str, list[Curve]]:
+def innovation_unit(kind: str) -> tuple[str, float] | None:
+    """Unit of the length of an innovation of a kind of instrument, and what an SI value is multiplied with.
+
+    None where the components of a measurement differ in their units, so that the length has none.
+
+    >>> innovation_unit("speed_log"), innovation_unit("gnss_position")
+    (('m/s', 1.0), ('m', 1.0))
+    """
+    shared = {c.error_unit for c in KINDS[kind].components}
+    if len(shared) > 1:
+        return None
+    unit = shared.pop()
+    return unit.replace("_", "/"), 1.0 / UNITS[unit]
+
+
+def _label(name: str, unit: str) -> str:
+    """Of the panel of a diagnostic: ``nis.speed_log`` on two lines, with its unit."""
+    quantity, dot, instrument = name.replace("_", " ").partition(".")
+    words = f"{instrument if dot else quantity}{f' [{unit}]' if unit else ''}"
+    return "\n".join([*([quantity] if dot else []), *textwrap.wrap(words, _WIDEST_LABEL, break_long_words=False)])
+
+
+def _diagnostics(shown: Sequence[tuple[str, Trial, Array]], recording: Recording) -> dict[str, list[Curve]]:
     """The diagnostics that most estimators give, one panel each; of an array, its mean over the components.
 
     Where not all can be shown, those of an instrument or of the motion go before counters.
@@ -135,5 +162,18 @@ def _diagnostics(shown: Sequence[tuple[str, Trial, Array]]) -> dict[str, list[Cu
                 mean = np.where(count > 0, np.nansum(v, axis=1) / np.maximum(count, 1), np.nan)
                 if np.nanmax(mean) == np.nanmin(mean):
                     continue  # it says nothing over time
-                found.setdefault(name.replace("_", " "), []).append(Curve(label, trial.time, mean))
-    return dict(sorted(found.items(), key=lambda item: (-len(item[1]), "." not in item[0]))[:_MOST_DIAGNOSTICS])
+                found.setdefault(name, []).append(Curve(label, trial.time, mean))
+    most = sorted(found.items(), key=lambda item: (-len(item[1]), "." not in item[0]))[:_MOST_DIAGNOSTICS]
+    panels = {}
+    for name, curves in most:
+        unit, factor = _unit(name, recording)
+        panels[_label(name, unit)] = [Curve(c.label, c.time, factor * c.values) for c in curves]
+    return panels
+
+
+def _unit(name: str, recording: Recording) -> tuple[str, float]:
+    """Unit of a diagnostic, empty where it is not known, and factor from SI."""
+    quantity, _, instrument = name.partition(".")
+    if quantity == "innovation" and instrument in recording.data.aids:
+        return innovation_unit(recording.data.aids[instrument].kind) or ("", 1.0)
+    return _UNITS.get(quantity, "") if instrument else "", 1.0

@@ -25,8 +25,8 @@ __all__ = [
 ]
 
 _CAPTION = (
-    "{score}: geometric mean over the runs, each scenario counting the same; a failed run counts {cap:g}. 95 % "
-    "interval: of the errors of completed runs. Rank: rows that share a rank cannot be told apart."
+    "{score}: geometric mean over the runs, each scenario counting the same; a failed run counts {cap:g}.{interval} "
+    "Rank: rows that share a rank cannot be told apart."
 )
 
 
@@ -36,10 +36,12 @@ def score_title(track: TrackRanking) -> str:
 
 
 def score_caption(track: TrackRanking) -> str:
-    """What the score is, in two sentences."""
+    """What the score, its interval and the rank are; a few runs give no interval, so that none is explained."""
     what = f"{SCORES[track.score].title} [{SCORES[track.score].unit}]" if track.score in SCORES else track.score
     what = f"× reference: {what} over the scenario's reference figure" if track.relative else f"Error: {what}"
-    return _CAPTION.format(score=what, cap=FAILURE)
+    known = any(between(r.low, r.high) for r in track.rows)
+    interval = " 95 % interval: of the errors of completed runs." if known else ""
+    return _CAPTION.format(score=what, cap=FAILURE, interval=interval)
 
 
 def tier_starts(tiers: Sequence[int | None]) -> list[bool]:

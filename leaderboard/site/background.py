@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.figures.run_figure import fixes, true_track
+from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, true_track
 from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.site.charts import short
 from simnav.leaderboard.site.facts import catalogued, datasheets, events
 from simnav.leaderboard.site.library import cache
+from simnav.leaderboard.site.rounding import short
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
@@ -32,7 +32,6 @@ BOUND_RUNS = 2
 
 _MOST_KEPT = 400  # files in the cache
 _TRACK_POINTS = 300
-_UNITS = {"m_s": ("m/s", 1.0), "deg": ("°", float(np.degrees(1.0)))}
 
 
 @dataclass(frozen=True)
@@ -84,8 +83,6 @@ def background_of(identity: str, seeds: Sequence[int]) -> Background:
 
 def background(identity: str, seeds: Iterable[int]) -> Background:
     """Make the recordings of a scenario again, and its bound."""
-    from simnav.kinds import KINDS
-
     scenario = catalogued(identity)
     recordings = {seed: found for seed in seeds if (found := _recording(identity, seed)) is not None}
     first = next(iter(recordings.values()), None)
@@ -93,10 +90,8 @@ def background(identity: str, seeds: Iterable[int]) -> Background:
         return Background()
     units = {}
     for name, stream in first.data.aids.items():
-        shared = {c.error_unit for c in KINDS[stream.kind].components}
-        if len(shared) == 1:
-            unit = shared.pop()
-            units[name] = list(_UNITS.get(unit, (unit, 1.0)))
+        if (unit := innovation_unit(stream.kind)) is not None:
+            units[name] = ["°" if unit[0] == "deg" else unit[0], unit[1]]
     return Background(
         happening=events(scenario, first),
         instruments=datasheets(scenario, first),

@@ -7,12 +7,13 @@ colours of the theme, which the page or `simnav.leaderboard.site.print_figures` 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
+
+from simnav.leaderboard.site.rounding import shorts
 
 __all__ = [
     "Chart",
@@ -23,8 +24,6 @@ __all__ = [
     "distribution",
     "over_time",
     "ratios_by_group",
-    "short",
-    "shorts",
     "spread",
     "stanford",
     "timeline",
@@ -79,30 +78,6 @@ class Chart:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-def short(value: Any, digits: int = 4) -> float | None:
-    """A figure with a few digits, so that pages stay small; None where there is none."""
-    x = math.nan if value is None else float(value)
-    return float(f"{x:.{digits}g}") if math.isfinite(x) else None
-
-
-def shorts(values: Any, digits: int = 4) -> list[float | None]:
-    """`short` of an array.
-
-    >>> shorts([0.123456, float("nan"), 12345.6, 0.0])
-    [0.1235, None, 12350.0, 0.0]
-    """
-    x = np.asarray(values, dtype=np.float64)
-    known = np.isfinite(x)
-    size = np.where(known & (x != 0.0), np.abs(x), 1.0)
-    places = np.clip(digits - 1 - np.floor(np.log10(size)), -22.0, 22.0)
-    up, down = 10.0 ** np.maximum(places, 0.0), 10.0 ** np.maximum(-places, 0.0)  # one of them is 1: both are exact
-    found = (np.rint(np.where(known, x, 0.0) * up / down) / up * down).tolist()
-    if not known.all():
-        for k in np.flatnonzero(~known).tolist():
-            found[k] = None
-    return found  # type: ignore[no-any-return]
-
-
 def columns(**values: Iterable[Any]) -> dict[str, list[Any]]:
     """Columns of a data set: arrays become short lists."""
     return {name: shorts(v) if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
@@ -113,9 +88,9 @@ def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
     return {"field": name, "type": "quantitative", "title": title, "scale": scale, **more}
 
 
-def _roomy(axis: Spec) -> Spec:
+def _roomy(axis: Spec, pixels: int = 14) -> Spec:
     """With room for the marks at the ends."""
-    return {**axis, "scale": {**axis["scale"], "padding": 14}}
+    return {**axis, "scale": {**axis["scale"], "padding": pixels}}
 
 
 def _row(name: str = "row") -> Spec:
@@ -307,7 +282,8 @@ def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart
     data : mapping
         ``rows``: columns ``row``, ``cost`` [ms], ``error``, ``family``, ``front`` (bool).
     """
-    x, y = _roomy(_axis("cost", "Time per epoch [ms]", log=True)), _roomy(_axis("error", y_title, log=True))
+    x = _roomy(_axis("cost", "Time per epoch [ms]", log=True))
+    y = _roomy(_axis("error", y_title, log=True), _NAME_ROOM)
     rows = {"data": {"name": "rows"}}
     layers: list[Spec] = [
         {
@@ -345,7 +321,8 @@ def detection(name: str, data: Mapping[str, Any]) -> Chart:
     data : mapping
         ``rows``: columns ``row``, ``found``, ``false``, ``front`` (bool).
     """
-    place = {"x": _roomy(_axis("false", "False alarms [%]")), "y": _roomy(_axis("found", "Faults detected [%]"))}
+    x, y = _axis("false", "False alarms [%]"), _axis("found", "Faults detected [%]")
+    place = {"x": _roomy(x), "y": _roomy(y, _NAME_ROOM)}
     tip = _tip(row="Estimator", found="Faults detected [%]", false="False alarms [%]")
     layers: list[Spec] = [
         {
@@ -369,12 +346,26 @@ def _front_colour() -> Spec:
 
 
 def _front_names(place: Spec) -> Spec:
-    """The names of the points of a Pareto front."""
+    """The names of the points of a Pareto front, above them: to the left where the right edge would cut the name."""
+    at = f"scale('x', datum['{place['x']['field']}'])"
+    left = f"{at} > width / 2 && {at} + {_NAME_GAP} + {_LETTER} * length(datum.row) > width"
     return {
         "transform": [{"filter": "datum.front"}],
-        "mark": {"type": "text", "align": "left", "dx": 7, "dy": -6, "fontSize": 11, "color": "$ink"},
+        "mark": {
+            "type": "text",
+            "align": {"expr": f"{left} ? 'right' : 'left'"},
+            "dx": {"expr": f"{left} ? {-_NAME_GAP} : {_NAME_GAP}"},
+            "baseline": "bottom",
+            "dy": -4,
+            "fontSize": 11,
+            "color": "$ink",
+        },
         "encoding": {**place, "text": {"field": "row"}},
     }
+
+
+_NAME_GAP, _LETTER = 7, 6.5  # from a point to its name, and a letter of it [pixels]
+_NAME_ROOM = 26  # for a name above the highest point [pixels]
 
 
 def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str) -> Chart:

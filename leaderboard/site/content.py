@@ -62,6 +62,8 @@ class ScenarioEntry:
         Facts that are shown beside the title.
     title, description, source, toml, group : str
         Empty for one that is not in the catalogue.
+    from_file : bool
+        Whether it is not in the catalogue, so that it came from a file of somebody's own.
     """
 
     id: str
@@ -75,6 +77,7 @@ class ScenarioEntry:
     source: str = ""
     toml: str = ""
     group: str = "other"
+    from_file: bool = False
 
     @property
     def data(self) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.leaderboard.results.stored_series import read_ahead
-from simnav.leaderboard.site.charts import shorts
+from simnav.leaderboard.site.rounding import shorts
 from simnav.scoring.integrity import RISK
 from simnav.scoring.plot_series import DIAGNOSTICS
 

@@ -43,8 +43,11 @@ def entries(
 
 
 def argument_of(identity: str) -> str:
-    """A scenario as it is asked for: one that is not in the catalogue came from a file."""
-    return identity if catalogued(identity) is not None else f"{identity.rpartition('-v')[0]}.toml"
+    """A scenario as it is asked for: one that is not in the catalogue came from a file.
+
+    Results do not say where the file is or what it is called. So the folder stands for what the reader has to fill in.
+    """
+    return identity if catalogued(identity) is not None else f"PATH/TO/{identity.rpartition('-v')[0]}.toml"
 
 
 def _scenario(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry:
@@ -54,7 +57,9 @@ def _scenario(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry
     facts = [Fact("Version", version or "–"), Fact("Seeds", len(seeds))]
     scenario = catalogued(identity)
     if scenario is None:
-        return ScenarioEntry(identity, name or identity, page, seeds, argument_of(identity), tuple(facts))
+        return ScenarioEntry(
+            identity, name or identity, page, seeds, argument_of(identity), tuple(facts), from_file=True
+        )
     facts += [Fact("Duration", tables.duration(scenario.duration)), Fact("Step", tables.duration(scenario.step))]
     if scenario.instruments:
         facts.append(Fact("Instruments", len(scenario.instruments)))

@@ -13,10 +13,10 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background
-from simnav.leaderboard.site.charts import short, shorts
 from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
 from simnav.leaderboard.site.content import Fact
 from simnav.leaderboard.site.losses import losses
+from simnav.leaderboard.site.rounding import short, shorts
 from simnav.leaderboard.site.scenario_page import inside_chart, track_from
 
 if TYPE_CHECKING:
@@ -259,7 +259,7 @@ def _worst_page(
         "seed": result.seed,
         "note": result.note,
         "ratio": short(ratio),
-        "error": short(result.scores.get("horizontal_rmse")),
+        "error": tables.number(result.scores.get("horizontal_rmse")),
         "command": f"simnav run {scenario.argument} --seed {result.seed} -e {label} --plot run.svg",
         "charts": [c.to_dict() for c in made],
     }

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from simnav.leaderboard.ranking.statistics import FAILURE
-from simnav.leaderboard.site.charts import short
 from simnav.leaderboard.site.columns import Column, plain
 from simnav.leaderboard.site.facts import catalogued
+from simnav.leaderboard.site.rounding import short
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.confinement import confined
-from simnav.leaderboard.site.charts import accuracy_and_cost, detection, short, spread
+from simnav.leaderboard.site.charts import accuracy_and_cost, detection, spread
 from simnav.leaderboard.site.columns import Column, plain
+from simnav.leaderboard.site.rounding import short
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking, Row, TrackRanking, TrackRow

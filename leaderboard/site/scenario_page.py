@@ -11,10 +11,11 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background, truth_of
-from simnav.leaderboard.site.charts import Chart, short
+from simnav.leaderboard.site.charts import Chart
 from simnav.leaderboard.site.columns import SCORES_SHOWN
 from simnav.leaderboard.site.curves import Curves, Gathered
 from simnav.leaderboard.site.overview import bar_scale, board_columns, board_row
+from simnav.leaderboard.site.rounding import short
 from simnav.leaderboard.site.sweeps import SweepFile
 from simnav.scoring.integrity import ALERT_LIMITS
 from simnav.scoring.plot_series import DIAGNOSTICS
@@ -146,7 +147,7 @@ def scenario_data(
         "runs": {
             "seeds": list(seeds),
             "all": list(entry.seeds),
-            "charts": [c.to_dict() for c in _run_charts()],
+            "charts": [c.to_dict() for c in _run_charts(around)],
             "inside": [inside_chart(k, around).to_dict() for k in sorted(kinds, key=_by_instrument)],
         },
         "sweeps": [sweep.section(k) for k, sweep in enumerate(sweeps)],
@@ -210,7 +211,8 @@ def _table(
                 and column.key != "nees_horizontal"
                 and row.ranked
                 and found.value == best[column.key],
-                "help": f"95 % interval of the median: {short(factor * found.low)} to {short(factor * found.high)}"
+                "help": f"95 % interval of the median: {tables.number(factor * found.low)} to "
+                f"{tables.number(factor * found.high)}"
                 if math.isfinite(found.low)
                 else None,
             }
@@ -259,7 +261,9 @@ def _over_all_runs(
         duration = max([float(time[-1]) if len(time) else 0.0, *ends])
         made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}.", duration))
     drawn = _counted([len(c) for c in by.values() if c], len(entry.seeds))
-    words = f"Median over {drawn}, and the band from the 5th to the 95th percentile. Shaded: faults of seed {first}."
+    words = f"Median over {drawn}, and the band from the 5th to the 95th percentile."
+    if faults["start"]:
+        words += f" Shaded: faults of seed {first}."
     for key, title, unit, factor in curves.QUANTITIES:
         found = {n: b for n, c in by.items() if (b := curves.band(c, key, factor, time)) is not None}
         if not found:
@@ -395,18 +399,21 @@ def _run_name(result: Result) -> str:
 # -- single runs -------------------------------------------------------------------------------------------
 
 
-def _run_charts() -> list[Chart]:
-    """Charts of one run, without data: they are read when a run is chosen."""
-    made = [
-        charts.track(
-            "track",
-            "Track",
-            {},
-            "With a circle at its start and a square at its end: the true track. Wide: where faults act. Grey: fixes.",
-        )
-    ]
+def _run_charts(around: Background) -> list[Chart]:
+    """Charts of one run, without data: they are read when a run is chosen.
+
+    Their captions name faults and fixes only where a recording of the runs has them.
+    """
+    faulty = any(run["faults"]["start"] for run in around.runs.values())
+    words = "With a circle at its start and a square at its end: the true track."
+    if faulty:
+        words += " Wide: where faults act."
+    if any(run["track"]["fixes"]["name"] for run in around.runs.values()):
+        words += " Grey: fixes."
+    made = [charts.track("track", "Track", {}, words)]
+    words = "Of this run. Shaded: faults." if faulty else "Of this run."
     for key, title, unit, _ in curves.QUANTITIES:
-        made.append(charts.over_time(f"run-{key}", title, unit, {}, "Of this run. Shaded: faults.", spread=False))
+        made.append(charts.over_time(f"run-{key}", title, unit, {}, words, spread=False))
     return made
 
 

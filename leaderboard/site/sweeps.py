@@ -15,7 +15,8 @@ from typing import Any
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.plain import plain
-from simnav.leaderboard.site.charts import Chart, dial, short
+from simnav.leaderboard.site.charts import Chart, dial
+from simnav.leaderboard.site.rounding import short
 from simnav.leaderboard.sweep.report import Sweep
 
 __all__ = ["SweepFile", "find", "write"]

@@ -5,8 +5,12 @@ from __future__ import annotations
 import io
 import time
 
+import pytest
 from rich.console import Console
+from rich.text import Text
+from typer.main import get_command
 
+from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.cli.console import Output, ProgressBar
 
 
@@ -42,3 +46,16 @@ def test_progress_on_a_terminal_begins_each_stage_anew():
         wait_for("running", screen)
     assert "running" in screen.getvalue()
     assert "16" not in screen.getvalue()
+
+
+def commands_of(command, name: str = "simnav"):
+    yield pytest.param(command, id=name)
+    for below, each in getattr(command, "commands", {}).items():
+        yield from commands_of(each, f"{name} {below}")
+
+
+@pytest.mark.parametrize("command", list(commands_of(get_command(app))))
+def test_help_is_shown_as_it_is_written(command):
+    """Rich takes words in square brackets for a style and shows none of them."""
+    for text in (command.help, *(getattr(p, "help", None) for p in command.params)):
+        assert Text.from_markup(text or "").plain == (text or "")

@@ -375,6 +375,15 @@ def test_the_names_are_the_last_to_go_from_a_narrow_terminal(width: int):
     assert "estimator" in table.shown(10)
 
 
+@pytest.mark.parametrize(("seeds", "known"), [(3, False), (12, True)])
+def test_the_interval_is_explained_only_where_the_table_has_one(seeds: int, known: bool) -> None:
+    table = track_table(ranked(campaign(SIMPLE, seeds)).track("sea"))
+    assert ("95 % interval" in table.shown(500)) == known
+    assert ("95 % interval" in (table.caption or "")) == known
+    assert "counts 1000." in (table.caption or "")
+    assert " Rank: rows that share a rank" in (table.caption or "")
+
+
 def test_a_row_that_only_smooths_beside_another_is_ranked_by_what_it_smooths() -> None:
     """As it declares, and only where the results agree in every run."""
     assert describe("ekf-rts").real_time_as == "ekf"

@@ -159,7 +159,7 @@ def test_the_board_has_a_table_a_track_and_shows_identical_oracles_once(folder, 
     assert rows["inertial"]["mark"] == "unsuitable"
     assert rows["ekf"]["rank"] in (1, 2)
     shown = Page(folder / "index.html").text
-    assert f"--scenario made-up-one.toml,made-up-two.toml,{catalogued}" in shown
+    assert f"--scenario PATH/TO/made-up-one.toml,PATH/TO/made-up-two.toml,{catalogued}" in shown
     assert "ekf:gate=3.5" in shown
 
 
@@ -213,6 +213,36 @@ def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):
     row = next(r for r in data["table"]["rows"] if r["name"]["text"] == "ekf")
     assert row["heading_rmse"]["value"] == pytest.approx(2.0)  # in degrees
     assert all(c["name"] != "timeline" for c in data["charts"])
+
+
+def test_commands_name_the_file_of_a_scenario_that_does_not_come_with_simnav(results, folder, catalogued, tmp_path,
+                                                                             no_charts):  # fmt: skip
+    own = [r for r in results if r.scenario in SCENARIOS]
+    text = Page(site.build(own, rank(own), tmp_path / "own")).text
+    assert "--scenario PATH/TO/made-up-one.toml,PATH/TO/made-up-two.toml --estimator" in text
+    assert "simnav evaluate my_filter.py --scenario PATH/TO/made-up-one.toml --runs 20" in text
+    assert "The scenarios made-up-one, made-up-two are not part of simnav" in text
+    assert "The scenarios made-up-one, made-up-two are not part of simnav" in Page(tmp_path / "own" / "about.html").text
+    assert "The scenario made-up-one is not part of simnav" in Page(folder / f"{SCENARIOS[0]}.html").text
+    assert "not part of simnav" not in Page(folder / f"{catalogued}.html").text
+
+
+def test_captions_speak_of_shaded_faults_only_where_faults_are_shaded(folder, catalogued):
+    def captions(name: str) -> str:
+        data = data_of(folder / f"{name}.html")
+        return " ".join(c["caption"] for c in [*data["charts"], *data["inside"], *data["runs"]["charts"]])
+
+    known, unknown = captions(catalogued), captions(SCENARIOS[0])
+    for words in (
+        "Shaded: faults of seed 0.",
+        "Of this run. Shaded: faults.",
+        "Wide: where faults act.",
+        "Grey: fixes.",
+    ):
+        assert words in known
+        assert words not in unknown
+    assert "Shaded" not in unknown
+    assert "Of this run." in unknown
 
 
 def test_the_page_of_an_estimator_says_what_it_is(folder):

@@ -1,0 +1,45 @@
+"""Charts of the site, drawn by the library itself, without a browser."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from simnav.leaderboard.site import charts
+from simnav.leaderboard.site.library import VEGA_LITE
+from simnav.leaderboard.site.print_figures import filled
+
+FONT = 11
+
+
+def names_of(chart: charts.Chart, width: int) -> dict[str, tuple[str, float, float]]:
+    """Anchor and place of the names beside the points, from the upper left corner of the axes."""
+    import vl_convert
+
+    svg = vl_convert.vegalite_to_svg(filled(chart, (), width), vl_version=VEGA_LITE)
+    place = r'text-anchor="(\w+)" transform="translate\(([-\d.]+),([-\d.]+)\)"'
+    pattern = rf"<text [^>]*{place}[^>]*>(first-\w+|last-\w+)</text>"
+    return {name: (anchor, float(x), float(y)) for anchor, x, y, name in re.findall(pattern, svg)}
+
+
+@pytest.mark.parametrize("width", [300, 620])
+def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
+    front = {"row": ["first-row", "last-row"], "front": [True, True]}
+    cost = charts.accuracy_and_cost(
+        "cost", "Score", {"rows": front | {"cost": [0.15, 0.23], "error": [12.4, 9.7], "family": ["a", "b"]}}
+    )
+    detection = charts.detection("detection", {"rows": front | {"false": [1.0, 9.0], "found": [50.0, 90.0]}})
+    for chart in (cost, detection):
+        found = names_of(chart, width)
+        assert found["first-row"][0] == "start"
+        assert found["last-row"][0] == "end"
+        for _, x, y in found.values():
+            assert 0.0 < x < width
+            assert y > 1.2 * FONT  # the text stands above this line
+
+
+def test_a_long_name_in_the_middle_is_not_cut() -> None:
+    front = {"row": ["first-row", "last-" + "x" * 40], "front": [True, True], "family": ["a", "b"]}
+    chart = charts.accuracy_and_cost("cost", "Score", {"rows": front | {"cost": [0.1, 0.101], "error": [3.0, 2.0]}})
+    assert names_of(chart, 620)["last-" + "x" * 40][0] == "end"
