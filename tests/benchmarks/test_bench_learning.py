@@ -88,7 +88,8 @@ def test_vector_forms_of_guidance_side_by_side(benchmark):
     bank.reset(seed=1)
     actions = np.zeros(bank.action_space.shape, np.float32)
     benchmark.pedantic(bank.step, (actions,), rounds=5, iterations=30, warmup_rounds=1)
-    assert median["bank"] > 0.8 * median["SyncVectorEnv"]  # 1.2 to 2.2 times; a busy machine must not fail it
+    if benchmark.enabled:  # a busy machine must not fail the tests
+        assert median["bank"] > 0.8 * median["SyncVectorEnv"]  # 1.2 to 2.2 times
 
 
 def test_a_step_of_guidance(benchmark):

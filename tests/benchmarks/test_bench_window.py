@@ -155,7 +155,7 @@ def test_weightings_cost_at_most_half_more(benchmark, recording: Recording, plac
     print(f"\n{place}: {listed}")
     benchmark.extra_info.update({f"{name}_ratio": ratio for name, ratio in ratios(costs).items()})
     benchmark.pedantic(lambda: None, rounds=1)
-    assert max(ratios(costs).values()) < 1.5, ratios(costs)
+    assert max(ratios(costs).values()) < (1.5 if benchmark.enabled else 3.0), ratios(costs)
 
 
 def test_cost_at_high_rates(benchmark):
@@ -180,7 +180,8 @@ def test_cost_at_high_rates(benchmark):
     print("\n" + ", ".join(f"{key}: {median:.2f} ms" for key, median in medians.items()))
     benchmark.extra_info.update({f"{key}_ms": median for key, median in medians.items()})
     benchmark.pedantic(lambda: None, rounds=1)
-    assert medians["sw-fgo, 1 s"] < medians["sw-fgo, 0.2 s"] < 0.75 * medians["sw-fgo, 0 s"], medians
+    part = 0.75 if benchmark.enabled else 1.0
+    assert medians["sw-fgo, 1 s"] < medians["sw-fgo, 0.2 s"] < part * medians["sw-fgo, 0 s"], medians
 
 
 def test_cost_against_the_length_of_the_window(benchmark, recording: Recording):
@@ -202,7 +203,7 @@ def test_cost_against_the_length_of_the_window(benchmark, recording: Recording):
         draw(costs)
     own = costs[OURS[0]]
     power = np.log(own[200] / own[50]) / np.log(4.0)  # 2 if it were quadratic
-    assert power < 1.3, own
+    assert power < (1.3 if benchmark.enabled else 1.8), own
 
 
 def draw(costs: dict[str, dict[int, float]]) -> None:
