@@ -38,7 +38,8 @@ def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | 
         if math.isfinite(r.score)
     ]
     axis = "Error, as a multiple of the reference figure" if track.relative else "Error [m]"
-    return dots(points, style, label=axis, title=f"{track.title}, 95 % interval")
+    known = any(math.isfinite(p.low) for p in points)
+    return dots(points, style, label=axis, title=track.title + (", 95 % interval" if known else ""))
 
 
 def _note(row: TrackRow) -> str:

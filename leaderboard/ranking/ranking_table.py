@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 _CAPTION = (
-    "{score}: geometric mean over the runs, each scenario counting the same; a failed run counts {cap:g}.{interval} "
+    "{score}: geometric mean over the runs, each scenario counting the same; a failed run counts {cap:g}. "
     "Rank: rows that share a rank cannot be told apart."
 )
 
@@ -36,12 +36,10 @@ def score_title(track: TrackRanking) -> str:
 
 
 def score_caption(track: TrackRanking) -> str:
-    """What the score, its interval and the rank are; a few runs give no interval, so that none is explained."""
+    """What the score and the rank are."""
     what = f"{SCORES[track.score].title} [{SCORES[track.score].unit}]" if track.score in SCORES else track.score
     what = f"× reference: {what} over the scenario's reference figure" if track.relative else f"Error: {what}"
-    known = any(between(r.low, r.high) for r in track.rows)
-    interval = " 95 % interval: of the errors of completed runs." if known else ""
-    return _CAPTION.format(score=what, cap=FAILURE, interval=interval)
+    return _CAPTION.format(score=what, cap=FAILURE)
 
 
 def tier_starts(tiers: Sequence[int | None]) -> list[bool]:
@@ -123,4 +121,5 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
         dim=[i for i, r in enumerate(track.rows) if not r.ranked],
         strong=[i for i, r in enumerate(track.rows) if r.estimator in mine],
         caption=" ".join(notes),
+        explained={"95 % interval": "95 % interval: of the errors of completed runs."},
     )

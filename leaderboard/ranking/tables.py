@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -192,6 +192,8 @@ class Fitted:
         How many are never left out.
     numeric, dim, strong, caption
         As of `table`.
+    explained : mapping of str to str
+        Sentences that are added to the caption where their column is shown.
     """
 
     title: str
@@ -203,6 +205,7 @@ class Fitted:
     dim: Sequence[int] = ()
     strong: Sequence[int] = ()
     caption: str | None = None
+    explained: Mapping[str, str] = field(default_factory=dict)
 
     def shown(self, width: int) -> list[str]:
         """The columns that fit into a width [characters], in the order of the table."""
@@ -226,10 +229,10 @@ class Fitted:
         kept = self.shown(options.max_width)
         where = [self.columns.index(name) for name in kept]
         left = [c for i, c in enumerate(self.columns) if c not in kept and any(row[i] != "" for row in self.rows)]
-        caption = self.caption
+        notes = [self.caption, *(text for name, text in self.explained.items() if name in kept)]
         if left:
-            note = f"Left out for want of width: {', '.join(left)}."
-            caption = f"{caption} {note}" if caption else note
+            notes.append(f"Left out for want of width: {', '.join(left)}.")
+        caption = " ".join(filter(None, notes)) or None
         yield table(
             self.title, kept, [[row[i] for i in where] for row in self.rows], numeric=self.numeric, dim=self.dim,
             strong=self.strong, caption=caption,

@@ -379,7 +379,9 @@ def _spread(
         return None
     most = max(len(runs[row.estimator].good) for row in ranking.rows)
     some = f", at most {_TICKS} of a row from the smallest to the largest value" if most > _TICKS else ""
-    caption = f"Ticks: runs that ended well{some}. Point and line: the median with its 95 % interval."
+    line = any(low < high for low, high in zip(middles["low"], middles["high"], strict=True))
+    middle = "Point and line: the median with its 95 % interval." if line else "Point: the median."
+    caption = f"Ticks: runs that ended well{some}. {middle}"
     if ideal:
         caption += " In the band the covariance agrees with the errors; to the right the estimator is optimistic."
     return charts.spread(name, title, axis, {"runs": ticks, "middles": middles}, caption, ideal=ideal)

@@ -268,6 +268,8 @@ class _Site:
     def write(self, runs_shown: int, figures: bool, sweeps: Sequence[SweepFile]) -> None:
         """Write all pages and data."""
         (self.folder / "data").mkdir()
+        if figures:
+            (self.folder / "figures").mkdir()
         seeds = {
             s: seeds_to_show(self.ranking.scenario(s), self.runs[s], entry.seeds, runs_shown)
             for s, entry in self.scenarios.items()
@@ -370,7 +372,6 @@ class _Site:
     def _print(self, scenario: ScenarioEntry, found: ScenarioData) -> None:
         from simnav.leaderboard.site.print_figures import filled, write_figure
 
-        (self.folder / "figures").mkdir(exist_ok=True)
         for chart in found.charts:
             write_figure(filled(chart, found.first), self.folder / "figures" / f"{scenario.data}-{chart.name}")
 

@@ -90,7 +90,9 @@ class SweepFile:
         unit = "" if score["unit"] == "-" else f" [{score['unit']}]"
         runs = max((p["error"]["runs"] for p in self.content["points"]), default=0)
         data = {"curves": {"rows": curves}, "marks": {"rows": marks}}
-        return dial(name, across, f"{score['title']}{unit}", data, f"Median of {runs} runs with its 95 % interval.")
+        known = any(short(p["error"]["low"]) is not None for p in self.content["points"])
+        band = " with its 95 % interval" if known else ""
+        return dial(name, across, f"{score['title']}{unit}", data, f"Median of {runs} runs{band}.")
 
 
 def _title(values: Mapping[str, Any]) -> str:

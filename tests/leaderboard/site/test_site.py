@@ -355,6 +355,22 @@ def test_a_failure_leaves_the_old_site_and_nothing_else(results, tmp_path, monke
     assert [p.name for p in tmp_path.iterdir()] == ["site"]
 
 
+def test_a_site_for_print_of_three_seeds_has_all_figures_and_speaks_of_no_interval(results, tmp_path):
+    seeds = sorted({r.seed for r in results})[:3]
+    few = [r for r in results if r.scenario == SCENARIOS[0] and r.seed in seeds and r.estimator in ("ekf", "sw-fgo")]
+    output = tmp_path / "site"
+    site.build(few, rank(few), output, figures=True)
+    names = {p.name for p in (output / "figures").iterdir()}
+    (board,) = (n for n in names if n.startswith("board-") and n.endswith(".svg"))
+    assert "95 % interval" not in (output / "figures" / board).read_text()
+    made = data_of(output / f"{SCENARIOS[0]}.html")["charts"]
+    assert made
+    assert {f"{SCENARIOS[0]}-{c['name']}.png" for c in made} <= names
+    captions = " ".join(c["caption"] for c in made)
+    assert "Point: the median." in captions
+    assert "95 % interval" not in captions
+
+
 def test_a_folder_with_other_files_is_left_alone(results, tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(RequestError, match="other files"):
