@@ -38,8 +38,11 @@ __all__ = [
 ]
 
 #: What makes recordings, and what runs an estimator over them: the imports are followed from here.
-SIMULATOR = ("simnav.source", "simnav.simulation.simulator", "simnav.log.source", "simnav.sensors")
+SIMULATOR = ("simnav.source", "simnav.simulation.simulator", "simnav.sensors")
 RUNNER = ("simnav.trial",)
+
+#: What reads the files of real voyages. It decides the recordings of recorded scenarios, and of no other.
+_LOGS = "simnav.log"
 
 _ABSENT = "absent"
 
@@ -73,14 +76,16 @@ def _installed_code(package: str) -> str:
 
 
 def simulator_version() -> str:
-    """Version of simnav with a digest of the code that makes recordings."""
+    """Version of simnav with a digest of the code that makes recordings; what reads log files is not in it."""
     from importlib.metadata import version
 
-    return f"{version('simnav')}+{_code_digest(followed(SIMULATOR))[:12]}"
+    return f"{version('simnav')}+{_code_digest(followed(SIMULATOR, without=[_LOGS]))[:12]}"
 
 
 def recording_digest(scenario: Scenario, simulator: str) -> str:
     """Digest of all that decides the recordings of a scenario, but the seed.
+
+    Of a recorded scenario the log files and the code that reads them count, too.
 
     Parameters
     ----------
@@ -106,7 +111,7 @@ def _log_digest(scenario: Scenario) -> str:
                 files.append((f"{recording}/{file.path}", path))
     except (ValueError, OSError):  # every run says so
         return _ABSENT
-    return files_digest(files)
+    return digest(files_digest(files), _code_digest(followed([f"{_LOGS}.source"])))
 
 
 def has_recordings(scenario: Scenario) -> bool:

@@ -12,7 +12,7 @@ import ast
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -211,7 +211,9 @@ def _named_files(tree: ast.Module) -> set[str]:
 # --- following imports --------------------------------------------------------------------------------
 
 
-def followed(modules: Iterable[str] = (), files: Iterable[Path] = ()) -> dict[str, str]:
+def followed(
+    modules: Iterable[str] = (), files: Iterable[Path] = (), *, without: Collection[str] = ()
+) -> dict[str, str]:
     """Modules and files, and all that they import: name -> digest of the code.
 
     Parameters
@@ -220,6 +222,8 @@ def followed(modules: Iterable[str] = (), files: Iterable[Path] = ()) -> dict[st
         Absolute names of modules of simnav.
     files : iterable of Path
         Python files of others; of the files beside them those that they import count, too.
+    without : collection of str
+        Packages of simnav that are not followed.
 
     Returns
     -------
@@ -227,7 +231,7 @@ def followed(modules: Iterable[str] = (), files: Iterable[Path] = ()) -> dict[st
         In the order of the names. A module of simnav goes by its absolute name, any other file by its path relative
         to the folder of the file that brought it, so that a folder may be moved.
     """
-    walk = _Walk()
+    walk = _Walk((_ABOVE, *without))
     for module in modules:
         walk.module(module)
     for path in files:
@@ -239,7 +243,8 @@ def followed(modules: Iterable[str] = (), files: Iterable[Path] = ()) -> dict[st
 class _Walk:
     """Modules that were found, and those whose imports are still to be followed."""
 
-    def __init__(self) -> None:
+    def __init__(self, without: Iterable[str]) -> None:
+        self.without = tuple(without)
         self.found: dict[str, str] = {}
         self.todo: list[tuple[Code, Path | None, Path]] = []  # code, folder of a file of others, its own folder
         self.taken: set[tuple[str, str]] = set()
@@ -247,7 +252,7 @@ class _Walk:
     def module(self, name: str) -> bool:
         """Take a module of simnav; returns whether there is such a module."""
         place = _place(name)
-        if place is None or name == _ABOVE or name.startswith(f"{_ABOVE}."):
+        if place is None or any(name == package or name.startswith(f"{package}.") for package in self.without):
             return False
         if name not in self.found:
             package = name if place.name == "__init__.py" else name.rpartition(".")[0]
