@@ -1,7 +1,7 @@
 """What an adaptation costs: every row beside the plain EKF, over two minutes of the open sea (four instruments).
 
 Compared are whole updates, the IMU's second included. The plain EKF takes a measurement in one kernel; a filter that
-adapts takes it in two, with the adaptation in Python between them. More than half of what the rows cost beyond the
+adapts takes it in two, with the adaptation in Python between them. At least a third of what the rows cost beyond the
 plain filter is that division: see ``fading-ekf``, which only multiplies P by a number.
 """
 
