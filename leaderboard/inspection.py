@@ -37,14 +37,18 @@ def rescore(
     key: str | os.PathLike[str] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> Rescored:
-    """Compute scores again from the trials that a campaign kept; no estimator runs.
+    """Compute scores from the trials that a campaign kept; no estimator runs.
+
+    A trial is kept in single precision, so that a score that is computed again agrees to about seven digits. What a
+    result has stays therefore, unless it is asked for by name, or its code has changed.
 
     Parameters
     ----------
     results : path
         Folder that a campaign wrote with ``keep_trials``. Its results get the scores.
     scores : str or iterable of str
-        Keys of `simnav.scoring.SCORES`; default: all, those of plug-ins too.
+        Keys of `simnav.scoring.SCORES`; default: those that a result lacks, and those of simnav whose code has changed
+        since.
     scenarios : scenarios, optional
         That are not in the catalogue.
     key : path, optional

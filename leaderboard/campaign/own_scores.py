@@ -10,7 +10,7 @@ from simnav.leaderboard.campaign.session_class import carry, is_session, receive
 from simnav.leaderboard.campaign.sources import digest, followed
 from simnav.plugins import is_file_module, load_plugin, place_of
 
-__all__ = ["OwnScores", "own_scores", "scoring_code", "scoring_differs"]
+__all__ = ["OwnScores", "own_scores", "same_code", "scoring_code", "scoring_differs"]
 
 
 @dataclass(frozen=True)
@@ -82,3 +82,13 @@ def scoring_differs(before: str, now: str) -> bool:
         return True
     old, new = json.loads(before), json.loads(now)
     return any(new.get(home) != code for home, code in old.items())
+
+
+def same_code(before: str, now: str) -> frozenset[str]:
+    """The modules of simnav whose scores a result has as they would be computed now.
+
+    >>> sorted(same_code('{"a": "1", "b": "1"}', '{"a": "1", "b": "2", "c": "1"}'))
+    ['a']
+    """
+    old, new = json.loads(before or "{}"), json.loads(now)
+    return frozenset(home for home, code in new.items() if old.get(home) == code)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
-from simnav.leaderboard.campaign.own_scores import scoring_code
+from simnav.leaderboard.campaign.own_scores import same_code, scoring_code, scoring_differs
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -32,9 +32,11 @@ class Rescored:
     folder : Path
         Folder of the results.
     scores : tuple of str
-        Names.
+        Names of those that were computed.
     rescored : int
-        Results that have these scores now.
+        Results that were given any of them.
+    complete : int
+        Results with a trial that had all their scores already.
     without_trial : int
         Results that keep what they had, for there is no trial: none was kept, or the run gave nothing.
     seconds : float
@@ -44,6 +46,7 @@ class Rescored:
     folder: Path
     scores: tuple[str, ...]
     rescored: int
+    complete: int
     without_trial: int
     seconds: float
 
@@ -53,6 +56,7 @@ class Rescored:
             "results": str(self.folder),
             "scores": list(self.scores),
             "rescored": self.rescored,
+            "complete": self.complete,
             "without_trial": self.without_trial,
             "seconds": self.seconds,
         }
@@ -66,14 +70,17 @@ def rescore_results(
     keys: Collection[str] | None = None,
     seal: Seal | None = None,
 ) -> Rescored:
-    """Compute scores of the current results of a folder again, from the trials that were kept.
+    """Compute scores of the current results of a folder, from the trials that were kept.
+
+    A trial is kept in single precision. What the campaign computed from all digits therefore stays, unless it is asked
+    for by name.
 
     Parameters
     ----------
     folder : path
         Folder of the results.
     names : iterable of str
-        Of scores; default: all that are known.
+        Of scores; default: those that a result lacks, and those of simnav whose code has changed since.
     scenarios : iterable of Scenario
         Those that are not in the catalogue.
     progress : callable, optional
@@ -102,8 +109,8 @@ def rescore_results(
 
     started = time.monotonic()
     path = Path(folder).resolve()
-    chosen = tuple(names) or tuple(SCORES)
-    for name in chosen:
+    asked = tuple(names)
+    for name in asked:
         if name not in SCORES:
             raise RequestError(f"there is no score {name!r}{closest(name, list(SCORES))}")
     results = store.load(path, series=False)
@@ -111,36 +118,52 @@ def rescore_results(
     if not kept:
         raise RequestError(f"no trials were kept in {path}; 'simnav campaign --keep-trials' keeps them")
     kept = _sealed_alike(kept, seal)
-    by_run: dict[tuple[str, int], list[Result]] = defaultdict(list)
+    code = scoring_code()
+
+    def wanted(result: Result) -> list[str]:
+        if asked:
+            return list(asked)
+        as_now = same_code(result.scoring, code)
+        return [
+            name
+            for name, s in SCORES.items()
+            if name not in result.scores or (s.__module__.startswith("simnav.") and s.__module__ not in as_now)
+        ]
+
+    by_run: dict[tuple[str, int], list[tuple[Result, list[str]]]] = defaultdict(list)
     for result in kept:
-        by_run[result.scenario, result.seed].append(result)
-    known = _scenarios({scenario: found[0] for (scenario, _), found in by_run.items()}, scenarios, seal)
+        if (chosen := wanted(result)) or scoring_differs(result.scoring, code):  # or a module of scores is gone
+            by_run[result.scenario, result.seed].append((result, chosen))
+    known = _scenarios({scenario: found[0][0] for (scenario, _), found in by_run.items()}, scenarios, seal)
     changed: dict[str, Mapping[str, float]] = {}
+    computed: dict[str, None] = {}
     for done, ((scenario, seed), found) in enumerate(sorted(by_run.items(), key=lambda item: item[0])):
         if progress is not None:
             progress(done, len(by_run), note=f"{scenario}, seed {seed}")
         with mistakes(ValueError, FileNotFoundError):
             recording = record(known[scenario], seed if seal is None else seal.seed(scenario, seed))
-        for result in found:
+        for result, chosen in found:
             trial, thinned = trials.read(path, result.key, recording)
-            wanted = [n for n in chosen if not (thinned and SCORES[n].uses_covariance and n in result.scores)]
-            changed[result.key] = {**result.scores, **score(trial, recording, wanted)}
+            now = [n for n in chosen if not (thinned and SCORES[n].uses_covariance and n in result.scores)]
+            changed[result.key] = {**result.scores, **score(trial, recording, now)}
+            computed |= dict.fromkeys(now)
     if progress is not None:
         progress(len(by_run), len(by_run))
-    _store(path, kept, changed, all_of_them=set(chosen) >= set(SCORES))
-    return Rescored(path, chosen, len(changed), len(results) - len(changed), time.monotonic() - started)
+    _store(path, kept, changed, "" if asked and not set(asked) >= set(SCORES) else code)
+    scores = asked or tuple(name for name in SCORES if name in computed)
+    return Rescored(
+        path, scores, len(changed), len(kept) - len(changed), len(results) - len(kept), time.monotonic() - started
+    )
 
 
-def _store(path: Path, kept: list[Result], changed: Mapping[str, Mapping[str, float]], *, all_of_them: bool) -> None:
-    """Write the scores; only where all were computed, the code that they were computed with is today's."""
-    if all_of_them:
-        store.rescore(path, changed, scoring_code())
-        return
+def _store(path: Path, kept: list[Result], changed: Mapping[str, Mapping[str, float]], code: str) -> None:
+    """Write the scores, and with which code all of a result were computed; without ``code`` that stays as it was."""
     by_code: dict[str, dict[str, Mapping[str, float]]] = defaultdict(dict)
     for result in kept:
-        by_code[result.scoring][result.key] = changed[result.key]
-    for code, scores in by_code.items():
-        store.rescore(path, scores, code)
+        if result.key in changed:
+            by_code[code or result.scoring][result.key] = changed[result.key]
+    for whole, scores in by_code.items():
+        store.rescore(path, scores, whole)
 
 
 def _sealed_alike(kept: list[Result], seal: Seal | None) -> list[Result]:

@@ -7,11 +7,12 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError, sentence
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
-__all__ = ["Verification", "verify_results"]
+__all__ = ["CLOSE", "Verification", "verify_results"]
+
+#: Relative difference of a score that was computed from a trial in single precision.
+CLOSE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -41,10 +45,15 @@ class Verification:
         Results that were not made under this key.
     repeated : int
         Runs that were repeated.
+    close : tuple of str
+        Those of which some scores differ by less than `CLOSE`, and which: as scores do that were computed again from
+        a kept trial (`simnav.rescore`).
     different : tuple of str
-        Those that gave other scores.
+        Those that gave other scores, and which.
     not_repeatable : tuple of str
         Those that could not be repeated, and why: other code, or an estimator that is not here.
+    unknown : tuple of str
+        Scores of the results that are not known in this process, for a plug-in was not loaded; they were not looked at.
     """
 
     folder: str
@@ -52,8 +61,10 @@ class Verification:
     seal: str
     other_seals: int
     repeated: int
+    close: tuple[str, ...]
     different: tuple[str, ...]
     not_repeatable: tuple[str, ...]
+    unknown: tuple[str, ...]
 
     @property
     def passed(self) -> bool:
@@ -103,7 +114,7 @@ def verify_results(
     known = {s.id: s for s in scenarios}
     requests = {e.label: e for e in estimators}
     report = progress or (lambda *_, **__: None)
-    different, without = [], []
+    close, different, without, unknown = [], [], [], dict[str, None]()
     with tempfile.TemporaryDirectory(prefix="simnav-verify-") as name:
         for k, result in enumerate(chosen):
             what = f"{result.estimator} on {result.scenario}, run {result.seed}"
@@ -115,12 +126,21 @@ def verify_results(
                 continue
             if again.key != result.key:
                 without.append(f"{what}: simulator, scenario, estimator or parameters are not those of the result")
-            elif again.status != result.status or not _same(result.scores, again.scores):
-                different.append(what)
+                continue
+            if again.status != result.status:
+                different.append(f"{what}: {result.status} is stored, {again.status} came out")
+                continue
+            comparison = _compared(result, again)
+            unknown |= dict.fromkeys(comparison.unknown)
+            if comparison.different:
+                different.append(f"{what}: {_listed(comparison.different)}")
+            elif comparison.close:
+                close.append(f"{what}: {_listed(comparison.close)}")
         report(len(chosen), len(chosen))
     return Verification(
-        str(folder), len(found), wanted, len(found) - len(mine), len(chosen), tuple(different), tuple(without)
-    )
+        str(folder), len(found), wanted, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
+        tuple(without), tuple(unknown),
+    )  # fmt: skip
 
 
 def _repeat(
@@ -142,13 +162,41 @@ def _repeat(
     return next(r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)
 
 
-def _same(stored: Mapping[str, float], again: Mapping[str, float]) -> bool:
-    """Whether scores are the same to the bit, wall times aside; NaN is equal to NaN.
+class _Comparison(NamedTuple):
+    """Scores that differ, each with both values in words, and those that are not known here."""
 
-    What was stored in single precision (`simnav.leaderboard.results.packing`) is compared with the rounded score.
+    close: list[str]
+    different: list[str]
+    unknown: list[str]
+
+
+def _compared(stored: Result, again: Result) -> _Comparison:
+    """Compare scores to the bit, wall times aside; NaN is equal to NaN.
+
+    What was stored in single precision (`simnav.leaderboard.results.packing`) is compared with the rounded score. A
+    score that came to simnav after the results, or by a plug-in, need not be in them.
     """
-    names = {name for name in (*stored, *again) if not name.startswith("update_")}
-    if not all(name in stored and name in again for name in names):
-        return False
-    pairs = [(float(stored[name]), float(again[name])) for name in names]
-    return all(a.hex() in (b.hex(), float(np.float32(b)).hex()) for a, b in pairs)
+    from simnav.scoring import SCORES
+
+    found = _Comparison([], [], [])
+    homes = same_code(stored.scoring, scoring_code())
+    for name in dict.fromkeys((*stored.scores, *again.scores)):
+        if name.startswith("update_"):
+            continue
+        if name not in stored.scores:
+            if SCORES[name].__module__ in homes:
+                found.different.append(f"{name} is missing")
+        elif name not in again.scores:
+            found.unknown.append(name)
+        else:
+            a, b = float(stored.scores[name]), float(again.scores[name])
+            if a.hex() in (b.hex(), float(np.float32(b)).hex()):
+                continue
+            words = f"{name} {a:.9g} is stored, {b:.9g} came out"
+            (found.close if abs(a - b) <= CLOSE * max(abs(a), abs(b)) else found.different).append(words)
+    return found
+
+
+def _listed(scores: Sequence[str], most: int = 3) -> str:
+    more = f"; and {len(scores) - most} more" if len(scores) > most else ""
+    return "; ".join(scores[:most]) + more

@@ -17,7 +17,8 @@ __all__ = ["command"]
 def command(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder of 'simnav campaign --keep-trials'.")],
     score: Annotated[
-        list[str] | None, typer.Option("--score", help="Names of scores, separated by commas. Default: all.")
+        list[str] | None,
+        typer.Option("--score", help="Names of scores, by commas. Default: those that are missing."),
     ] = None,
     scenario: Annotated[
         list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")
@@ -26,15 +27,17 @@ def command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Compute scores again, new ones too, without running an estimator."""
+    """Compute new scores, or others again, without running an estimator."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
 
         with out.progress("rescoring") as progress:
             done = interface.rescore(results, ",".join(score or ()), scenarios=scenario, key=key, progress=progress)
         out.document(done.to_dict())
-        without = f", {done.without_trial} have no trial" if done.without_trial else ""
+        counts = {"were complete": done.complete, "have no trial": done.without_trial}
+        others = "".join(f", {count} {words}" for words, count in counts.items() if count)
+        named = "no score" if not done.scores else ", ".join(done.scores[:5]) + (", ..." if done.scores[5:] else "")
         out.print(
-            f"results: {done.folder} ({done.rescored} have {len(done.scores)} scores now{without})",
+            f"results: {done.folder} ({done.rescored} were given {named}{others})",
             f"next:    simnav leaderboard {quote(str(done.folder))}",
         )

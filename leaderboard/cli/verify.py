@@ -50,6 +50,7 @@ def command(
             _print(out, facts)
             return
         from simnav.leaderboard import interface
+        from simnav.leaderboard.campaign.verification import CLOSE
 
         with out.progress("repeating") as progress:
             done = interface.verify(
@@ -61,9 +62,14 @@ def command(
         if done.other_seals:
             lines.append(f"{done.other_seals} results were not made under this key")
         lines += [f"different: {text}" for text in done.different]
+        lines += [f"close: {text}" for text in done.close]
         lines += [f"not repeatable: {text}" for text in done.not_repeatable]
-        same = done.repeated - len(done.different) - len(done.not_repeatable)
-        lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit")
+        if done.unknown:
+            names = ", ".join(done.unknown)
+            lines.append(f"not known here: {names} ('simnav --plugin FILE verify ...' loads a file of scores)")
+        same = done.repeated - len(done.close) - len(done.different) - len(done.not_repeatable)
+        more = f", {len(done.close)} more within {CLOSE:.0e}" if done.close else ""
+        lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")
         out.print(*lines)
         out.code = 0 if done.passed else FAILED
 

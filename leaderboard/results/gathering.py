@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from collections.abc import Iterable
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.folder import COMPACTED, LOOSE, DamagedError, tables_of
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.store import StoreError
 
@@ -18,7 +20,8 @@ __all__ = ["gather"]
 def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[str]]) -> Path:
     """Put the results of several folders into one, as of the parts of one campaign.
 
-    The folders stay as they are. A run that several of them hold counts once.
+    The folders stay as they are. A run that several of them hold counts once. The copy of a file that is damaged is set
+    aside, with a warning.
 
     Parameters
     ----------
@@ -68,6 +71,15 @@ def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[s
                     (target / part).mkdir(exist_ok=True)
                     with store.atomic(target / part / file.name) as copy, open(file, "rb") as original:
                         shutil.copyfileobj(original, copy)
+                    if part in (COMPACTED, LOOSE):
+                        _looked_through(target / part / file.name)
     store.select(target, {s: (e["recording"], e["estimators"]) for s, e in current.items()})
     store.compact(target)
     return target
+
+
+def _looked_through(file: Path) -> None:
+    """Read a copy as a whole: one that is damaged is set aside, and the original stays as it is."""
+    with contextlib.suppress(DamagedError):
+        for _ in tables_of(file):
+            pass

@@ -59,12 +59,14 @@ def test_a_new_score_after_a_campaign(here: Path, monkeypatch: pytest.MonkeyPatc
     assert campaign(keep_trials=True)[0] == 0  # a new score does not void the campaign
     monkeypatch.setattr("simnav.trial.run_trial", None)  # whoever ran an estimator would fail
     done = simnav.rescore("out", scenarios="pond.toml")
-    assert (done.rescored, done.without_trial, done.scores[-1]) == (4, 0, "north_spread")
+    assert (done.rescored, done.complete, done.without_trial, done.scores) == (4, 0, 0, ("north_spread",))
+    again = simnav.rescore("out", scenarios="pond.toml")
+    assert (again.rescored, again.complete, again.scores) == (0, 4, ())
     after = store.load(here / "out")
     for old, new in zip(before, after, strict=True):
         assert old.key == new.key
-        rescored = {name: value for name, value in new.scores.items() if name != "north_spread"}
-        assert rescored == pytest.approx(old.scores, rel=1e-6, nan_ok=True)
+        kept = {name: repr(value) for name, value in new.scores.items() if name != "north_spread"}
+        assert kept == {name: repr(value) for name, value in old.scores.items()}
         assert new.scores["north_spread"] > 0.0
     ranking = simnav.rank("out", score="north_spread")
     assert ranking.tracks[0].score == "north_spread"
@@ -119,7 +121,7 @@ def test_a_run_without_scores_is_not_void_by_an_edited_score(here: Path, monkeyp
 
 def test_thinned_covariances_leave_scores_that_use_them_as_they_are(here: Path) -> None:
     _, before = campaign(keep_trials=True, covariance_interval=10.0)
-    simnav.rescore("out", scenarios="pond.toml")
+    simnav.rescore("out", list(SCORES), scenarios="pond.toml")
     for old, new in zip(before, store.load(here / "out"), strict=True):
         assert new.scores["nees_horizontal"] == old.scores["nees_horizontal"]
         assert new.scores == pytest.approx(old.scores, rel=1e-6, nan_ok=True)
@@ -144,7 +146,36 @@ def test_what_cannot_be_rescored_is_one_sentence(here: Path, monkeypatch: pytest
         simnav.rescore("out", "cep05")
     simnav.campaign("pond.toml", "gnss-only", runs=1, seed=7, output="out", keep_trials=True, oracle=False)
     with pytest.raises(RequestError, match="scenario pond-v1 is not in the catalogue; give its file with --scenario"):
-        simnav.rescore("out")
+        simnav.rescore("out", "cep50")
     monkeypatch.setattr(rescoring, "simulator_version", lambda: "0.1.0+other")
     with pytest.raises(RequestError, match="the recordings of pond-v1 cannot be made again, for the scenario or the"):
-        simnav.rescore("out", scenarios="pond.toml")
+        simnav.rescore("out", "cep50", scenarios="pond.toml")
+
+
+def test_scores_of_a_plug_in_and_of_kept_trials_are_verified(here: Path) -> None:
+    campaign(keep_trials=True)
+
+    @register_score("north_spread", title="Spread of the north error", unit="m", better="lower")
+    def north_spread(given: ScoringInput) -> float:
+        return float(given.error[:, 0].std())
+
+    simnav.rescore("out", scenarios="pond.toml")
+    wanted = {"sample": 4, "scenarios": "pond.toml", "estimators": ESTIMATORS}
+    known = simnav.verify("out", **wanted)
+    assert (known.passed, known.different, known.unknown) == (True, (), ())
+    assert all("north_spread" in text for text in known.close)
+    registry._REGISTRY._classes.pop("north_spread")
+    assert (simnav.verify("out", **wanted).passed, simnav.verify("out", **wanted).unknown) == (True, ("north_spread",))
+    words = ["verify", "out", "-s", "pond.toml", *(w for e in ESTIMATORS for w in ("-e", e))]
+    said = CliRunner().invoke(app, words)
+    assert said.exit_code == 0, said.output
+    assert "not known here: north_spread ('simnav --plugin FILE verify" in " ".join(said.stdout.split())
+    simnav.rescore("out", "cep50,r95", scenarios="pond.toml")
+    again = simnav.verify("out", **wanted)
+    assert again.passed
+    assert len(again.close) > 0
+    (one, *_) = store.load(here / "out")
+    store.rescore(here / "out", {one.key: {n: v for n, v in one.scores.items() if n != "cep50"}}, one.scoring)
+    without = simnav.verify("out", **wanted)
+    assert (without.passed, len(without.different)) == (False, 1)
+    assert "cep50 is missing" in without.different[0]

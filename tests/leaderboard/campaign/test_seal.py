@@ -81,6 +81,7 @@ def test_a_changed_score_is_found(tmp_path: Path, key: Path) -> None:
     store.rescore(tmp_path / "out", {result.key: {**result.scores, "horizontal_rmse": 0.1}}, result.scoring)
     report = verify_results(tmp_path / "out", read_seal(key), scenarios=[scenario])
     assert (report.passed, len(report.different)) == (False, 1)
+    assert "horizontal_rmse 0.1 is stored, " in report.different[0]
     assert simnav.verify(tmp_path / "out", key=key).to_dict()["not_repeatable"]  # the catalogue's is longer
 
 

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.gathering import gather
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.results.stored_series import StoredSeries
+from simnav.leaderboard.results.store import StoreWarning
+from simnav.leaderboard.results.stored_series import LostSeriesError, StoredSeries, read_ahead
 
 
 @pytest.fixture(params=[False, True], ids=["loose", "compacted"])
@@ -44,3 +46,53 @@ def test_series_stay_on_disk_until_they_are_looked_at(folder: Path):
         np.testing.assert_array_equal(r.series["grid"], np.full((2, 3), k))
         np.testing.assert_array_equal(pickle.loads(pickle.dumps(r.series))["time"], np.arange(4))
     assert dict(store.load(folder, series=False)[0].series) == {}
+
+
+def spoil_series(folder: Path) -> Path:
+    """Flip two bytes in the last column of the series of the first file; scores and keys stay whole."""
+    import pyarrow.parquet as pq
+
+    path = next(p for p in sorted(folder.rglob("*.parquet")) if p.parent.name in ("compacted", "results"))
+    group = pq.ParquetFile(path).metadata.row_group(0)
+    columns = [group.column(k) for k in range(group.num_columns)]
+    column = max((c for c in columns if c.path_in_schema.startswith("series.")), key=lambda c: c.data_page_offset)
+    start = min(filter(None, (column.dictionary_page_offset, column.data_page_offset)))
+    content = bytearray(path.read_bytes())
+    for k in (1, 2):
+        content[start + column.total_compressed_size - k] ^= 0xFF
+    path.write_bytes(bytes(content))
+    return path
+
+
+def test_damaged_series_are_named_and_set_aside_and_the_others_are_read(folder: Path):
+    path = spoil_series(folder)
+    found = store.load(folder)
+    assert [r.scores["a"] for r in found] == [0.0, 1.0, 2.0, 3.0, 4.0]  # they are whole
+    with pytest.warns(StoreWarning) as caught:
+        read = {id(series): held for series, held in read_ahead([r.series for r in found])}
+    assert all(str(path) in str(w.message) for w in caught)
+    assert "the charts lack its runs; 'simnav campaign' computes them again" in str(caught[-1].message)
+    lost = [r.seed for r in found if not read[id(r.series)]]
+    assert lost == ([0, 1, 2, 3, 4] if path.parent.name == "compacted" else [0])
+    assert path.with_name(f"{path.name}.broken").exists()
+    with pytest.raises(LostSeriesError, match="cannot be read any more"):
+        found[0].series["time"]
+    assert {f"k-{seed}" for seed in lost}.isdisjoint(store.keys(folder))  # a campaign computes them again
+
+
+def test_series_that_are_looked_at_alone_name_their_damaged_file(folder: Path):
+    path = spoil_series(folder)
+    first = store.load(folder)[0]
+    with (
+        pytest.raises(LostSeriesError, match=f"{path.name} was damaged and is set aside"),
+        pytest.warns(StoreWarning, match="set aside"),
+    ):
+        first.series["time"]
+
+
+def test_what_is_damaged_is_not_merged(folder: Path, tmp_path: Path):
+    path = spoil_series(folder)
+    with pytest.warns(StoreWarning, match=f"{path.name} is not a whole file of results, set aside"):
+        out = gather(tmp_path / "out", [folder])
+    assert len(store.load(out)) == (0 if path.parent.name == "compacted" else 4)
+    assert path.exists()
