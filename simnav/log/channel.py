@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from simnav.geometry.rotation import wrap_angle
 from simnav.kinds import Component, Kind, geodetic_components, speed_components
 from simnav.log.nmea import read_nmea, utc_seconds
-from simnav.log.spec import LOG_UNITS, ChannelSpec, FileSpec, LogImuSpec, OriginSpec, RecordedSpec
+from simnav.log.spec import (
+    DIMENSIONS,
+    LOG_UNITS,
+    ChannelSpec,
+    FileSpec,
+    LogImuSpec,
+    OriginSpec,
+    RecordedSpec,
+    dimension,
+)
 from simnav.log.table import LogError, LogWarning, Table, check_ascending, read_csv
 from simnav.types import KINDS, Array
 
@@ -162,7 +171,7 @@ def _offset(spec: RecordedSpec, file: FileSpec, recording: str) -> float:
 def _open(
     spec: RecordedSpec, key: str, recording: str, sentence: str | None = None, talker: str | None = None
 ) -> tuple[Table, Array, NDArray[np.int64]]:
-    """Table, times of its rows, and the rows that ``skip_rows`` leaves."""
+    """Table without the rows of ``skip_rows``, times of its rows, and the rows that count."""
     file = spec.files[key]
     path = locate(spec, file, recording)
     if file.format == "nmea":
@@ -173,14 +182,16 @@ def _open(
             raise LogError(f"{table.source}, line {table.line[-1]}: no {file.clock} time; use the other 'clock'")
         rows = _without_bursts(time, np.flatnonzero(np.isfinite(time)), table)
     else:
-        table = read_csv(path)
-        rows = np.arange(file.skip_rows, len(table))
-        if rows.size == 0:
+        table = read_csv(path, file.comment)
+        if len(table) <= file.skip_rows:
             raise LogError(f"{table.source}: {len(table)} rows, of which skip_rows = {file.skip_rows} leaves none")
+        table = table.without_first(file.skip_rows)  # before anything is taken for a number: it may be a row of units
+        rows = np.arange(len(table))
         _, column = table.resolve(file.time)
         time = _csv_time(table, file, column)
     check_ascending(time[rows], Table(table.source, {}, table.line[rows]), column)
-    stamps = np.arange(len(table)) * file.spacing if file.spacing is not None else time * file.scale
+    first = file.skip_rows if file.format == "csv" else 0
+    stamps = np.arange(first, first + len(table)) * file.spacing if file.spacing is not None else time * file.scale
     return table, np.asarray(stamps + _offset(spec, file, recording), dtype=np.float64), rows
 
 
@@ -250,6 +261,7 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     units = (
         (channel.units,) * len(columns) if isinstance(channel.units, str) else channel.units or ("1",) * len(columns)
     )
+    _check_units(table.source, what, kind, columns, units, local=channel.frame != "geodetic")
     value = np.empty((len(rows), len(names)))
     given = np.ones(len(rows), dtype=bool)
     for i, (column, unit) in enumerate(zip(columns, units, strict=True)):
@@ -274,6 +286,19 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
         if component.cyclic and not (kind.geodetic and i < 2):
             value[:, i] = wrap_angle(value[:, i])
     return Series(table.source, time[rows], value, table.line[rows])
+
+
+def _check_units(
+    source: str, what: str, kind: Kind, columns: tuple[int | str, ...], units: tuple[str, ...], *, local: bool
+) -> None:
+    """LogError where the unit of a column is of another dimension than what it holds; "1" is SI and always fits."""
+    for component, column, unit in zip(kind.components, columns, units, strict=True):
+        wanted = dimension("m" if local and kind.geodetic else component.unit)
+        if unit != "1" and wanted and dimension(unit) != wanted:
+            raise LogError(
+                f"{source}, column {column!r}: {component.name} of {what} in {unit!r}; a unit of {wanted} is wanted "
+                f"({', '.join(DIMENSIONS[wanted])})"
+            )
 
 
 def _check_range(

@@ -30,27 +30,57 @@ Fields = list[str]
 Row = dict[str, float]
 
 
-class _NoFixError(Exception):
-    """A well-formed sentence that says that it holds no measurement."""
+#: Positions of GGA that no satellite gave: none, estimated (dead reckoning), entered by hand, of a simulator.
+_NO_FIX = ("", "0", "6", "7", "8")
+#: The same as a mode of RMC, GLL, VTG and THS; an empty one, or none, is of a receiver before version 2.3.
+_NO_MODE = ("N", "E", "M", "S", "V")
+
+
+class _InvalidError(Exception):
+    """A well-formed sentence that says that it holds no measurement; its time is good."""
+
+    def __init__(self, time_of_day: float = math.nan):
+        super().__init__()
+        self.time_of_day = time_of_day
 
 
 def _number(text: str) -> float:
-    return float(text) if text else math.nan
+    value = float(text) if text else math.nan
+    if math.isinf(value):
+        raise ValueError(f"number {text!r}")
+    return value
 
 
-def _angle(text: str, hemisphere: str) -> float:
-    """``ddmm.mmmm`` and N, S, E or W, in radians."""
+def _angle(text: str, hemisphere: str, positive: str, negative: str, largest: float) -> float:
+    """``ddmm.mmmm`` and the hemisphere, in radians."""
     if not text:
         return math.nan
-    if hemisphere not in ("N", "S", "E", "W"):
+    if hemisphere not in (positive, negative):
         raise ValueError(f"hemisphere {hemisphere!r}")
     value = float(text)
     degrees = math.floor(value / 100.0)
     minutes = value - 100.0 * degrees
-    if not 0.0 <= minutes < 60.0 or degrees > 180:
+    if not 0.0 <= minutes < 60.0 or not 0.0 <= degrees + minutes / 60.0 <= largest:
         raise ValueError(f"angle {text!r}")
     angle = (degrees + minutes / 60.0) * _DEG
-    return -angle if hemisphere in "SW" else angle
+    return -angle if hemisphere == negative else angle
+
+
+def _place(f: Fields) -> Row:
+    """Latitude, its hemisphere, longitude, its hemisphere."""
+    return {"latitude": _angle(f[0], f[1], "N", "S", 90.0), "longitude": _angle(f[2], f[3], "E", "W", 180.0)}
+
+
+def _direction(text: str) -> float:
+    """Degrees, in radians."""
+    angle = _number(text)
+    if abs(angle) > 360.0:
+        raise ValueError(f"direction {text!r}")
+    return angle * _DEG
+
+
+def _mode(f: Fields, at: int) -> str:
+    return f[at].strip() if len(f) > at else ""
 
 
 def _time_of_day(text: str) -> float:
@@ -58,11 +88,14 @@ def _time_of_day(text: str) -> float:
         return math.nan
     if len(text) < 6 or not text[:6].isdigit():
         raise ValueError(f"time of day {text!r}")
-    return int(text[:2]) * 3600.0 + int(text[2:4]) * 60.0 + float(text[4:])
+    hours, minutes, seconds = int(text[:2]), int(text[2:4]), float(text[4:])
+    if hours > 23 or minutes > 59 or not seconds < 61.0:  # a leap second is the 60th
+        raise ValueError(f"time of day {text!r}")
+    return hours * 3600.0 + minutes * 60.0 + seconds
 
 
 def _track(course: str, knots: str) -> Row:
-    angle, speed = _number(course) * _DEG, _number(knots) * _KNOT
+    angle, speed = _direction(course), _number(knots) * _KNOT
     if speed == 0.0 and math.isnan(angle):
         angle = 0.0  # a ship at rest has no course
     return {
@@ -74,14 +107,14 @@ def _track(course: str, knots: str) -> Row:
 
 
 def _gga(f: Fields) -> Row:
-    if f[5] in ("", "0"):
-        raise _NoFixError
+    time_of_day = _time_of_day(f[0])
+    if f[5] in _NO_FIX:
+        raise _InvalidError(time_of_day)
     separation = _number(f[10])
     altitude = _number(f[8])
     return {
-        "time_of_day": _time_of_day(f[0]),
-        "latitude": _angle(f[1], f[2]),
-        "longitude": _angle(f[3], f[4]),
+        "time_of_day": time_of_day,
+        **_place(f[1:5]),
         "quality": float(f[5]),
         "satellites": _number(f[6]),
         "hdop": _number(f[7]),
@@ -92,17 +125,17 @@ def _gga(f: Fields) -> Row:
 
 
 def _gll(f: Fields) -> Row:
-    if len(f) > 5 and f[5] == "V":
-        raise _NoFixError
-    tod = _time_of_day(f[4]) if len(f) > 4 else math.nan
-    return {"time_of_day": tod, "latitude": _angle(f[0], f[1]), "longitude": _angle(f[2], f[3])}
+    time_of_day = _time_of_day(f[4]) if len(f) > 4 else math.nan
+    if _mode(f, 5) == "V" or _mode(f, 6) in _NO_MODE:
+        raise _InvalidError(time_of_day)
+    return {"time_of_day": time_of_day, **_place(f[:4])}
 
 
 def _rmc(f: Fields) -> Row:
-    if f[1] == "V":
-        raise _NoFixError
-    place = {"time_of_day": _time_of_day(f[0]), "latitude": _angle(f[2], f[3]), "longitude": _angle(f[4], f[5])}
-    return place | _track(f[7], f[6])
+    time_of_day = _time_of_day(f[0])
+    if f[1] == "V" or _mode(f, 11) in _NO_MODE:
+        raise _InvalidError(time_of_day)
+    return {"time_of_day": time_of_day, **_place(f[2:6]), **_track(f[7], f[6])}
 
 
 def _zda(f: Fields) -> Row:
@@ -110,23 +143,33 @@ def _zda(f: Fields) -> Row:
 
 
 def _vtg(f: Fields) -> Row:
+    if _mode(f, 8) in _NO_MODE:
+        raise _InvalidError
     return _track(f[0], f[4])
 
 
 def _hdt(f: Fields) -> Row:
-    return {"heading": _number(f[0]) * _DEG}
+    return {"heading": _direction(f[0])}
+
+
+def _ths(f: Fields) -> Row:
+    if _mode(f, 1) in _NO_MODE:
+        raise _InvalidError
+    return _hdt(f)
 
 
 def _vhw(f: Fields) -> Row:
-    return {"heading": _number(f[0]) * _DEG, "speed": _number(f[4]) * _KNOT}
+    return {"heading": _direction(f[0]), "speed": _number(f[4]) * _KNOT}
 
 
 def _vbw(f: Fields) -> Row:
+    """Speeds through the water and over the ground; each pair has a status, A (valid) or V."""
+    water, ground = (math.nan if _mode(f, at) == "V" else _KNOT for at in (2, 5))
     return {
-        "speed": _number(f[0]) * _KNOT,
-        "speed_starboard": _number(f[1]) * _KNOT,
-        "ground_forward": _number(f[3]) * _KNOT,
-        "ground_starboard": _number(f[4]) * _KNOT,
+        "speed": _number(f[0]) * water,
+        "speed_starboard": _number(f[1]) * water,
+        "ground_forward": _number(f[3]) * ground,
+        "ground_starboard": _number(f[4]) * ground,
     }
 
 
@@ -138,13 +181,13 @@ def _psxn23(f: Fields) -> Row:
     return {
         "roll": _number(f[0]) * _DEG,
         "pitch": _number(f[1]) * _DEG,
-        "heading": _number(f[2]) * _DEG,
+        "heading": _direction(f[2]),
         "heave": _number(f[3]) if len(f) > 3 else math.nan,
     }
 
 
 def _uvh(f: Fields) -> Row:
-    east, north, heading = _number(f[0]) * _KNOT, _number(f[1]) * _KNOT, _number(f[2]) * _DEG
+    east, north, heading = _number(f[0]) * _KNOT, _number(f[1]) * _KNOT, _direction(f[2])
     return {
         "east": east,
         "north": north,
@@ -162,7 +205,7 @@ SENTENCES: Mapping[str, Callable[[Fields], Row]] = {
     "ZDA": _zda,
     "VTG": _vtg,
     "HDT": _hdt,
-    "THS": _hdt,
+    "THS": _ths,
     "VHW": _vhw,
     "VBW": _vbw,
     "DPT": _dpt,
@@ -206,7 +249,8 @@ def read_nmea(path: Path) -> NmeaFile:
     """Read an NMEA log; kept for the life of the process, as long as the file does not change.
 
     Lines with a bad checksum and lines that cannot be understood are left out, with one `LogWarning` for each kind that
-    counts them; a sentence without a checksum is accepted.
+    counts them; a sentence without a checksum is accepted. A sentence that says that it is invalid (by its quality,
+    status or mode) is left out without a warning, but its time counts.
 
     Raises
     ------
@@ -264,7 +308,7 @@ def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
         for number, line in enumerate(lines, 1):
             at = line.find("$")
             if at < 0:
-                if line.strip():
+                if line.strip() and "!" not in line:  # "!" begins the sentences of AIS
                     bad_line.append(number)
                 continue
             body, star, given = line[at + 1 :].strip().partition("*")
@@ -281,17 +325,20 @@ def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
             decode = SENTENCES.get(sentence)
             if decode is None:
                 continue
+            row: Row | None = None
             try:
                 row = decode(fields)
-                stamp = _stamp(line[:at])
                 tod = row.pop("time_of_day", math.nan)
-                if not math.isnan(tod):
-                    about = epoch if math.isnan(stamp) else stamp
-                    epoch = tod if math.isnan(about) else _near(tod, about)
-            except _NoFixError:
-                continue
+            except _InvalidError as invalid:
+                tod = invalid.time_of_day
             except (ValueError, IndexError):
                 bad_line.append(number)
+                continue
+            stamp = _stamp(line[:at])
+            if not math.isnan(tod):
+                about = epoch if math.isnan(stamp) else stamp
+                epoch = tod if math.isnan(about) else _near(tod, about)
+            if row is None:
                 continue
             rows.setdefault((talker, sentence), []).append((number, stamp, epoch, row))
     for bad, what in ((bad_sum, "have a bad checksum"), (bad_line, "are not understood")):

@@ -148,6 +148,15 @@ class LogSource:
                     f"{series.source}: none of the {len(time)} measurements of {name!r} lies within the run; they are "
                     f"at {time[0]:.3f} to {time[-1]:.3f} s of it (check clock and offset_s)"
                 )
+            often = float(np.median(np.diff(time[inside]))) if inside.sum() > 2 else math.inf
+            if often * sheet.rate < 0.8:
+                warnings.warn(
+                    f"{series.source}: {name!r} is measured every {often:.3g} s, but rate_hz = {sheet.rate:g}, and the "
+                    f"environment has room for no more; set rate_hz = {1.0 / often:.3g}, or take every "
+                    f"{round(1.0 / (often * sheet.rate))}th row (every)",
+                    LogWarning,
+                    3,
+                )
             value = series.value[inside]
             sigma = np.tile(sheet.sigma, (len(value), 1))
             nothing = np.zeros(len(value), np.uint32)

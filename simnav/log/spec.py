@@ -6,6 +6,7 @@ unit; the IMU, the aiding instruments and the reference are channels. Nothing he
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -13,6 +14,7 @@ from pydantic import Field, model_validator
 from simnav.spec import UNITS, NonNegative, Positive, Spec, Vector, closest, quantity
 
 __all__ = [
+    "DIMENSIONS",
     "LOG_UNITS",
     "ChannelSpec",
     "FileSpec",
@@ -21,6 +23,7 @@ __all__ = [
     "OriginSpec",
     "RecordedSpec",
     "ReferenceSpec",
+    "dimension",
 ]
 
 #: Factor to SI of every unit that a column of a log may have: those of TOML keys, and some that only logs have.
@@ -38,6 +41,22 @@ LOG_UNITS = {
     "us": 1e-6,
     "ns": 1e-9,
 }
+
+#: Units by what they measure, for those that a column may well have.
+DIMENSIONS: Mapping[str, tuple[str, ...]] = {
+    "length": ("m", "mm", "cm", "km", "ft"),
+    "speed": ("m_s", "mm_s", "cm_s", "kn", "km_h"),
+    "acceleration": ("m_s2", "g", "mg", "ug"),
+    "angle": ("deg", "rad", "arcsec"),
+    "angular rate": ("deg_s", "rad_s", "deg_min", "deg_h"),
+    "time": ("s", "ms", "us", "ns", "min", "h"),
+}
+
+
+def dimension(unit: str) -> str:
+    """What a unit measures: a key of `DIMENSIONS`, or empty where none of them."""
+    return next((name for name, units in DIMENSIONS.items() if unit in units), "")
+
 
 #: A column: its header, or its number counted from 1; a minus before it flips the sign; ``"=0.0"`` is a constant.
 Column = int | str
@@ -67,7 +86,9 @@ class FileSpec(Spec):
     offset : float or tuple of float
         Added to the times, after ``scale`` or ``spacing`` [s]; one for each recording, or one for all.
     skip_rows : int
-        CSV: rows of data to leave out at the beginning.
+        CSV: rows after the header to leave out at the beginning, for example one of units.
+    comment : str
+        CSV: lines that begin with it are left out, wherever they stand.
     """
 
     path: str
@@ -79,11 +100,13 @@ class FileSpec(Spec):
     scale: Positive = 1.0
     offset: float | tuple[float, ...] = quantity("s", 0.0)
     skip_rows: Annotated[int, Field(ge=0)] = 0
+    comment: str = ""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.time_unit != "iso":
             _check_units((self.time_unit,))
+            _check_dimension("time_unit", self.time_unit, "time")
         return self
 
 
@@ -195,6 +218,9 @@ class LogImuSpec(Spec):
     @model_validator(mode="after")
     def _check(self) -> Self:
         _check_units((self.angular_rate_unit, self.specific_force_unit))
+        increments = self.samples == "increments"  # "rad_s" and "m_s2" are the defaults, and in SI like "rad" and "m_s"
+        _check_dimension("angular_rate_unit", self.angular_rate_unit, "angular rate", *["angle"] * increments)
+        _check_dimension("specific_force_unit", self.specific_force_unit, "acceleration", *["speed"] * increments)
         return self
 
 
@@ -304,6 +330,13 @@ class RecordedSpec(Spec):
 
 def _near(name: str, spec: RecordedSpec) -> str:
     return closest(name, list(spec.files))
+
+
+def _check_dimension(key: str, unit: str, *wanted: str) -> None:
+    """ValueError where a unit is of none of these dimensions; "1" is SI and always fits."""
+    if unit != "1" and dimension(unit) not in wanted:
+        known = ", ".join(name for dimension in wanted for name in DIMENSIONS[dimension])
+        raise ValueError(f"{key} = {unit!r} is no unit of {' or '.join(wanted)} ({known})")
 
 
 def _check_units(units: tuple[str, ...]) -> None:

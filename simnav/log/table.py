@@ -5,8 +5,10 @@ A `Table` has float columns and knows the line of each row in the file, so that 
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -97,6 +99,10 @@ class Table:
             return -1.0, which[1:]
         raise LogError(f"{self.source}: there is no column {which.removeprefix('-')!r}{closest(which, self.names)}")
 
+    def without_first(self, count: int) -> Table:
+        """The table without its first rows."""
+        return Table(self.source, {n: c[count:] for n, c in self.columns.items()}, self.line[count:], self.numbered)
+
     def _numbers(self, name: str) -> Array:
         """A text column as numbers; the first cell that is none is named."""
         out = np.empty(len(self))
@@ -125,35 +131,45 @@ def check_ascending(time: Array, table: Table, column: str) -> None:
         )
 
 
-def read_csv(path: Path) -> Table:
+def read_csv(path: Path, comment: str = "") -> Table:
     """Read a table of numbers with or without a header, separated by comma, semicolon, tab or blank.
 
     The result is kept for the life of the process, as long as the file does not change.
 
+    Parameters
+    ----------
+    path : Path
+        The file: text in UTF-8, UTF-16 or Latin-1.
+    comment : str
+        Lines that begin with it are left out, wherever they stand.
+
     Raises
     ------
     LogError
-        If the file is absent, empty, or its rows differ in length.
+        If the file is absent or empty, or its rows differ in length.
     """
     try:
         status = os.stat(path)
     except OSError:
         raise LogError(f"{path}: there is no such file") from None
-    return _read_csv(path, status.st_mtime_ns, status.st_size)
+    try:
+        return _read_csv(path, comment, status.st_mtime_ns, status.st_size)
+    except OSError as error:
+        raise LogError(f"{path} cannot be read: {error.strerror}") from None
 
 
 @lru_cache(maxsize=64)
-def _read_csv(path: Path, _mtime: int, _size: int) -> Table:
+def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     import pyarrow as pa
     from pyarrow import csv
 
-    first = ""
-    blank = 0
-    with open(path, encoding="utf-8-sig", errors="replace") as lines:
-        for first in lines:
-            if first.strip():
-                break
-            blank += 1
+    content, mark = _utf8(path), comment.encode()
+    first, blank = "", 0
+    for raw in io.BytesIO(content):
+        if raw.strip() and not _marked(raw, mark):
+            first = raw.decode()
+            break
+        blank += 1
     first = first.strip("\r\n")
     if not first.strip():
         raise LogError(f"{path}: the file is empty")
@@ -164,19 +180,26 @@ def _read_csv(path: Path, _mtime: int, _size: int) -> Table:
     names = cells if header else [str(i) for i in range(1, len(cells) + 1)]
     if len(set(names)) != len(names):
         raise LogError(f"{path}, line {blank + 1}: two columns share a name: {', '.join(names)}")
-    # Columns may be lined up with any number of blanks.
-    text = (
-        io.BytesIO(b"\n".join(b" ".join(line.split()) for line in path.read_bytes().split(b"\n"))) if blanks else path
-    )
+    begin = blank + int(header)  # lines before the data
+    text = b"".join(content.split(b"\n", begin)[begin:])
+    if not text.strip():
+        raise LogError(f"{path}: there are no rows of data")
+    numbers: NDArray[np.int64] | None = None
+    if blanks or comment:  # columns may be lined up with any number of blanks
+        kept = [(n, line) for n, line in enumerate(text.split(b"\n"), begin + 1) if not _marked(line, mark)]
+        text = b"\n".join(b" ".join(line.split()) if blanks else line for _, line in kept)
+        numbers = np.array([n for n, _ in kept], dtype=np.int64)
     try:
         data = csv.read_csv(
-            text,
-            read_options=csv.ReadOptions(column_names=names, skip_rows=blank + int(header), use_threads=False),
+            io.BytesIO(text),
+            read_options=csv.ReadOptions(column_names=names, use_threads=False),
             parse_options=csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
             convert_options=csv.ConvertOptions(null_values=_MISSING, strings_can_be_null=True),
         )
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise LogError(_ragged(path, delimiter, len(names)) or f"{path}: cannot be read: {error}") from None
+        lines = enumerate(content.split(b"\n")[begin:], begin + 1)
+        kept = [(n, line) for n, line in lines if not _marked(line, mark)]
+        raise LogError(_ragged(path, kept, delimiter, len(names)) or f"{path}: {error}") from None
     while data.num_rows and all(c[-1].as_py() is None for c in data.columns):  # empty lines at the end
         data = data.slice(0, data.num_rows - 1)
     columns: dict[str, NDArray[np.float64] | NDArray[np.object_]] = {}
@@ -188,7 +211,9 @@ def _read_csv(path: Path, _mtime: int, _size: int) -> Table:
             columns[name] = np.array([None if c is None else str(c) for c in column.to_pylist()], dtype=object)
     if data.num_rows == 0:
         raise LogError(f"{path}: there are no rows of data")
-    return Table(str(path), columns, np.arange(data.num_rows) + blank + int(header) + 1)
+    if numbers is None:
+        numbers = np.arange(begin + 1, begin + 1 + data.num_rows)
+    return Table(str(path), columns, numbers[: data.num_rows])
 
 
 def _is_number(cell: str) -> bool:
@@ -199,11 +224,31 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _ragged(path: Path, delimiter: str, width: int) -> str:
-    """The sentence for the first row whose number of cells is not that of the first."""
-    with open(path, encoding="utf-8", errors="replace") as lines:
-        for number, line in enumerate(lines, 1):
-            count = len(line.split()) if delimiter == " " else line.rstrip("\r\n").count(delimiter) + 1
-            if line.strip() and count != width:
-                return f"{path}, line {number}: {count} cells where the first line has {width}"
+def _marked(line: bytes, mark: bytes) -> bool:
+    """Whether a line is a comment."""
+    return bool(mark) and line.lstrip().startswith(mark)
+
+
+def _utf8(path: Path) -> bytes:
+    """The content of a text file in UTF-8, which may have been in UTF-16 or in Latin-1."""
+    content = path.read_bytes()
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        with contextlib.suppress(UnicodeDecodeError):
+            return content.decode("utf-16").encode()
+    try:
+        return content.decode("utf-8-sig").encode()
+    except UnicodeDecodeError:
+        return content.decode("latin-1").encode()
+
+
+def _ragged(path: Path, lines: Iterable[tuple[int, bytes]], delimiter: str, width: int) -> str:
+    """The sentence for the first line whose number of cells is not that of the first."""
+    for number, raw in lines:
+        line = raw.decode().rstrip("\r")
+        count = len(line.split()) if delimiter == " " else line.count(delimiter) + 1
+        if line.strip() and count != width:
+            return (
+                f"{path}, line {number}: {count} cells where the first line has {width}; lines that are no data are "
+                "left out by 'comment', the mark that they begin with"
+            )
     return ""

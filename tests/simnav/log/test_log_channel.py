@@ -198,6 +198,8 @@ def test_the_data_folder(tiny, monkeypatch, tmp_path):
         ),
         ('units = "deg"', 'units = "degs"', r"log\.reference\.attitude.*unknown unit 'degs'; did you mean 'deg"),
         ('units = ["m_s", "m_s", "mm_s"]', 'units = ["m_s"]', "1 units for 3 columns"),
+        ('specific_force_unit = "g"', 'specific_force_unit = "deg"', "'deg' is no unit of acceleration .m_s2, g, mg"),
+        ('time_unit = "ms"', 'time_unit = "m"', r"time_unit = 'm' is no unit of time \(s, ms"),
         ('columns = [2, -3, 4]\nunits = ["m_s", "m_s", "mm_s"]\n', "", "instruments.dvl: 'columns' is missing"),
         ('file = "dvl"', 'source = "reference"', "reads no file"),
         (
@@ -238,3 +240,37 @@ def test_dates_in_the_time_column(tmp_path, monkeypatch):
     path.write_text("when,depth\n2020-01-01T00:00:00.5Z,3\nyesterday,4\n")
     with pytest.raises(LogError, match=r"depth\.csv, line 3, column 'when': 'yesterday' is not a date"):
         read_channel(spec, channel, "depth", "")
+
+
+def test_a_unit_of_another_dimension_is_refused(tiny):
+    spec = log(tiny)
+    for units, message in (
+        (("m_s", "m_s", "deg"), r"dvl1\.txt, column 4: down of dvl in 'deg'; a unit of speed is wanted \(m_s, mm_s"),
+        ("m", "column 2: forward of dvl in 'm'; a unit of speed"),
+    ):
+        with pytest.raises(LogError, match=message):
+            read_channel(spec, ChannelSpec(file="dvl", columns=(2, 3, 4), units=units), "dvl", "1")
+    known = read_channel(spec, ChannelSpec(file="dvl", columns=(2, 3, 4), units="1"), "dvl", "1")
+    assert len(known.time) > 0
+
+
+def test_a_row_of_units_after_the_header_is_skipped(tiny):
+    channel = ChannelSpec(file="truth", columns=("lat", "lon", "h"), units=("deg", "deg", "m"))
+    before = read_channel(log(tiny), channel, "position", "1")
+    path = tiny.folder / "truth1.csv"
+    header, *rows = path.read_text().splitlines()
+    units = ",".join("[unit]" for _ in header.split(","))
+    path.write_text("\n".join([header, units, "% a remark", *rows]) + "\n")
+    tiny.replace('path = "truth{recording}.csv"', 'path = "truth{recording}.csv"\nskip_rows = 1\ncomment = "%"')
+    after = read_channel(log(tiny), channel, "position", "1")
+    np.testing.assert_array_equal(after.value, before.value)
+    np.testing.assert_array_equal(after.time, before.time)
+    np.testing.assert_array_equal(after.line, before.line + 2)
+
+
+def test_a_log_faster_than_its_datasheet_says_so(tiny):
+    from simnav.source import record
+
+    tiny.replace("rate_hz = 1.0", "rate_hz = 0.2")
+    with pytest.warns(LogWarning, match=r"'dvl' is measured every \S+ s, but rate_hz = 0\.2, and the environment"):
+        record(tiny.scenario(), 0)

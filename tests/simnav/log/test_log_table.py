@@ -80,3 +80,26 @@ def test_complaints(tmp_path, text, column, message):
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(LogError, match=r"nowhere\.csv: there is no such file"):
         read_csv(tmp_path / "nowhere.csv")
+
+
+@pytest.mark.parametrize("delimiter", [",", " "])
+def test_comments_anywhere_and_a_row_of_units(tmp_path, delimiter):
+    lines = ["# made by hand", "t,x", "s,m", "0.5,1", "# a remark, with commas", "1.5,x", "", "2.5,3"]
+    path = write(tmp_path / "a.csv", "\n".join(line if "#" in line else line.replace(",", delimiter) for line in lines))
+    table = read_csv(path, "#").without_first(1)
+    np.testing.assert_array_equal(table.column("t")[1], [0.5, 1.5, np.nan, 2.5])
+    assert table.line.tolist()[:2] == [4, 6]
+    with pytest.raises(LogError, match=r"a\.csv, line 6, column 'x': 'x' is not a number"):
+        table.column("x")
+    with pytest.raises(LogError, match="lines that are no data are left out by 'comment'"):
+        read_csv(path)
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-16"])
+def test_headers_with_letters_of_other_alphabets(tmp_path, encoding):
+    path = tmp_path / "a.csv"
+    path.write_bytes("Zeit,Kurs [°]\r\n0,1\r\n1,20°\r\n".encode(encoding))
+    table = read_csv(path)
+    assert table.names == ("Zeit", "Kurs [°]")
+    with pytest.raises(LogError, match=r"a\.csv, line 3, column 'Kurs \[°\]': '20°' is not a number"):
+        table.column("Kurs [°]")

@@ -110,3 +110,59 @@ def test_a_file_without_sentences(tmp_path):
     path = write(tmp_path / "log", "time,x", "1,2")
     with pytest.warns(LogWarning), pytest.raises(LogError, match="no NMEA sentence that is understood"):
         read_nmea(path)
+
+
+def test_a_sentence_that_says_that_it_is_invalid_is_not_used_but_its_time_is(tmp_path):
+    place = "2200.1,N,00100.0,E"
+    knots = "5.0,1.0"
+    lines = []
+    good = [f"GPGGA,{{}},{place},{q},09,0.9,1.0,M,0.0,M,," for q in "123459"]
+    bad = [f"GPGGA,{{}},{place},{q},09,0.9,1.0,M,0.0,M,," for q in ("0", "6", "7", "8")]
+    good += [f"GPRMC,{{}},A,{place},5.0,10.0,010524,,,{m}" for m in "ADFPR"] + [
+        f"GPRMC,{{}},A,{place},5.0,10.0,010524,,"
+    ]
+    bad += [f"GPRMC,{{}},A,{place},5.0,10.0,010524,,,{m}" for m in "NEMS"] + [
+        f"GPRMC,{{}},V,{place},5.0,10.0,010524,,,A"
+    ]
+    good += [f"GPGLL,{place},{{}},A", f"GPGLL,{place},{{}},A,D"]
+    bad += [f"GPGLL,{place},{{}},V", f"GPGLL,{place},{{}},A,N"]
+    for k, sentence in enumerate(good + bad):
+        lines += [checksum(sentence.format(f"0000{k:02d}.00")), checksum("HEHDT,10.0,T")]
+    lines += [checksum(f"GPVTG,10.0,T,,M,5.0,N,,K,{m}") for m in "ADN"]
+    lines += [checksum(f"HETHS,10.0,{m}") for m in "AEMSV"]
+    lines += [checksum(f"VDVBW,{knots},{a},{knots},{b}") for a, b in ("AA", "AV", "VA")]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        file = read_nmea(write(tmp_path / "log", *lines))
+    counts = {sentence: len(file.table(sentence)) for _, sentence in file.tables}
+    assert counts == {"GGA": 6, "RMC": 6, "GLL": 2, "HDT": len(good + bad), "VTG": 2, "THS": 1, "VBW": 3}
+    np.testing.assert_allclose(file.table("HDT").columns["sentence"], np.arange(len(good + bad)))
+    vbw = file.table("VBW").columns
+    assert np.isnan(vbw["speed"]).tolist() == np.isnan(vbw["speed_starboard"]).tolist() == [False, False, True]
+    assert np.isnan(vbw["ground_forward"]).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        "GPGGA,240000,2200.1,N,00100.0,E,1,,,,M,,M,,", "GPGGA,126100,2200.1,N,00100.0,E,1,,,,M,,M,,",
+        "GPGGA,120061,2200.1,N,00100.0,E,1,,,,M,,M,,", "GPGGA,120000,2200.1,E,00100.0,E,1,,,,M,,M,,",
+        "GPGGA,120000,2200.1,N,00100.0,N,1,,,,M,,M,,", "GPGGA,120000,9000.1,N,00100.0,E,1,,,,M,,M,,",
+        "GPGGA,120000,2260.0,N,00100.0,E,1,,,,M,,M,,", "GPGGA,120000,2200.1,N,18000.1,E,1,,,,M,,M,,",
+        "GPGGA,120000,-2200.1,N,00100.0,E,1,,,,M,,M,,", "HEHDT,400.0,T", "HEHDT,inf,T",
+    ],
+)  # fmt: skip
+def test_an_impossible_value_is_left_out_with_a_warning(tmp_path, bad):
+    path = write(tmp_path / "log", checksum("GPGGA,000001,2200.1,N,00100.0,E,1,,,,M,,M,,"), checksum(bad), "$HEHDT,1,T")
+    with pytest.warns(LogWarning, match="1 lines are not understood and are left out, the first is line 2"):
+        file = read_nmea(path)
+    assert (len(file.table("GGA")), len(file.table("HDT"))) == (1, 1)
+    assert file.table("HDT").columns["sentence"][0] == 1.0
+
+
+def test_midnight_a_leap_second_and_sentences_of_ais(tmp_path):
+    lines = [f"$GPGGA,{t},2200.1,N,00100.0,E,1,,,,M,,M,," for t in ("235959.5", "235960.5", "000001.5")]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        file = read_nmea(write(tmp_path / "log", "!AIVDM,1,1,,A,13u?etPv2;0n:dDPwUM1U1Cb069D,0*24", *lines))
+    np.testing.assert_allclose(np.diff(file.table("GGA").columns["sentence"]), [1.0, 1.0])
