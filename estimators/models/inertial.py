@@ -139,6 +139,15 @@ class InertialModel(ErrorModel):
         """An IMU, and anything to aid it."""
         return (IMU, AID)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy: its last sample is in the clock that was copied with it."""
+        vars(self).update(state)
+        if "_clock" in state:
+            self._bind()
+
+    def _bind(self) -> None:
+        self.raw_rate, self.raw_force = self._clock[12:15], self._clock[6:9]
+
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """Itself; UnsuitableScenario without an IMU or without anything to aid it."""
         if instruments.imu is None:
@@ -162,7 +171,7 @@ class InertialModel(ErrorModel):
         self.bias, self._memory, self._turn = np.zeros(6), np.zeros(6), np.zeros(3)
         self._clock = np.zeros(15)
         self._clock[0], self._clock[1] = start.time, -1e9
-        self.raw_rate, self.raw_force = self._clock[12:15], self._clock[6:9]
+        self._bind()
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.load(None)
         gyro, level, vertical = self._sensors(imu)

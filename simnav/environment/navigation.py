@@ -258,9 +258,10 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
     def _observation(self) -> Observation:
         stretch, i = self._stretch, self._row
         assert stretch is not None
-        observation: Observation = {"interval": stretch.intervals[i]}
+        # Copies: a view would lead to the measurements of the steps to come, by its base.
+        observation: Observation = {"interval": stretch.intervals[i].copy()}
         for name, columns in stretch.columns.items():
-            observation[name] = {key: array[i] for key, array in columns.items()}
+            observation[name] = {key: array[i].copy() for key, array in columns.items()}
         for name in self._most.keys() - stretch.columns.keys():  # instruments that other runs of the scenario have
             observation[name] = self._nothing(name)
         return observation

@@ -14,9 +14,12 @@ estimator is told. Every process has its own random stream and draws at every sa
 
 from __future__ import annotations
 
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial, wraps
 from math import inf
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -24,7 +27,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from simnav.kinds import INSTRUMENTS, Kind
-from simnav.plugins import PluginError
+from simnav.plugins import PluginError, place_of
 from simnav.recording import AidStream
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, Vector, closest, quantity
@@ -35,6 +38,7 @@ __all__ = [
     "ZERO",
     "AidSpec",
     "Instrument",
+    "InstrumentError",
     "Pair",
     "SigmaPair",
     "SigmaTriple",
@@ -54,6 +58,23 @@ _RESERVED = ("imu", "interval", "position", "velocity", "attitude")
 _BY_COMPONENT = ("sigma", "bias", "bias_instability", "fixed_bias")
 #: Default of a vector.
 ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class InstrumentError(SpecError):
+    """An instrument that cannot be built or read; the message names it, its file, and what would be right."""
+
+
+def _label(name: str, kind: str, cls: type) -> str:
+    file = Path(place_of(cls)[0]).name
+    return f"instrument {name!r} of kind {kind!r} ({cls.__qualname__} in {file})"
+
+
+def _raised(label: str, cls: type, error: Exception) -> InstrumentError:
+    """The error that an exception in the code of an instrument becomes; the place is the innermost in its own file."""
+    file = place_of(cls)[0]
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    where = f" in {frames[-1].name}(), line {frames[-1].lineno}" if frames else ""
+    return InstrumentError(f"{label}: {type(error).__name__}{where}: {error}")
 
 
 def _spread(n: int) -> BeforeValidator:
@@ -229,7 +250,7 @@ class AidSpec(Spec):
         water_depth : float, optional
             Below the mean sea surface [m], for instruments that need the bottom.
         """
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__qualname__} has no build()")
 
 
 S = TypeVar("S", bound=AidSpec)
@@ -284,9 +305,29 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
                 raise PluginError(
                     f"{source}: its figures do not fit its components ({', '.join(kind.errors)}): {error}"
                 ) from None
+        cls.build = _named(cls.build)  # type: ignore[method-assign]
         return cls
 
     return wrap
+
+
+def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
+    """``build`` of a specification, whose errors name the instrument."""
+
+    @wraps(build)
+    def named(self: AidSpec, name: str, seed: int, **rest: Any) -> Instrument:
+        label = _label(name, self.kind, type(self))
+        try:
+            made = build(self, name, seed, **rest)
+        except (InstrumentError, MemoryError):
+            raise
+        except Exception as error:
+            raise _raised(label, type(self), error) from error
+        if not isinstance(made, Instrument):
+            raise InstrumentError(f"{label}: build() returned {type(made).__name__}, where an Instrument is wanted")
+        return made
+
+    return named
 
 
 class Instrument(ABC):
@@ -350,7 +391,7 @@ class Instrument(ABC):
 
     def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
         """`observe`, `noise_sigma` and `available` in one."""
-        value = self.observe(tap)
+        value = _checked_rows(self, "observe()", self.observe(tap), tap)
         return value, self.noise_sigma(value), self.available(tap)
 
     def lever_displacement(self, tap: TapStates) -> Array:
@@ -399,8 +440,13 @@ class Instrument(ABC):
         -------
         AidStream
             Without faults; ``dropped`` holds the times at which the instrument delivers nothing.
+
+        Raises
+        ------
+        InstrumentError
+            If `observe`, `noise_sigma` or `available` raises, or returns an array of another shape than it should.
         """
-        value, sigma, there = self.reading(tap)
+        value, sigma, there = _checked_reading(self, tap)
         error, variates = self.ahead(tap.time)
         if self._noise is not None:
             error += sigma * variates
@@ -412,3 +458,40 @@ class Instrument(ABC):
         return AidStream(
             self.name, self.kind, time, value, np.zeros(n, np.uint32), np.zeros(value.shape), sigma, dropped
         )
+
+
+def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+    """The reading; what is wrong with it is an error of the instrument, not of the estimator that would get it."""
+    label = partial(_label, instrument.name, instrument.kind, type(instrument))
+    try:
+        value, sigma, there = instrument.reading(tap)
+        value = _checked_rows(instrument, "observe()", value, tap)
+        sigma = _checked_rows(instrument, "noise_sigma()", sigma, tap)
+        there = None if there is None else np.asarray(there)
+    except (InstrumentError, MemoryError):
+        raise
+    except Exception as error:
+        raise _raised(label(), type(instrument), error) from error
+    n = len(tap.time)
+    if there is not None and (there.shape != (n,) or there.dtype != np.bool_):
+        raise InstrumentError(
+            f"{label()}: available() returned an array of {there.dtype} of shape {there.shape}, where one of bool of "
+            f"shape {(n,)} is wanted: an entry for each of {n} times"
+        )
+    return value, sigma, there
+
+
+def _checked_rows(instrument: Instrument, method: str, array: Array, tap: TapStates) -> Array:
+    """What a method returned, if it has a row for each time and a column for each component."""
+    array = np.asarray(array, dtype=np.float64)
+    components = instrument.definition.values
+    shape = (len(tap.time), len(components))
+    if not len(tap.time) and not array.size:
+        return array.reshape(shape)
+    if array.shape != shape:
+        raise InstrumentError(
+            f"{_label(instrument.name, instrument.kind, type(instrument))}: {method} returned an array of shape "
+            f"{array.shape}, where {shape} is wanted: a row for each of {shape[0]} times, a column for each component "
+            f"({', '.join(components)})"
+        )
+    return array

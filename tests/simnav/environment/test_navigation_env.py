@@ -196,6 +196,12 @@ def test_a_scenario_with_short_steps(scenario):
     assert [o["imu"]["valid"].sum() for o in seen] == [5] * 30 + [0]
 
 
+def test_an_observation_does_not_lead_to_the_steps_to_come():
+    env = NavigationEnv(parse(TOML))
+    observation, _ = env.reset(seed=3)
+    assert all(array.base is None for array in flat(observation).values())
+
+
 def test_observations_do_not_share_memory(scenario):
     seen, _ = play(NavigationEnv(scenario), 2)
     first = [{k: v.copy() for k, v in flat(o).items()} for o in seen]

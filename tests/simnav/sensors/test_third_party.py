@@ -196,7 +196,7 @@ def test_a_kind_whose_instrument_fails_is_left_out_of_the_contract_test(plugins,
     broken = (plugins / "beacon.py").read_text().replace("bearing = wrap_angle", "bearing = unwrap_angle")
     (tmp_path / "broken.py").write_text(broken)
     load_plugin(tmp_path / "broken.py")
-    with pytest.warns(UserWarning, match="kind 'beacon' are left out of the contract test: NameError"):
+    with pytest.warns(UserWarning, match="kind 'beacon' are left out of the contract test: .* NameError"):
         recording = contract_recording(0)
     assert set(recording.instruments) == set(KINDS) - {"beacon"}
 
