@@ -26,6 +26,7 @@ Dynamics 21(1) and 21(2), 1998. P. D. Groves 2013, chapter 5.
 from __future__ import annotations
 
 from math import cos, sin, sqrt
+from typing import TypeAlias
 
 import numpy as np
 
@@ -70,11 +71,14 @@ def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: flo
     )
 
 
+#: Of three axes.
+Triple: TypeAlias = tuple[float, float, float]
+
+
 @kernel()
 def mechanize_step(
-    position: Array, velocity: Array, dcm: Array, memory: Array, w0: float, w1: float, w2: float, f0: float, f1: float,
-    f2: float, dt: float,
-) -> None:  # fmt: skip
+    position: Array, velocity: Array, dcm: Array, memory: Array, rate: Triple, force: Triple, dt: float
+) -> None:
     """One interval of the mechanization (equations in the module), in place.
 
     Parameters
@@ -85,9 +89,13 @@ def mechanize_step(
         Body to north-east-down.
     memory : (6,) array
         Angle and velocity increments of the interval before; zeros at the start.
-    w0, w1, w2, f0, f1, f2, dt : float
-        Mean angular rate, mean specific force, length of the interval.
+    rate, force : three floats
+        Mean angular rate [rad/s], mean specific force [m/s^2].
+    dt : float
+        Length of the interval [s].
     """
+    w0, w1, w2 = rate
+    f0, f1, f2 = force
     a0, a1, a2 = w0 * dt, w1 * dt, w2 * dt
     n0, n1, n2 = f0 * dt, f1 * dt, f2 * dt
     q0, q1, q2 = cross(memory[0], memory[1], memory[2], a0, a1, a2)
@@ -173,8 +181,8 @@ def mechanize(
     for k in range(interval.size):
         mechanize_step(
             position, velocity, dcm, memory,
-            angular_rate[k, 0], angular_rate[k, 1], angular_rate[k, 2],
-            specific_force[k, 0], specific_force[k, 1], specific_force[k, 2],
+            (angular_rate[k, 0], angular_rate[k, 1], angular_rate[k, 2]),
+            (specific_force[k, 0], specific_force[k, 1], specific_force[k, 2]),
             interval[k],
         )  # fmt: skip
 
@@ -201,8 +209,8 @@ def _integrate(
     for k in range(interval.size):
         mechanize_step(
             position, velocity, dcm, memory,
-            angular_rate[k, 0], angular_rate[k, 1], angular_rate[k, 2],
-            specific_force[k, 0], specific_force[k, 1], specific_force[k, 2],
+            (angular_rate[k, 0], angular_rate[k, 1], angular_rate[k, 2]),
+            (specific_force[k, 0], specific_force[k, 1], specific_force[k, 2]),
             interval[k],
         )  # fmt: skip
         positions[k] = position

@@ -59,10 +59,10 @@ def _sum(rows: Array, count: int, n: int, column: int) -> float:
     return total
 
 
-@kernel("i8(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], i8, i8, f8, f8, b1, f8, f8[:, ::1])")
+@kernel("i8(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], Tuple((i8, i8, f8, f8)), b1, f8, f8[:, ::1])")
 def _average(
-    rows: Array, count: int, predicted: Array, nominal: Array, shortest: int, longest: int, low: float, high: float,
-    newest: bool, forgetting: float, estimate: Array,
+    rows: Array, count: int, predicted: Array, nominal: Array, window: tuple[int, int, float, float], newest: bool,
+    forgetting: float, estimate: Array,
 ) -> int:  # fmt: skip
     """Noise from the last innovations (eqs. 16-20).
 
@@ -74,10 +74,9 @@ def _average(
         Epochs so far; the last r of them are there.
     predicted, nominal : (m, m) arrays
         H P H' and R.
-    shortest, longest : int
-        Bounds of the length of the window; equal for a fixed one.
-    low, high : float
-        Bounds of the ratio of variances between which the length is adapted.
+    window : (int, int, float, float)
+        Shortest and longest length of the window, equal for a fixed one; bounds of the ratio of variances between which
+        the length is adapted.
     newest : bool
         Subtract the newest H P H' from all epochs, not to each its own.
     forgetting : float
@@ -90,6 +89,7 @@ def _average(
     int
         Length of the window.
     """
+    shortest, longest, low, high = window
     m, ring = nominal.shape[0], rows.shape[0]
     length = shortest
     if longest > shortest and count > 1:
@@ -238,8 +238,9 @@ class InnovationBased(EstimatedNoise):
         if window.estimate is None:
             window.estimate, forgetting = np.zeros_like(innovation.noise), 1.0
         length = _average(
-            window.rows, window.count, innovation.predicted, innovation.noise, self.shortest, self.longest, self.low,
-            self.high, self.newest and self.source == "innovation", forgetting, window.estimate,
+            window.rows, window.count, innovation.predicted, innovation.noise,
+            (self.shortest, self.longest, self.low, self.high), self.newest and self.source == "innovation", forgetting,
+            window.estimate,
         )  # fmt: skip
         self._length = length
         self.report(self._lengths[name], length)

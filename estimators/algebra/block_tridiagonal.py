@@ -32,6 +32,7 @@ backward pass G. J. Bierman, "Fixed interval smoothing with discrete measurement
 from __future__ import annotations
 
 from math import sqrt
+from typing import TypeAlias
 
 import numpy as np
 
@@ -39,10 +40,25 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.cholesky import factorise
 from simnav.types import Array, Integers
 
-__all__ = ["after_step", "half_squares", "keep_weights", "solve_chain", "whiten"]
+__all__ = ["Aids", "Elimination", "after_step", "half_squares", "keep_weights", "solve_chain", "whiten"]
 
 #: A factor of less weight than this counts for nothing.
 LEAST_WEIGHT = 1e-9
+
+#: The M aiding factors: their nodes (M,), in ascending order, and the number of the first node of all; which instrument
+#: each comes from (M,), measurements of one instrument on one node are taken as their mean; components (M,), 0 for a
+#: factor that says nothing; Jacobians with respect to the nodes (M, 3, n); residuals, measured less predicted (M, 3);
+#: covariances (M, 3, 3), and the weights that divide them (M,).
+Aids: TypeAlias = tuple[Integers, int, Integers, Integers, Array, Array, Array, Array]
+_AIDS = "Tuple((i8[::1], i8, i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1]))"
+#: What an elimination leaves: covariances (K, n, n) of a node without its own measurements, all older ones included,
+#: and its mean less the node (K, n); the same two with its own measurements; ``L^-1 H P`` and ``L^-1 H`` of each
+#: measurement at its turn, ``L L'`` being S (M, 3, n), and ``L^-1 (r - H d)`` (M, 3); 1 where a measurement counts, for
+#: itself or for a mean, else 0 (M,).
+Elimination: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array, Integers]
+_ELIMINATION = (
+    "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1]))"
+)
 
 
 @kernel()
@@ -77,13 +93,16 @@ def _predict(P: Array, F: Array, Q: Array, weight: float, work: Array, turned: A
 
 @kernel()
 def _absorb(
-    P: Array, d: Array, H: Array, r: Array, R: Array, weight: float, m: int, L: Array, U: Array, G: Array, y: Array
+    P: Array, d: Array, measured: tuple[Array, Array, Array, float, int], L: Array, white: tuple[Array, Array, Array]
 ) -> bool:
-    """Take m measurements with the covariance ``R / weight`` into P and d; False, and nothing done, if S is singular.
+    """Take measurements (H, r, R, weight, m) with the covariance ``R / weight`` into P and d.
 
-    With ``L L' = S = H P H' + R / weight`` they are left white: ``U = L^-1 H P``, ``G = L^-1 H`` and
+    With ``L L' = S = H P H' + R / weight`` they are left white (U, G, y): ``U = L^-1 H P``, ``G = L^-1 H`` and
     ``y = L^-1 (r - H d)``, so that ``d + U' y`` and ``P - U' U`` are the update. The last row of L is for the pivots.
+    False, and nothing done, if S is singular.
     """
+    H, r, R, weight, m = measured
+    U, G, y = white
     n = P.shape[0]
     for a in range(m):
         y[a] = r[a]
@@ -133,10 +152,7 @@ def _absorb(
 
 
 @kernel()
-def _mean_of(
-    i: int, end: int, instrument: Integers, components: Integers, H: Array, r: Array, R: Array, weight: Array,
-    used: Integers, mean_H: Array, mean_r: Array, mean_R: Array,
-) -> int:  # fmt: skip
+def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r: Array, mean_R: Array) -> int:
     """The mean of measurement i and of the later ones before ``end`` that are its instrument's and count.
 
     Each has a share of ``w / trace(R)`` in it. ``used`` becomes 0 for those that i stands for.
@@ -146,6 +162,7 @@ def _mean_of(
     int
         How many they are; where there is only one, nothing is written.
     """
+    _, _, instrument, components, H, r, R, weight = aids
     count = 1
     for k in range(i + 1, end):
         if used[k] == 1 and instrument[k] == instrument[i] and components[k] == components[i]:
@@ -208,62 +225,29 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
 
 
 @kernel(
-    "UniTuple(f8, 2)(f8[:, ::1], f8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], "
-    "i8[::1], i8, i8[::1], i8[::1], f8[:, :, ::1], "
-    "f8[:, ::1], f8[:, :, ::1], f8[::1], f8, i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], "
-    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], f8[:, ::1], f8[::1])"
+    "UniTuple(f8, 2)(Tuple((f8[:, ::1], f8[::1])), Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
+    f"{_AIDS}, f8, i8, {_ELIMINATION}, f8[:, ::1], f8[::1])"
 )
 def solve_chain(
-    prior: Array, prior_shift: Array, transition: Array, noise: Array, error: Array, motion_weight: Array,
-    node: Integers, base: int, instrument: Integers, components: Integers, jacobian: Array, residual: Array,
-    aid_noise: Array, aid_weight: Array, damping: float, first: int, predicted: Array, predicted_shift: Array,
-    filtered: Array, filtered_shift: Array, cross: Array, white: Array, innovation: Array, used: Integers, step: Array,
-    size: Array,
+    prior: tuple[Array, Array], motion: tuple[Array, Array, Array, Array], aids: Aids, damping: float, first: int,
+    left: Elimination, step: Array, size: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """One step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
     Parameters
     ----------
-    prior : (n, n) array
-        Covariance of the first node before its measurements.
-    prior_shift : (n,) array
-        d, mean of the prior less the first node.
-    transition, noise : (K - 1, n, n) array
-        F and Q.
-    error : (K - 1, n) array
-        e, newer node less the motion of the older one.
-    motion_weight : (K - 1,) array
-        Weights of the motion factors, which divide their noise.
-    node : (M,) int array
-        In ascending order; the first node is number ``base``.
-    base : int
-        Number of the first node.
-    instrument : (M,) int array
-        Which one it comes from; measurements of one instrument on one node are taken as their mean.
-    components : (M,) int array
-        0 for a factor that says nothing.
-    jacobian : (M, 3, n) array
-        Jacobians of the measurements with respect to their nodes.
-    residual : (M, 3) array
-        Measured less predicted.
-    aid_noise : (M, 3, 3) array
-        Covariances of the measurements.
-    aid_weight : (M,) array
-        Weights of the measurements, which divide their noise.
+    prior : (n, n) and (n,) arrays
+        Covariance of the first node before its measurements; d, mean of the prior less the first node.
+    motion : (K - 1, n, n), (K - 1, n, n), (K - 1, n) and (K - 1,) arrays
+        F and Q; e, newer node less the motion of the older one; the weights that divide Q.
+    aids : tuple
+        See `Aids`.
     damping : float
         lambda, 0 for a Gauss-Newton step.
     first : int
-        Nodes before it have been eliminated, without damping; the arrays that follow hold what that left.
-    predicted, filtered : (K, n, n) arrays
-        Overwritten with the covariances of a node without and with its own measurements, all older ones included.
-    predicted_shift, filtered_shift : (K, n) arrays
-        Overwritten with their means less the node.
-    cross, white : (M, 3, n) arrays
-        Overwritten with ``L^-1 H P`` and ``L^-1 H`` of each measurement at its turn, ``L L'`` being S.
-    innovation : (M, 3) array
-        Overwritten with ``L^-1 (r - H d)``.
-    used : (M,) int array
-        Overwritten with 1 where a measurement counts, for itself or for a mean, else 0.
+        Nodes before it have been eliminated, without damping; ``left`` holds what that left.
+    left : tuple of arrays
+        See `Elimination`; overwritten.
     step : (K, n) array
         Overwritten with dx.
     size : (K,) array
@@ -275,6 +259,10 @@ def solve_chain(
     float, float
         Largest ``size`` of all nodes, and of those before ``first``.
     """
+    prior_covariance, prior_shift = prior
+    transition, noise, error, motion_weight = motion
+    node, base, _, components, jacobian, residual, aid_noise, aid_weight = aids
+    predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used = left
     count, n = step.shape
     total = node.size
     work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((4, 3))
@@ -291,7 +279,7 @@ def solve_chain(
     for k in range(first, count):
         P, d = predicted[k], predicted_shift[k]
         if k == 0:
-            P[:] = prior
+            P[:] = prior_covariance
             d[:] = prior_shift
         else:
             _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], work, turned, P)
@@ -309,8 +297,8 @@ def solve_chain(
             for r in range(n):
                 unit[0, r] = 1.0
                 damp_used[k, r] = _absorb(
-                    P, d, unit, zero, variance[r], damping, 1, L,
-                    damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r],
+                    P, d, (unit, zero, variance[r], damping, 1), L,
+                    (damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r]),
                 )  # fmt: skip
                 unit[0, r] = 0.0
         end = i
@@ -319,19 +307,11 @@ def solve_chain(
             end += 1
         while i < end:
             if used[i] == 1:
-                if _mean_of(
-                    i, end, instrument, components, jacobian, residual, aid_noise, aid_weight, used,
-                    mean_jacobian, mean_residual, mean_noise,
-                ) == 1:  # fmt: skip
-                    used[i] = _absorb(
-                        P, d, jacobian[i], residual[i], aid_noise[i], aid_weight[i], components[i], L,
-                        cross[i], white[i], innovation[i],
-                    )  # fmt: skip
+                m, whitened = components[i], (cross[i], white[i], innovation[i])
+                if _mean_of(i, end, aids, used, mean_jacobian, mean_residual, mean_noise) == 1:
+                    used[i] = _absorb(P, d, (jacobian[i], residual[i], aid_noise[i], aid_weight[i], m), L, whitened)
                 else:
-                    used[i] = _absorb(
-                        P, d, mean_jacobian, mean_residual, mean_noise, 1.0, components[i], L,
-                        cross[i], white[i], innovation[i],
-                    )  # fmt: skip
+                    used[i] = _absorb(P, d, (mean_jacobian, mean_residual, mean_noise, 1.0, m), L, whitened)
             i += 1
 
     adjoint, after, z = np.zeros(n), np.empty(n), np.empty(3)
@@ -373,25 +353,31 @@ def solve_chain(
 
 
 @kernel(
-    "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8[::1], "
-    "i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
+    "void(f8[:, ::1], UniTuple(f8[:, ::1], 2), "
+    "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
+    "Tuple((i8[::1], i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])))"
 )
 def after_step(
-    step: Array, predicted_shift: Array, filtered_shift: Array, transition: Array, error: Array, whitener: Array,
-    whitened: Array, norm: Array, node: Integers, base: int, jacobian: Array, residual: Array, aid_whitener: Array,
-    aid_whitened: Array, aid_norm: Array,
+    step: Array, shifts: tuple[Array, Array], motion: tuple[Array, Array, Array, Array, Array],
+    aids: tuple[Integers, int, Array, Array, Array, Array, Array],
 ) -> None:  # fmt: skip
     """Shifts and residuals after a step, as the factors were linearised: what solving for it supposes them to be.
 
     Parameters
     ----------
-    step, predicted_shift, filtered_shift : (K, n) arrays
-        The step is taken off the shifts.
-    transition, error, node, base, jacobian, residual
-        As for `solve_chain`; errors and residuals are updated.
-    whitener, whitened, norm, aid_whitener, aid_whitened, aid_norm
-        As for `whiten`, of motion and of aids.
+    step : (K, n) array
+        Of the nodes.
+    shifts : two (K, n) arrays
+        Means without and with a node's own measurements, less the node; the step is taken off them.
+    motion : tuple of arrays
+        F and e, which is updated, as for `solve_chain`; whiteners, whitened errors and norms, as for `whiten`.
+    aids : tuple
+        Nodes, number of the first node, Jacobians and residuals, which are updated, as for `solve_chain`; whiteners,
+        whitened residuals and norms, as for `whiten`.
     """
+    predicted_shift, filtered_shift = shifts
+    transition, error, whitener, whitened, norm = motion
+    node, base, jacobian, residual, aid_whitener, aid_whitened, aid_norm = aids
     n = step.shape[1]
     for k in range(step.shape[0]):
         for r in range(n):
@@ -435,24 +421,20 @@ def whiten(first: int, error: Array, whitener: Array, whitened: Array, norm: Arr
         norm[k] = _whiten(error[k], whitener[k], whitened[k])
 
 
-@kernel("i8(f8[::1], f8[::1], f8[::1], i8[::1], i8, f8[::1], f8[::1], f8[::1], f8)")
+@kernel("i8(UniTuple(f8[::1], 3), i8[::1], i8, UniTuple(f8[::1], 3), f8)")
 def keep_weights(
-    before: Array, norm: Array, weight: Array, node: Integers, base: int, aid_before: Array, aid_norm: Array,
-    aid_weight: Array, tolerance: float,
-) -> int:  # fmt: skip
+    motion: tuple[Array, Array, Array], node: Integers, base: int, aids: tuple[Array, Array, Array], tolerance: float
+) -> int:
     """Set weights back that have hardly changed.
 
     Parameters
     ----------
-    before, aid_before : (K - 1,), (M,) arrays
-        The weights with which the factors, of motion and aiding, were eliminated.
-    norm, aid_norm : arrays
-        Of the whitened residuals.
-    weight, aid_weight : arrays
-        The weights that are wanted; overwritten with those before where the weight and the factor's pull, which is the
-        weight times the norm, differ by no more than the tolerance.
+    motion, aids : three (K - 1,), three (M,) arrays
+        The weights with which the factors were eliminated; norms of the whitened residuals; the weights that are
+        wanted, overwritten with those before where the weight and the factor's pull, which is the weight times the
+        norm, differ by no more than the tolerance.
     node, base
-        As for `solve_chain`.
+        As of `Aids`.
     tolerance : float
         Largest change of a weight that is ignored.
 
@@ -461,6 +443,8 @@ def keep_weights(
     int
         The first node at whose elimination a weight differs; K if there is none.
     """
+    before, norm, weight = motion
+    aid_before, aid_norm, aid_weight = aids
     first = norm.size + 1
     for k in range(norm.size - 1, -1, -1):
         if abs(weight[k] - before[k]) * max(norm[k], 1.0) > tolerance:

@@ -7,6 +7,7 @@ estimator that holds a policy call the same three kernels, so that they agree bi
 from __future__ import annotations
 
 from math import exp, log, log1p, log10, sqrt
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,19 @@ from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
 
-__all__ = ["MEMORY_COLUMNS", "observe", "set_scales", "take"]
+__all__ = ["EVENTS", "MEMORY_COLUMNS", "STEPS", "Events", "Steps", "observe", "set_scales", "take"]
+
+#: The events of all voyages: the fields of `simnav.estimators.learning.reference.Linear`, in their order.
+Events: TypeAlias = tuple[Array, Array, Flags, Integers, Array, Integers, Array, Array, Array, Array]
+#: Of each filter of a bank: whether it takes the step, and its events in it, from the first up to, not including, the
+#: last; all (b,).
+Steps: TypeAlias = tuple[Flags, Integers, Integers]
+#: Their types.
+EVENTS = (
+    "Tuple((f8[:, :, ::1], f8[:, :, ::1], b1[::1], i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], "
+    "f8[:, :, ::1], f8[:, ::1]))"
+)
+STEPS = "Tuple((b1[::1], i8[::1], i8[::1]))"
 
 #: Of each instrument: four fading means, time of the last measurement, logarithm of the scale over the largest.
 MEMORY_COLUMNS = 6
@@ -55,15 +68,12 @@ def _clipped(value: float) -> float:
 
 
 @kernel(
-    "void(f8[:, :, ::1], b1[::1], i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], "
-    "i8[::1], i8[::1], f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, b1[::1], "
-    "f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f4[:, ::1])"
+    f"void({STEPS}, {EVENTS}, f8[::1], f8[:, ::1], Tuple((i8[::1], f8[:, ::1], i8)), "
+    "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1])), f4[:, ::1])"
 )
 def observe(
-    transition: Array, moves: Flags, instrument: Integers, time: Array, size: Integers, innovation: Array,
-    jacobian: Array, noise: Array, correction: Array, first: Integers, last: Integers, end: Array, context: Array,
-    place: Integers, period: Array, most: int, active: Flags, covariance: Array, delta: Array, memory: Array,
-    observation: NDArray[np.float32],
+    steps: Steps, events: Events, end: Array, context: Array, layout: tuple[Integers, Array, int],
+    filters: tuple[Array, Array, Array], observation: NDArray[np.float32],
 ) -> None:  # fmt: skip
     """What an agent sees before it decides on the step that lies ahead (`simnav.estimators.learning.features`).
 
@@ -71,29 +81,24 @@ def observe(
 
     Parameters
     ----------
-    transition, moves, instrument, time, size, innovation, jacobian, noise, correction
-        The events of all voyages, as in `simnav.estimators.learning.reference.Linear`.
-    first, last : (b,) int arrays
-        Of each filter of the bank: its events in the step are those from ``first`` up to, not including, ``last``.
+    steps, events : tuples of arrays
+        See `Steps` and `Events`.
     end : (b,) array
         End of each filter's step [s].
     context : (b, 11) array
         As of `simnav.estimators.learning.features.Context`.
-    place : (k,) int array
-        Of each instrument: its place in the observation; -1 for none.
-    period : (b, p) array
-        Of each place: nominal time between two measurements [s].
-    most : int
-        Measurements a step that have room in the observation.
-    active : (b,) bool array
-        Which filters are looked at.
-    covariance, delta : (b, n, n), (b, n) arrays
-        Of the filters.
-    memory : (b, p, 6) array
-        Of the instruments; updated.
+    layout : (k,) int array, (b, p) array, int
+        Of each instrument its place in the observation, -1 for none; of each place the nominal time between two
+        measurements [s]; how many measurements a step have room in the observation.
+    filters : (b, n, n), (b, n) and (b, p, 6) arrays
+        Covariances, distances to the plain filter, and memory of the instruments, which is updated.
     observation : (b, o) float32 array
         Overwritten for the filters that are active.
     """
+    active, first, last = steps
+    transition, _, moves, instrument, time, size, innovation, jacobian, noise, correction = events
+    place, period, most = layout
+    covariance, delta, memory = filters
     n = delta.shape[1]
     places = period.shape[1]
     width = PER_INSTRUMENT + PER_MEASUREMENT * most
@@ -221,23 +226,18 @@ def _propagate(
             P[j, i] = x
 
 
-@kernel(
-    "void(f8[:, :, ::1], f8[:, :, ::1], b1[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], "
-    "f8[:, ::1], i8[::1], i8[::1], i8[::1], b1[::1], f8[:, :, ::1], f8[::1], f8[:, :, ::1], f8[:, ::1])"
-)
+@kernel(f"void({STEPS}, {EVENTS}, i8[::1], f8[:, :, ::1], f8[::1], f8[:, :, ::1], f8[:, ::1])")
 def take(
-    transition: Array, process_noise: Array, moves: Flags, instrument: Integers, size: Integers, innovation: Array,
-    jacobian: Array, noise: Array, correction: Array, first: Integers, last: Integers, place: Integers, active: Flags,
-    scale: Array, process_scale: Array, covariance: Array, delta: Array,
-) -> None:  # fmt: skip
+    steps: Steps, events: Events, place: Integers, scale: Array, process_scale: Array, covariance: Array, delta: Array
+) -> None:
     """Take each filter of a bank through its step, with the noise that its agent has set.
 
     Parameters
     ----------
-    transition, process_noise, moves, instrument, size, innovation, jacobian, noise, correction
-        The events of all voyages, as in `simnav.estimators.learning.reference.Linear`.
-    first, last, place, active
-        As of `observe`.
+    steps, events : tuples of arrays
+        See `Steps` and `Events`.
+    place : (k,) int array
+        Of each instrument: its place in the observation; -1 for none.
     scale : (b, p, k) array
         Factor on the sigma of the j-th measurement of the step by the instrument of each place, the last for those
         beyond; not above zero: the measurement is left out.
@@ -246,6 +246,8 @@ def take(
     covariance, delta : (b, n, n), (b, n) arrays
         Updated.
     """
+    active, first, last = steps
+    transition, process_noise, moves, instrument, _, size, innovation, jacobian, noise, correction = events
     n = delta.shape[1]
     most = scale.shape[2]
     A, B, T = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))

@@ -156,10 +156,10 @@ class Filters:
         active: NDArray[np.bool_],
     ) -> None:  # fmt: skip
         """Fill `observation` for the active filters; the arguments as of `simnav.estimators.learning.bank.observe`."""
+        layout = self.layout.place, self.period, self.layout.most
         observe(
-            linear.transition, linear.moves, linear.instrument, linear.time, linear.size, linear.innovation,
-            linear.jacobian, linear.noise, linear.correction, first, last, end, context, self.layout.place,
-            self.period, self.layout.most, active, self.covariance, self.delta, self.memory, self.observation,
+            (active, first, last), linear.events, end, context, layout, (self.covariance, self.delta, self.memory),
+            self.observation,
         )  # fmt: skip
 
     def decide(self, actions: Array) -> None:
@@ -172,9 +172,8 @@ class Filters:
         """Take the active filters through a step, with what was decided."""
         decision = self.decision
         take(
-            linear.transition, linear.process_noise, linear.moves, linear.instrument, linear.size, linear.innovation,
-            linear.jacobian, linear.noise, linear.correction, first, last, self.layout.place, active, decision.scale,
-            decision.process_scale, self.covariance, self.delta,
+            (active, first, last), linear.events, self.layout.place, decision.scale, decision.process_scale,
+            self.covariance, self.delta,
         )  # fmt: skip
         self.memory[active, :, 5] = decision.setting[active]
 
@@ -185,8 +184,8 @@ class Filters:
         """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.rewards.reward`."""
         decision = self.decision
         reward(
-            self._code, error, oracle, decision.correction, first, last, linear.instrument, linear.size, faulty,
-            self.layout.place, active, decision.scale, self.covariance, self.delta, self.rewards,
+            self._code, (active, first, last), linear.events, faulty, (error, oracle),
+            (self.layout.place, decision.scale, decision.correction), (self.covariance, self.delta), self.rewards,
         )  # fmt: skip
         return self.rewards.copy()
 

@@ -194,13 +194,13 @@ class GuidedVoyages:
 
     def look(self, active: NDArray[np.bool_]) -> None:
         """What the agents of some voyages see."""
-        runs, routes, spread = self.runs, self._routes, self.navigators.spread
+        runs, spread = self.runs, self.navigators.spread
         variance = np.stack([spread[:, 0] + spread[:, 2], spread[:, 3]], axis=1)
         o = self.options
         look(
-            active, self.time, self._dt, self.navigators.estimate, variance, runs.step, runs.count, runs.who, runs.when,
-            self._fix, routes.of, routes.length, routes.points, routes.geodetic, routes.course, routes.along,
-            o.half_width if o.route == "channel" else ASIDE, self._at, self._notes, self._start, self.observation,
+            active, (runs.step, self.time, self._dt), (self.navigators.estimate, variance),
+            (runs.count, runs.who, runs.when, self._fix), self._routes.tracks,
+            o.half_width if o.route == "channel" else ASIDE, (self._at, self._notes, self._start), self.observation,
         )  # fmt: skip
 
     @property
@@ -211,19 +211,19 @@ class GuidedVoyages:
 
     def step(self, active: NDArray[np.bool_], actions: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Steer some voyages for a step; rewards, who touched the side, and for whom it was the last step."""
-        runs, routes, o = self.runs, self._routes, self.options
+        runs, tracks, o = self.runs, self._routes.tracks, self.options
         steer(
-            active, actions, self._at, self._ahead, routes.of, routes.length, routes.points, runs.truth,
-            self.navigators.estimate, self._planned, self._wrong, self._heading, self._speed,
+            active, actions, self._at, self._ahead, tracks, runs.truth, self.navigators.estimate,
+            (self._planned, self._wrong, self._heading, self._speed),
         )  # fmt: skip
         motion.command(active, runs.x, self._wrong, self._heading, self._speed)
         runs.advance(active)
         self.navigators.update(active)
         last = runs.step >= self._steps
         judge(
-            active, self._dt, self._planned, np.ascontiguousarray(runs.x[:, motion.U]), runs.truth, routes.of,
-            routes.length, routes.geodetic, routes.course, routes.along, last, ROUTES.index(o.route), o.half_width,
-            self._true_at, self._tally, self.aside, self._rewards, self._aground,
+            (active, last), (self._dt, self._planned, np.ascontiguousarray(runs.x[:, motion.U])), runs.truth, tracks,
+            (ROUTES.index(o.route), o.half_width), self._true_at, self._tally,
+            (self.aside, self._rewards, self._aground),
         )  # fmt: skip
         self.look(active)
         return self._rewards.copy(), self._aground.copy(), active & last & ~self._aground

@@ -7,6 +7,7 @@ voyage and the vector form call the same kernels, so that they agree bit for bit
 from __future__ import annotations
 
 from math import atan2, cos, exp, hypot, inf, log1p, log10, pi, radians, sin
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,12 @@ from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.estimators.learning.features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 from simnav.geometry.rotation import wrap_scalar
 
-__all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "judge", "look", "steer"]
+__all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "Tracks", "judge", "look", "steer"]
+
+#: The tracks of many voyages: which track is each voyage's (b,); the points of each track (r,); north, east, heading,
+#: speed of each point (r, p, 4); its latitude, longitude [rad] and metres per radian of both (r, p, 4); the course
+#: there [rad], and the distance from the start [m] (r, p).
+Tracks: TypeAlias = tuple[Integers, Integers, Array, Array, Array, Array]
 
 #: Unit of the distance from the track [m], and largest change of heading [rad].
 ASIDE, LARGEST_TURN = 20.0, radians(60.0)
@@ -27,13 +33,14 @@ SIZE = len(GUIDANCE)
 BEHIND, AHEAD = 20, 120
 
 
-@kernel(
-    "void(b1[::1], f8[:, ::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], "
-    "f8[::1], f8[::1], f8[::1], f8[::1])"
-)
+#: Types of `Tracks`.
+_TRACKS = "Tuple((i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1]))"
+
+
+@kernel(f"void(b1[::1], f8[:, ::1], i8[::1], i8[::1], {_TRACKS}, f8[:, ::1], f8[:, ::1], UniTuple(f8[::1], 4))")
 def steer(
-    active: Flags, actions: Array, at: Integers, ahead: Integers, route: Integers, length: Integers, points: Array,
-    truth: Array, estimate: Array, planned: Array, wrong: Array, heading: Array, speed: Array,
+    active: Flags, actions: Array, at: Integers, ahead: Integers, tracks: Tracks, truth: Array, estimate: Array,
+    commands: tuple[Array, Array, Array, Array],
 ) -> None:  # fmt: skip
     """What the agents' actions mean for the vessels.
 
@@ -43,17 +50,18 @@ def steer(
         Which voyages.
     actions : (b, 2) array
         Clipped to [-1, 1].
-    at, ahead, route : (b,) int arrays
-        Point of the track where each vessel believes to be, how far ahead the heading is taken, and which track it is.
-    length : (r,) int array
-        Points of each track.
-    points : (r, p, 4) array
-        North, east, heading, speed (`simnav.world.track.PlannedTrack`).
+    at, ahead : (b,) int arrays
+        Point of the track where each vessel believes to be, and how far ahead the heading is taken.
+    tracks : tuple of arrays
+        See `Tracks`.
     truth, estimate : (b, 9) arrays
         Position, velocity, roll, pitch and yaw; NaN for what is not estimated.
-    planned, wrong, heading, speed : (b,) arrays
-        Overwritten: the planned speed, and the arguments of `simnav.world.motion.command`.
+    commands : four (b,) arrays
+        Overwritten: the planned speed, and the arguments of `simnav.world.motion.command`: what is wrong with the
+        heading, heading and speed.
     """
+    route, length, points, _, _, _ = tracks
+    planned, wrong, heading, speed = commands
     for b in range(active.size):
         if not active[b]:
             continue
@@ -83,39 +91,39 @@ def _place(
 
 
 @kernel(
-    "void(b1[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], "
-    "b1[::1], i8, f8, i8[::1], f8[:, ::1], f8[::1], f8[::1], b1[::1])"
+    f"void(Tuple((b1[::1], b1[::1])), UniTuple(f8[::1], 3), f8[:, ::1], {_TRACKS}, Tuple((i8, f8)), i8[::1], "
+    "f8[:, ::1], Tuple((f8[::1], f8[::1], b1[::1])))"
 )
 def judge(
-    active: Flags, step: Array, planned: Array, speed: Array, truth: Array, route: Integers, length: Integers,
-    geodetic: Array, course: Array, along: Array, last: Flags, code: int, half_width: float, at: Integers,
-    tally: Array, aside: Array, rewards: Array, aground: Flags,
+    which: tuple[Flags, Flags], paces: tuple[Array, Array, Array], truth: Array, tracks: Tracks,
+    task: tuple[int, float], at: Integers, tally: Array, outcome: tuple[Array, Array, Flags],
 ) -> None:  # fmt: skip
     """What a step was worth.
 
     Parameters
     ----------
-    active, route, length, planned, truth
+    which : two (b,) bool arrays
+        Which voyages, and for which of them this is the last step.
+    paces : three (b,) arrays
+        Length of a step [s], planned speed, and true speed through the water [m/s].
+    truth : (b, 9) array
         As of `steer`.
-    step, speed : (b,) arrays
-        Length of a step [s], and true speed through the water [m/s].
-    geodetic : (r, p, 4) array
-        Of the points of each track: latitude, longitude [rad], and metres per radian of both.
-    course, along : (r, p) arrays
-        Course of the track there [rad], and the distance from its start [m].
-    last : (b,) bool array
-        Whether this is the last step.
-    code : int
-        0 track, 1 channel, 2 dock.
-    half_width : float
-        Of the channel [m].
+    tracks : tuple of arrays
+        See `Tracks`.
+    task : (int, float)
+        0 track, 1 channel, 2 dock; half the width of the channel [m].
     at : (b,) int array
         Point of the track where each vessel truly is; updated.
     tally : (b, 4) array
         Distance along the track, sum of the squared distances from it, fuel, least clearance; updated.
-    aside, rewards, aground : (b,) arrays
+    outcome : three (b,) arrays
         Overwritten: distance to starboard of the track [m], reward, whether the vessel touched the side.
     """
+    active, last = which
+    step, planned, speed = paces
+    route, length, _, geodetic, course, along = tracks
+    code, half_width = task
+    aside, rewards, aground = outcome
     for b in range(active.size):
         rewards[b], aground[b] = 0.0, False
         if not active[b]:
@@ -156,50 +164,48 @@ def _number(value: float) -> float:
 
 
 @kernel(
-    "void(b1[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[:, ::1], f8[:, ::1], b1[:, ::1], "
-    "i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, "
-    "i8[::1], f8[:, ::1], f8[:, ::1], f4[:, ::1])"
+    "void(b1[::1], Tuple((i8[::1], f8[::1], f8[::1])), UniTuple(f8[:, ::1], 2), "
+    f"Tuple((i8[::1], i8[:, ::1], f8[:, ::1], b1[:, ::1])), {_TRACKS}, f8, "
+    "Tuple((i8[::1], f8[:, ::1], f8[:, ::1])), f4[:, ::1])"
 )
 def look(
-    active: Flags, now: Array, step: Array, estimate: Array, variance: Array, begun: Integers, count: Integers,
-    who: Integers, when: Array, fix: Flags, route: Integers, length: Integers, points: Array, geodetic: Array,
-    course: Array, along: Array, half_width: float, at: Integers, notes: Array, start: Array,
-    observation: NDArray[np.float32],
+    active: Flags, clock: tuple[Integers, Array, Array], believed: tuple[Array, Array],
+    delivered: tuple[Integers, Integers, Array, Flags], tracks: Tracks, half_width: float,
+    memory: tuple[Integers, Array, Array], observation: NDArray[np.float32],
 ) -> None:  # fmt: skip
     """What the agents see.
 
     Parameters
     ----------
-    active, route, length, points, geodetic, course, along
-        As of `judge`.
-    now, step : (b,) arrays
-        Time of the estimate, and length of a step [s].
-    estimate : (b, 9) array
-        As of `steer`.
-    variance : (b, 2) array
-        Of the horizontal position [m^2] and of the heading [rad^2], as estimated.
-    begun : (b,) int array
-        0 at the start of a voyage, when there is no step to look back at.
-    count, who, when
-        As of `simnav.simulation.steps.SteppedRuns`.
-    fix : (b, i) bool array
-        Which instruments give a position.
+    active : (b,) bool array
+        Which voyages.
+    clock : three (b,) arrays
+        Number of the step, 0 at the start of a voyage, when there is no step to look back at; time of the estimate, and
+        length of a step [s].
+    believed : (b, 9) and (b, 2) arrays
+        Estimate, as of `steer`; variances of its horizontal position [m^2] and of its heading [rad^2].
+    delivered : tuple of arrays
+        Count, who and when of `simnav.simulation.steps.SteppedRuns`; which instruments give a position (b, i).
+    tracks : tuple of arrays
+        See `Tracks`.
     half_width : float
         Of the channel [m]; `ASIDE` without one.
-    at : (b,) int array
-        Point of the track where each vessel believes to be; updated.
-    notes : (b, 3) array
-        Heading of the last estimate, turn rate, time of the last fix; updated.
-    start : (b, 2) array
-        As ``variance``, of the start.
+    memory : (b,) int, (b, 3) and (b, 2) arrays
+        Point of the track where each vessel believes to be, updated; heading of the last estimate, turn rate and time
+        of the last fix, updated; variances at the start.
     observation : (b, 16) float32 array
         Overwritten for the voyages that are active.
     """
+    steps, now, step = clock
+    estimate, variance = believed
+    count, who, when, fix = delivered
+    route, length, points, geodetic, course, along = tracks
+    at, notes, start = memory
     for b in range(active.size):
         if not active[b]:
             continue
         r, e, row = route[b], estimate[b], observation[b]
-        if begun[b] > 0:
+        if steps[b] > 0:
             turned = wrap_scalar(e[8] - notes[b, 0])
             if turned == turned:
                 notes[b, 1] = turned / step[b]

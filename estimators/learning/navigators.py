@@ -32,10 +32,8 @@ from simnav.types import Array, Estimate, InitialState, Instruments
 __all__ = ["Navigators", "navigate"]
 
 _INSTRUMENTS = ("codes", "arms", "noises", "limits", "used")
-_STATE = (
-    "position", "velocity", "dcm", "memory", "bias", "turn", "clock", "sensors", "calibration", "decay", "density",
-    "covariance",
-)  # fmt: skip
+_PROCESS = ("sensors", "decay", "density")
+_STATE = ("position", "velocity", "dcm", "memory", "bias", "turn", "clock", "calibration", "covariance")
 
 
 class Navigators:
@@ -102,12 +100,14 @@ class Navigators:
         for b in np.flatnonzero(banked).tolist():
             self._until[b] = runs.interval_of(b)[1]
         a = self._arrays
-        arguments: Any = (
-            banked, self._until, runs.count, runs.who, runs.when, runs.value, runs.samples, runs.imu_time,
-            runs.imu_interval, runs.rate, runs.force, self._size, *(a[name] for name in _INSTRUMENTS), self._now,
-            *(a[name] for name in _STATE), self.estimate, self.spread,
+        instruments: Any = tuple(a[name] for name in _INSTRUMENTS)
+        state: Any = (self._size, self._now, *(a[name] for name in _STATE))
+        process: Any = tuple(a[name] for name in _PROCESS)
+        navigate(
+            banked, self._until, (runs.count, runs.who, runs.when, runs.value),
+            (runs.samples, runs.imu_time, runs.imu_interval, runs.rate, runs.force), instruments, process, state,
+            (self.estimate, self.spread),
         )  # fmt: skip
-        navigate(*arguments)
 
     def _put(self, name: str, b: int, array: NDArray[Any]) -> None:
         """Store an array of voyage b; where there is no room for it, all get more."""
@@ -136,17 +136,18 @@ class Navigators:
 
 
 @kernel(
-    "void(b1[::1], f8[::1], i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], i8[::1], f8[:, ::1], f8[:, ::1], "
-    "f8[:, :, ::1], f8[:, :, ::1], i8[::1], i8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], "
-    "f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-    "f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+    "void(b1[::1], f8[::1], Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), "
+    "Tuple((i8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
+    "Tuple((i8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])), UniTuple(f8[:, ::1], 3), "
+    "Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "f8[:, ::1], f8[:, ::1], f8[:, ::1])), UniTuple(f8[:, ::1], 2))"
 )
 def navigate(
-    active: Flags, until: Array, count: Integers, who: Integers, when: Array, value: Array, samples: Integers,
-    imu_time: Array, imu_interval: Array, rate: Array, force: Array, size: Integers, codes: Integers, arms: Array,
-    noises: Array, limits: Array, used: Array, now: Array, position: Array, velocity: Array, dcm: Array, memory: Array,
-    bias: Array, turn: Array, clock: Array, sensors: Array, calibration: Array, decay: Array, density: Array,
-    covariance: Array, estimate: Array, spread: Array,
+    active: Flags, until: Array, delivered: tuple[Integers, Integers, Array, Array],
+    imu: tuple[Integers, Array, Array, Array, Array], instruments: tuple[Integers, Array, Array, Array, Array],
+    process: tuple[Array, Array, Array],
+    state: tuple[Integers, Array, Array, Array, Array, Array, Array, Array, Array, Array, Array],
+    result: tuple[Array, Array],
 ) -> None:  # fmt: skip
     """One step of many inertial filters: each propagated to its measurements, and corrected by them.
 
@@ -156,29 +157,34 @@ def navigate(
         Which filters.
     until : (b,) array
         End of each step [s].
-    count, who, when, value, samples, imu_time, imu_interval, rate, force
-        As of `simnav.simulation.steps.SteppedRuns`.
-    size : (b,) int array
-        States of each.
-    codes, arms, noises, limits : (b, i, ...) arrays
-        The instruments, as of `simnav.estimators.models.inertial.InertialModel.arrays`.
-    used : (b, i) array
-        Time of the last measurement that was used of each [s].
-    now : (b,) array
-        Time of the state [s]; updated, like what follows.
-    position, velocity, dcm, memory, bias, turn, clock, sensors, calibration, decay, density
-        As of `InertialModel.arrays`.
-    covariance : (b, n n) array
-        Flat, with room behind it.
-    estimate, spread : (b, 9), (b, 4) arrays
-        Overwritten (`Navigators`).
+    delivered : tuple of arrays
+        Count, who, when and value of `simnav.simulation.steps.SteppedRuns`.
+    imu : tuple of arrays
+        Its samples, times, intervals, rate and force.
+    instruments : tuple of (b, i, ...) arrays
+        Codes, arms, noises and limits, as of `simnav.estimators.models.inertial.InertialModel.arrays`; the time of the
+        last measurement of each that was used [s], updated.
+    process : tuple of (b, ...) arrays
+        Sensors, decay and density, as of `InertialModel.arrays`.
+    state : tuple of (b, ...) arrays
+        Updated: how many states each filter has, and their time [s]; position, velocity, matrix of the attitude,
+        memory, biases, turn, clock and calibration, as of `InertialModel.arrays`; the covariance, flat, with room
+        behind it.
+    result : (b, 9) and (b, 4) arrays
+        Overwritten: estimate and spread (`Navigators`).
     """
+    count, who, when, value = delivered
+    samples, imu_time, imu_interval, rate, force = imu
+    codes, arms, noises, limits, used = instruments
+    sensors, decay, density = process
+    size, now, position, velocity, dcm, memory, bias, turn, clock, calibration, covariance = state
+    estimate, spread = result
     longest = 0.0
     for b in range(active.size):
         if active[b]:
             longest = max(longest, until[b] - now[b])
     blocks = np.empty((int(longest / BLOCK) + 4, BLOCK_COLUMNS))
-    transition, process = np.empty((15, 15)), np.empty((15, 15))
+    transition, process_noise = np.empty((15, 15)), np.empty((15, 15))
     for b in range(active.size):
         if not active[b]:
             continue
@@ -204,20 +210,20 @@ def navigate(
             if elapsed > 0.0:
                 s = samples[b]
                 first, blocks_used = advance_inertial(
-                    position[b], velocity[b], dcm[b], memory[b], bias[b], turn[b], clock[b], imu_time[b, :s],
-                    imu_interval[b, :s], rate[b, :s], force[b, :s], first, stop, sensors[b], blocks,
+                    (position[b], velocity[b], dcm[b], memory[b], bias[b], turn[b], clock[b]),
+                    (imu_time[b, :s], imu_interval[b, :s], rate[b, :s], force[b, :s]), first, stop, sensors[b], blocks,
                 )  # fmt: skip
-                accumulate_error(blocks, blocks_used, sensors[b], transition, process)
+                accumulate_error(blocks, blocks_used, sensors[b], transition, process_noise)
                 now[b] = stop
                 more = n - 15
                 propagate_covariance(
-                    P, transition, process, calibration[b, :more], decay[b, :more], density[b, :more], elapsed
+                    P, transition, process_noise, calibration[b, :more], decay[b, :more], density[b, :more], elapsed
                 )
             if i >= 0:
                 assimilate_inertial(
-                    code, arms[b, i], codes[b, i, 2], codes[b, i, 3], value[b, j, :d], position[b], velocity[b], dcm[b],
-                    clock[b, 12:15], bias[b], calibration[b, : n - 15], P, noises[b, i, : d * d].reshape((d, d)),
-                    correction,
+                    (code, arms[b, i], codes[b, i, 2], codes[b, i, 3]), value[b, j, :d],
+                    (position[b], velocity[b], dcm[b], clock[b, 12:15], bias[b], calibration[b, : n - 15]), P,
+                    noises[b, i, : d * d].reshape((d, d)), correction,
                 )  # fmt: skip
         for k in range(3):
             estimate[b, k], estimate[b, 3 + k] = position[b, k], velocity[b, k]

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simnav.estimators.algebra.joseph import joseph_update, project
+from simnav.estimators.learning.bank import Events
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, Flags, InitialState, Instruments, Integers, Measurement, Measurements
@@ -65,6 +66,14 @@ class Linear(NamedTuple):
     jacobian: Array
     noise: Array
     correction: Array
+
+    @property
+    def events(self) -> Events:
+        """The same as the kernels take it."""
+        return (
+            self.transition, self.process_noise, self.moves, self.instrument, self.time, self.size, self.innovation,
+            self.jacobian, self.noise, self.correction,
+        )  # fmt: skip
 
     @staticmethod
     def empty(events: int, n: int) -> Linear:

@@ -26,6 +26,7 @@ from math import log, sqrt
 import numpy as np
 
 from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.estimators.learning.bank import EVENTS, STEPS, Events, Steps
 
 __all__ = ["NEED_ORACLE", "REWARDS", "reward"]
 
@@ -36,13 +37,12 @@ NEED_ORACLE = ("error", "gain")
 
 
 @kernel(
-    "void(i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[::1], i8[::1], b1[::1], i8[::1], b1[::1], "
-    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])"
+    f"void(i8, {STEPS}, {EVENTS}, b1[::1], UniTuple(f8[:, ::1], 2), "
+    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1])), Tuple((f8[:, :, ::1], f8[:, ::1])), f8[::1])"
 )
 def reward(
-    code: int, error: Array, oracle: Array, action: Array, first: Integers, last: Integers, instrument: Integers,
-    size: Integers, faulty: Flags, place: Integers, active: Flags, scale: Array, covariance: Array, delta: Array,
-    rewards: Array,
+    code: int, steps: Steps, events: Events, faulty: Flags, errors: tuple[Array, Array],
+    decision: tuple[Integers, Array, Array], filters: tuple[Array, Array], rewards: Array,
 ) -> None:  # fmt: skip
     """What each filter's step was worth; 0 where the truth is not known.
 
@@ -50,19 +50,26 @@ def reward(
     ----------
     code : int
         Of `REWARDS`.
-    error : (b, 9) array
-        Of the plain filter at the end of the step: estimate minus truth.
-    oracle : (b, 3) array
-        As of `simnav.estimators.learning.voyage.Voyage`.
-    action : (b, 7) array
-        Corrections: north, east, down [m], the same of the velocity [m/s], heading [rad].
-    first, last, instrument, size, place, active, scale, covariance, delta
-        As of `simnav.estimators.learning.bank.take`.
+    steps, events : tuples of arrays
+        As of `simnav.estimators.learning.bank`.
     faulty : (e,) bool array
         Which measurements a fault has touched.
+    errors : (b, 9) and (b, 3) arrays
+        Of the plain filter at the end of the step: estimate minus truth; of the oracle, as of
+        `simnav.estimators.learning.voyage.Voyage`.
+    decision : (k,) int, (b, p, k) and (b, 7) arrays
+        Places of the instruments and factors on their sigmas, as of `simnav.estimators.learning.bank.take`;
+        corrections north, east, down [m], the same of the velocity [m/s], heading [rad].
+    filters : (b, n, n) and (b, n) arrays
+        Covariances, and distances to the plain filter.
     rewards : (b,) array
         Overwritten.
     """
+    active, first, last = steps
+    _, _, _, instrument, _, size, _, _, _, _ = events
+    error, oracle = errors
+    place, scale, action = decision
+    covariance, delta = filters
     counts = np.empty(scale.shape[1], np.int64)
     for b in range(first.size):
         rewards[b] = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.estimators.learning.guidance_kernels import Tracks
 from simnav.geometry.earth import principal_radii, relative_position
 from simnav.scenario import Scenario
 from simnav.types import Array
@@ -42,6 +43,11 @@ class Routes:
         self.points, self.geodetic = np.zeros((0, 0, 4)), np.zeros((0, 0, 4))
         self.course, self.along = np.zeros((0, 0)), np.zeros((0, 0))
 
+    @property
+    def tracks(self) -> Tracks:
+        """All of them, as the kernels take them."""
+        return self.of, self.length, self.points, self.geodetic, self.course, self.along
+
     def put(self, b: int, template: Scenario, drawn: Scenario) -> None:
         """Plan the track of a voyage, from its scenario before and after what is drawn."""
         shared = not template.distributions
@@ -74,12 +80,12 @@ _tracks: dict[str, PlannedTrack] = {}
 def _planned(scenario: Scenario) -> PlannedTrack:
     """The track that the manoeuvres plan; the last ones are kept, since that of half a day takes half a second."""
     assert scenario.start is not None
-    told = scenario.start, scenario.vessel or Vessel(), scenario.manoeuvres, scenario.current
-    key = repr((told, scenario.duration))
+    voyage = scenario.start, scenario.vessel or Vessel(), scenario.manoeuvres, scenario.current
+    key = repr((voyage, scenario.duration))
     if key not in _tracks:
         if len(_tracks) > 4:
             _tracks.pop(next(iter(_tracks)))
-        _tracks[key] = track = World.plan(*told)
+        _tracks[key] = track = World.plan(*voyage)
         track.reach(scenario.duration)
     return _tracks[key]
 

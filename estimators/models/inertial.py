@@ -38,9 +38,24 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
-from simnav.estimators.models.measurements import CODES, HEADING, OWN, observe, uncalibrated_noise, white_noise
+from simnav.estimators.models.measurements import (
+    CODES,
+    HEADING,
+    OWN,
+    Aid,
+    State,
+    observe,
+    uncalibrated_noise,
+    white_noise,
+)
 from simnav.estimators.models.own_observation import OwnObservation
-from simnav.estimators.models.propagation import TURN_TIME, correct_inertial, propagate_covariance, propagate_inertial
+from simnav.estimators.models.propagation import (
+    TURN_TIME,
+    Samples,
+    correct_inertial,
+    propagate_covariance,
+    propagate_inertial,
+)
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.types import (
@@ -103,7 +118,7 @@ class InertialModel(ErrorModel):
         Of the aiding instruments.
     bias_at, scale_at : dict of str to int
         Index in the error state of an instrument's first bias, and of its scale factor.
-    aid_parameters : dict of str to (int, (3,) array, int, int)
+    aid_parameters : dict of str to Aid
         What `simnav.estimators.models.measurements.observe_inertial` is told of an instrument: its code, its lever arm,
         and its places in ``bias_at`` and ``scale_at``, -1 for none.
     own : dict of str to OwnObservation
@@ -208,7 +223,7 @@ class InertialModel(ErrorModel):
         self.scale_at: dict[str, int] = {}
         self.noise: dict[str, Array] = {}
         self.uncalibrated: set[str] = set()
-        self.aid_parameters: dict[str, tuple[int, Array, int, int]] = {}
+        self.aid_parameters: dict[str, Aid] = {}
         self.own: dict[str, OwnObservation] = {}
         self._states: list[tuple[float, float, float]] = []  # initial variance, decay, noise density
         for sheet in self.instruments.values():
@@ -294,7 +309,7 @@ class InertialModel(ErrorModel):
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self._first = 0
-        self._samples: tuple[Array, Array, Array, Array]
+        self._samples: Samples
         if imu is None or len(imu) == 0:
             self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
         else:
@@ -309,8 +324,8 @@ class InertialModel(ErrorModel):
         if elapsed <= 0.0:
             return
         self._first = propagate_inertial(
-            self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock,
-            *self._samples, self._first, until, self._noise, self.transition, self.process_noise,
+            (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
+            self._first, until, self._noise, self.transition, self.process_noise,
         )  # fmt: skip
         self.time = until
         propagate_covariance(
@@ -336,33 +351,27 @@ class InertialModel(ErrorModel):
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         name = measurement.instrument
         if name in self.own:
-            found = self.observe_own(
-                name, measurement.time, measurement.value, self.position, self.velocity, self.dcm, self.raw_rate,
-                self.bias, self.calibration,
-            )  # fmt: skip
+            found = self.observe_own(name, measurement.time, measurement.value, self._state())
             return None if found is None else Linearised(*found, self.noise[name])
-        code, arm, bias_at, scale_at = self.aid_parameters[name]
         jacobian, noise = self._jacobians[name], self.noise[name]
         innovation, value = np.empty(len(noise)), measurement.value.astype(np.float64)
-        if not observe(
-            code, arm, bias_at, scale_at, value, self.position, self.velocity, self.dcm, self.raw_rate, self.bias,
-            self.calibration, innovation, jacobian,
-        ):  # fmt: skip
+        if not observe(self.aid_parameters[name], value, self._state(), innovation, jacobian):
             return None
         if name in self.uncalibrated:
             noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
         return Linearised(innovation, jacobian, noise)
 
-    def observe_own(
-        self, name: str, time: float, value: Array, position: Array, velocity: Array, dcm: Array, rate: Array,
-        bias: Array, calibration: Array,
-    ) -> tuple[Array, Array] | None:  # fmt: skip
+    def _state(self) -> State:
+        return self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration
+
+    def observe_own(self, name: str, time: float, value: Array, state: State) -> tuple[Array, Array] | None:
         """Innovation and Jacobian of a measurement whose kind has an equation of its own, at any state.
 
-        See `simnav.estimators.models.own_observation.OwnObservation.linearise`; the state as of the attributes.
+        See `simnav.estimators.models.own_observation.OwnObservation.linearise`.
         """
+        *moving, calibration = state
         own, size = self.own[name], _NAV + len(calibration)
-        point = own.point(time, position, velocity, dcm, rate, bias)
+        point = own.point(time, *moving)
         return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
@@ -377,14 +386,12 @@ class InertialModel(ErrorModel):
         name = measurement.instrument
         if name not in self._fused:
             return super().innovate(measurement, covariance)
-        code, arm, bias_at, scale_at = self.aid_parameters[name]
         noise, value = self.noise[name], measurement.value.astype(np.float64)
         d = len(noise)
         innovation, cross, predicted = np.empty(d), np.empty((self.size, d)), np.empty((d, d))
         if not innovate_inertial(
-            code, arm, bias_at, scale_at, value, self.position, self.velocity, self.dcm, self.raw_rate, self.bias,
-            self.calibration, covariance, innovation, cross, predicted,
-        ):  # fmt: skip
+            self.aid_parameters[name], value, self._state(), covariance, innovation, cross, predicted
+        ):
             return None
         return innovation, cross, predicted, noise
 
@@ -394,8 +401,8 @@ class InertialModel(ErrorModel):
             return super().absorb(observation, covariance, correction)
         innovation, cross, predicted, noise = observation
         nis: float = absorb_inertial(
-            covariance, cross, predicted, np.ascontiguousarray(noise, dtype=np.float64), innovation,
-            self.position, self.velocity, self.dcm, self.bias, self.calibration, correction,
+            covariance, cross, predicted, np.ascontiguousarray(noise, dtype=np.float64), innovation, self._state(),
+            correction,
         )  # fmt: skip
         return nis
 
@@ -404,11 +411,9 @@ class InertialModel(ErrorModel):
         name = measurement.instrument
         if name not in self._fused:
             return None
-        code, arm, bias_at, scale_at = self.aid_parameters[name]
         nis, size = assimilate_inertial(
-            code, arm, bias_at, scale_at, measurement.value.astype(np.float64), self.position, self.velocity,
-            self.dcm, self.raw_rate, self.bias, self.calibration, covariance, self.noise[name],
-            correction,
+            self.aid_parameters[name], measurement.value.astype(np.float64), self._state(), covariance,
+            self.noise[name], correction,
         )  # fmt: skip
         return nis, size
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import OWN, observe_inertial
+from simnav.estimators.models.measurements import OWN, State, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
 from simnav.geometry.rotation import cross, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments, Integers
@@ -238,13 +238,13 @@ def _along_motion(
 
 
 @kernel(
-    "void(i8, i8[::1], i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8[:, ::1], "
-    "f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], i8[::1])"
+    "void(i8, Tuple((i8[::1], i8[::1], f8[:, ::1])), Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])), "
+    "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])), f8[:, ::1], f8[:, :, ::1], "
+    "i8[::1])"
 )
 def _linearise_aids(
-    first: int, row: Integers, instrument: Integers, value: Array, codes: Integers, arms: Array, bias_at: Integers,
-    scale_at: Integers, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, calibration: Array,
-    residual: Array, jacobian: Array, components: Integers,
+    first: int, measured: tuple[Integers, Integers, Array], aids: tuple[Integers, Array, Integers, Integers],
+    states: State, residual: Array, jacobian: Array, components: Integers,
 ) -> None:  # fmt: skip
     """Residuals and derivatives of M measurements at the K states that they are attached to.
 
@@ -252,15 +252,11 @@ def _linearise_aids(
     ----------
     first : int
         Measurement to begin with.
-    row : (M,) int array
-        Number of the state of each measurement; -1: none of these states.
-    instrument : (M,) int array
-        Number s of its instrument.
-    value : (M, 3) array
-        What was measured.
-    codes, arms, bias_at, scale_at
-        Of each instrument, as `simnav.estimators.models.measurements.observe_inertial` takes them.
-    position, velocity, dcm, rate, bias, calibration : (K, ...) arrays
+    measured : (M,) int, (M,) int and (M, 3) arrays
+        Number of the state of each measurement, -1: none of these states; number of its instrument; what was measured.
+    aids : tuple of arrays
+        Of each instrument, what is in `simnav.estimators.models.measurements.Aid`.
+    states : tuple of (K, ...) arrays
         The states, likewise.
     residual : (M, 3) array
         Overwritten: measured minus predicted.
@@ -269,26 +265,29 @@ def _linearise_aids(
     components : (M,) int array
         Overwritten: components that count; 0 where the state has no such measurement.
     """
+    row, instrument, value = measured
+    codes, arms, bias_at, scale_at = aids
+    position, velocity, dcm, rate, bias, calibration = states
     innovation = np.empty(3)
     for i in range(first, row.size):
         k, s = row[i], instrument[i]
         if k < 0:
             continue
         components[i] = observe_inertial(
-            codes[s], arms[s], bias_at[s], scale_at[s], value[i],
-            position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k], innovation, jacobian[i],
+            (codes[s], arms[s], bias_at[s], scale_at[s]), value[i],
+            (position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k]), innovation, jacobian[i],
         )  # fmt: skip
         for r in range(3):
             residual[i, r] = innovation[r] if r < components[i] else 0.0
 
 
 @kernel(
-    "void(i8, f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
+    "void(i8, f8[:, :, ::1], f8[:, ::1], Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])), "
+    "f8[:, :, ::1])"
 )
 def _move_folds(
-    first: int, transition: Array, shift: Array, position: Array, velocity: Array, dcm: Array, bias: Array,
-    calibration: Array, jacobian: Array,
-) -> None:  # fmt: skip
+    first: int, transition: Array, shift: Array, states: tuple[Array, Array, Array, Array, Array], jacobian: Array
+) -> None:
     """Correct the states of folds by where their nodes' shifts lead, in place.
 
     Parameters
@@ -299,11 +298,12 @@ def _move_folds(
         Phi from each node to the time of its fold.
     shift : (K, n) array
         By how much the node has been moved since the fold was predicted.
-    position, velocity, dcm, bias, calibration : (K, ...) arrays
-        States at the folds; updated.
+    states : tuple of (K, ...) arrays
+        Position, velocity, rotation, biases and calibration at the folds; updated.
     jacobian : (K, n, n) array
         Overwritten: derivative of the fold's state with respect to the node.
     """
+    position, velocity, dcm, bias, calibration = states
     count, n = shift.shape
     moved, dx = np.empty(n), np.zeros(15 + calibration.shape[1])
     for k in range(first, count):
@@ -376,10 +376,12 @@ class InertialChain(Chain):
         for i, name in enumerate(self.names):
             if name in front.own:  # the compiled loop has no use for its states
                 known[i] = (OWN, np.zeros(3), -1, -1)
-        self._codes = np.array([code for code, *_ in known], dtype=np.int64)
-        self._arms = np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3)
-        self._bias_at = np.array([at for *_, at, _ in known], dtype=np.int64)
-        self._scale_at = np.array([at for *_, at in known], dtype=np.int64)
+        self._known = (
+            np.array([code for code, *_ in known], dtype=np.int64),
+            np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3),
+            np.array([at for *_, at, _ in known], dtype=np.int64),
+            np.array([at for *_, at in known], dtype=np.int64),
+        )
         return covariance
 
     def linearise_motion(self, first: int = 0) -> None:
@@ -393,9 +395,9 @@ class InertialChain(Chain):
         wide = jacobian if self.size >= 15 else np.zeros((len(aids), 3, 15))
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
         _linearise_aids(
-            first, row, aids["instrument"], aids["value"], self._codes, self._arms, self._bias_at, self._scale_at,
-            position, velocity, dcm, states["raw_rate"], bias, calibration,
-            aids["residual"], wide, aids["components"],
+            first, (row, aids["instrument"], aids["value"]), self._known,
+            (position, velocity, dcm, states["raw_rate"], bias, calibration), aids["residual"], wide,
+            aids["components"],
         )  # fmt: skip
         if self.front.own:
             self._observe_own(first, row, states, prefix, wide)
@@ -409,20 +411,20 @@ class InertialChain(Chain):
         for name in names:
             folds[f"now_{name}"][first:] = folds[name][first:]
         position, velocity, dcm, bias, calibration = (folds[f"now_{name}"] for name in names)
-        _move_folds(
-            first, folds["transition"], folds["shift"], position, velocity, dcm, bias, calibration, folds["jacobian"]
-        )
+        states = position, velocity, dcm, bias, calibration
+        _move_folds(first, folds["transition"], folds["shift"], states, folds["jacobian"])
 
     def _observe_own(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """`observe` for the aids whose kind has a measurement equation of its own."""
         aids, front = self.aids, self.front
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in front.state)
-        columns = (position, velocity, dcm, states["raw_rate"], bias, calibration)
-        for i in first + np.flatnonzero((self._codes[aids["instrument"][first:]] == OWN) & (row[first:] >= 0)):
+        for i in first + np.flatnonzero((self._known[0][aids["instrument"][first:]] == OWN) & (row[first:] >= 0)):
             name = self.names[aids["instrument"][i]]
             d = len(front.noise[name])
             aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
-            found = front.observe_own(name, aids["time"][i], aids["value"][i, :d], *(c[row[i]] for c in columns))
+            k = row[i]
+            at = position[k], velocity[k], dcm[k], states["raw_rate"][k], bias[k], calibration[k]
+            found = front.observe_own(name, aids["time"][i], aids["value"][i, :d], at)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
 

@@ -24,7 +24,16 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import HEADING, NAVIGATION_STATES, SPEED_LOG, observe_inertial
+from simnav.estimators.models.measurements import (
+    AID,
+    HEADING,
+    NAVIGATION_STATES,
+    SPEED_LOG,
+    STATE,
+    Aid,
+    State,
+    observe_inertial,
+)
 from simnav.estimators.models.points import PointModel
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import cross, rotation_coefficients
@@ -108,8 +117,8 @@ def propagate_points(
         memory[:] = 0.0
         mechanize_step(
             p, v, m, memory,
-            sample[0] - errors[k, 9], sample[1] - errors[k, 10], sample[2] - errors[k, 11],
-            sample[3] - errors[k, 12], sample[4] - errors[k, 13], sample[5] - errors[k, 14],
+            (sample[0] - errors[k, 9], sample[1] - errors[k, 10], sample[2] - errors[k, 11]),
+            (sample[3] - errors[k, 12], sample[4] - errors[k, 13], sample[5] - errors[k, 14]),
             interval,
         )  # fmt: skip
         errors[k, 0] = (p[0] - end_latitude) * next_north
@@ -131,11 +140,8 @@ def propagate_points(
             errors[k, 12 + j] *= keep_a
 
 
-@kernel("void(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def observe_points(
-    code: int, arm: Array, bias_at: int, scale_at: int, position: Array, velocity: Array, dcm: Array, rate: Array,
-    bias: Array, calibration: Array, errors: Array, differences: Array,
-) -> None:  # fmt: skip
+@kernel(f"void({AID}, {STATE}, f8[:, ::1], f8[:, ::1])")
+def observe_points(aid: Aid, state: State, errors: Array, differences: Array) -> None:
     """What an instrument should read at points, minus what it should read at the state.
 
     In position and calibration the readings are linear (see the module), and so computed; the rest is the instrument's
@@ -143,13 +149,15 @@ def observe_points(
 
     Parameters
     ----------
-    code, arm, bias_at, scale_at, position, velocity, dcm, rate, bias, calibration
+    aid, state
         As of `simnav.estimators.models.measurements.observe_inertial`.
     errors : (k, n) array
         Of the points.
     differences : (k, d) array
         Filled.
     """
+    code, arm, bias_at, scale_at = aid
+    position, velocity, dcm, rate, bias, calibration = state
     n, d = errors.shape[1], differences.shape[1]
     linear, scratch = np.zeros((3, n)), np.zeros((3, 12))
     at_state, reading = np.zeros(3), np.zeros(3)
@@ -169,8 +177,8 @@ def observe_points(
             _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
         full = k == -2
         known = observe_inertial(
-            code, arm, bias_at if full else -1, scale_at if full else -1, value, position, v, m, rate, b, calibration,
-            reading, linear if full else scratch,
+            (code, arm, bias_at if full else -1, scale_at if full else -1), value,
+            (position, v, m, rate, b, calibration), reading, linear if full else scratch,
         )  # fmt: skip
         if k == -1:
             at_state[:] = reading
@@ -225,8 +233,5 @@ class InertialPoints(InertialModel, PointModel):
             assert found is not None  # `measure` says something of it
             return found
         differences = np.empty((len(errors), len(self.noise[name])))
-        observe_points(
-            *self.aid_parameters[name], self.position, self.velocity, self.dcm, self.raw_rate, self.bias,
-            self.calibration, errors, differences,
-        )  # fmt: skip
+        observe_points(self.aid_parameters[name], self._state(), errors, differences)
         return differences

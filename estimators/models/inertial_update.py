@@ -12,26 +12,22 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
-from simnav.estimators.models.measurements import observe_inertial
+from simnav.estimators.models.measurements import AID, STATE, Aid, State, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
 from simnav.types import Array
 
 __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
 
 
-@kernel(
-    "b1(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], "
-    "f8[:, ::1], f8[:, ::1])"
-)
+@kernel(f"b1({AID}, f8[::1], {STATE}, f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1])")
 def innovate_inertial(
-    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
-    rate: Array, bias: Array, calibration: Array, covariance: Array, innovation: Array, cross: Array, predicted: Array,
-) -> bool:  # fmt: skip
+    aid: Aid, value: Array, state: State, covariance: Array, innovation: Array, cross: Array, predicted: Array
+) -> bool:
     """Innovation of a measurement, and what the covariance says of it.
 
     Parameters
     ----------
-    code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration
+    aid, value, state
         As of `simnav.estimators.models.measurements.observe_inertial`.
     covariance : (n, n) array
         P.
@@ -48,22 +44,16 @@ def innovate_inertial(
         False where the measurement says nothing.
     """
     jacobian = np.empty((innovation.size, covariance.shape[0]))
-    if not observe_inertial(
-        code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, innovation, jacobian
-    ):
+    if not observe_inertial(aid, value, state, innovation, jacobian):
         return False
     project(covariance, jacobian, cross, predicted)
     return True
 
 
-@kernel(
-    "f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], "
-    "f8[::1])"
-)
+@kernel(f"f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], {STATE}, f8[::1])")
 def absorb_inertial(
-    covariance: Array, cross: Array, predicted: Array, noise: Array, innovation: Array, position: Array,
-    velocity: Array, dcm: Array, bias: Array, calibration: Array, correction: Array,
-) -> float:  # fmt: skip
+    covariance: Array, cross: Array, predicted: Array, noise: Array, innovation: Array, state: State, correction: Array
+) -> float:
     """Correct a state and its covariance by an innovation, in place.
 
     Parameters
@@ -72,8 +62,8 @@ def absorb_inertial(
         As of `innovate_inertial`.
     noise : (d, d) array
         R.
-    position, velocity, dcm, bias, calibration
-        As of `simnav.estimators.models.propagation.correct_inertial`.
+    state : tuple of arrays
+        As of `innovate_inertial`; corrected.
     correction : (n,) array
         Overwritten with what was added to the state.
 
@@ -89,18 +79,15 @@ def absorb_inertial(
             spread[i, k] = predicted[i, k] + noise[i, k]
     nis = joseph_update(covariance, cross, spread, innovation, correction)
     if nis >= 0.0:
+        position, velocity, dcm, _, bias, calibration = state
         correct_inertial(position, velocity, dcm, bias, calibration, correction)
     return nis
 
 
-@kernel(
-    "UniTuple(f8, 2)(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], "
-    "f8[:, ::1], f8[:, ::1], f8[::1])"
-)
+@kernel(f"UniTuple(f8, 2)({AID}, f8[::1], {STATE}, f8[:, ::1], f8[:, ::1], f8[::1])")
 def assimilate_inertial(
-    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
-    rate: Array, bias: Array, calibration: Array, covariance: Array, noise: Array, correction: Array,
-) -> tuple[float, float]:  # fmt: skip
+    aid: Aid, value: Array, state: State, covariance: Array, noise: Array, correction: Array
+) -> tuple[float, float]:
     """`innovate_inertial` and `absorb_inertial` in one.
 
     Returns
@@ -113,15 +100,10 @@ def assimilate_inertial(
     """
     n, d = covariance.shape[0], noise.shape[0]
     innovation, cross, predicted = np.empty(d), np.empty((n, d)), np.empty((d, d))
-    if not innovate_inertial(
-        code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, covariance,
-        innovation, cross, predicted,
-    ):  # fmt: skip
+    if not innovate_inertial(aid, value, state, covariance, innovation, cross, predicted):
         return -1.0, 0.0
     size = 0.0
     for i in range(d):
         size += innovation[i] * innovation[i]
-    nis = absorb_inertial(
-        covariance, cross, predicted, noise, innovation, position, velocity, dcm, bias, calibration, correction
-    )
+    nis = absorb_inertial(covariance, cross, predicted, noise, innovation, state, correction)
     return nis, sqrt(size)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import atan2, cos, sin, sqrt
+from typing import TypeAlias
 
 import numpy as np
 
@@ -31,7 +32,10 @@ from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJO
 from simnav.geometry.rotation import cross
 from simnav.types import Array, Datasheet
 
-__all__ = ["CODES", "OWN", "observe", "observe_inertial", "radii", "uncalibrated_noise", "white_noise", "wrap"]
+__all__ = [
+    "AID", "CODES", "OWN", "STATE", "Aid", "State", "observe", "observe_inertial", "radii", "uncalibrated_noise",
+    "white_noise", "wrap",
+]  # fmt: skip
 
 #: A heading needs the forward axis this far from the vertical: the cosine of the pitch [-].
 LEAST_LEVEL = 0.1
@@ -52,6 +56,17 @@ CODES: Mapping[str, int] = {
 #: In the place of a code: the kind of instrument has a function of its own (`simnav.kinds.Kind.observation`).
 OWN = -1
 
+#: What is known of an instrument: one of `CODES`; its lever arm (3,), body axes [m]; the place in the error state of
+#: its first bias, and of its scale factor (behind a DVL's scale factor come three misalignments, behind a log's bias
+#: the current, north and east), -1 for none.
+Aid: TypeAlias = tuple[int, Array, int, int]
+#: The state at which a measurement is observed: position (3,), latitude, longitude [rad] and height [m]; velocity (3,),
+#: north, east, down [m/s]; rotation from body to north-east-down (3, 3); body rate relative to the inertial frame, as
+#: measured (3,) [rad/s]; bias, the gyroscopes' first; calibration states of the instruments (n - 15,).
+State: TypeAlias = tuple[Array, Array, Array, Array, Array, Array]
+#: Their types.
+AID, STATE = "Tuple((i8, f8[::1], i8, i8))", "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1]))"
+
 
 def wrap(angle: float) -> float:
     """An angle brought into [-pi, pi]."""
@@ -66,33 +81,17 @@ def radii(latitude: float) -> tuple[float, float]:
 
 
 @kernel()
-def observe_inertial(
-    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
-    rate: Array, bias: Array, calibration: Array, innovation: Array, jacobian: Array,
-) -> int:  # fmt: skip
+def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
     """Innovation and Jacobian of one measurement (equations in the module).
 
     Parameters
     ----------
-    code : int
-        One of `CODES`.
-    arm : (3,) array
-        Lever arm, body axes [m].
-    bias_at, scale_at : int
-        Place in the error state of the instrument's first bias, and of its scale factor (behind a DVL's scale factor
-        come three misalignments, behind a log's bias the current, north and east); -1 for none.
+    aid : tuple
+        The instrument, see `Aid`.
     value : (d,) array
         As measured.
-    position, velocity : (3,) arrays
-        Latitude, longitude [rad] and height [m]; velocity north, east, down [m/s].
-    dcm : (3, 3) array
-        Rotation from body to north-east-down.
-    rate : (3,) array
-        Body rate relative to the inertial frame, as measured [rad/s].
-    bias : (k,) array, k >= 3
-        The gyroscopes' first.
-    calibration : (n - 15,) array
-        Calibration states of the instruments.
+    state : tuple of arrays
+        See `State`.
     innovation : (d,) array
         Filled: measured minus predicted, in the units of ``KINDS[kind].errors``.
     jacobian : (d, n) array
@@ -103,6 +102,8 @@ def observe_inertial(
     int
         d; 0 where the measurement says nothing (a heading near the vertical).
     """
+    code, arm, bias_at, scale_at = aid
+    position, velocity, dcm, rate, bias, calibration = state
     d = 3
     if code == TERRAIN_FIX:
         d = 2
@@ -199,17 +200,10 @@ def observe_inertial(
     return d
 
 
-@kernel(
-    "i8(i8, f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])"
-)
-def observe(
-    code: int, arm: Array, bias_at: int, scale_at: int, value: Array, position: Array, velocity: Array, dcm: Array,
-    rate: Array, bias: Array, calibration: Array, innovation: Array, jacobian: Array,
-) -> int:  # fmt: skip
+@kernel(f"i8({AID}, f8[::1], {STATE}, f8[::1], f8[:, ::1])")
+def observe(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
     """`observe_inertial`, to be called from Python."""
-    return observe_inertial(
-        code, arm, bias_at, scale_at, value, position, velocity, dcm, rate, bias, calibration, innovation, jacobian
-    )
+    return observe_inertial(aid, value, state, innovation, jacobian)
 
 
 def white_noise(sheet: Datasheet, faster: Array | float, rate_variance: float) -> Array:

@@ -9,6 +9,7 @@ covariance is touched once a measurement (`propagate_covariance`). The equations
 from __future__ import annotations
 
 from math import cos, exp, sin
+from typing import TypeAlias
 
 import numpy as np
 
@@ -23,7 +24,10 @@ __all__ = [
     "BLOCK_COLUMNS",
     "HELD_ATTITUDE",
     "HELD_VELOCITY",
+    "SAMPLES",
     "TURN_TIME",
+    "Moving",
+    "Samples",
     "accumulate_error",
     "advance_inertial",
     "correct_inertial",
@@ -46,6 +50,17 @@ GRAVITY_FLATTENING = 0.0053024
 #: Columns of a block: duration, time held; latitude, height; velocity; mean DCM; mean specific force, north-east-down;
 #: averaged body rate.
 BLOCK_COLUMNS = 22
+
+#: IMU samples: their times and intervals (k,) [s], angular rates [rad/s] and specific forces [m/s^2] (k, 3).
+Samples: TypeAlias = tuple[Array, Array, Array, Array]
+SAMPLES = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))"
+#: An inertial state that is carried along, with its memory of the samples: position (3,), latitude, longitude [rad] and
+#: height [m]; velocity (3,), north, east, down [m/s]; rotation from body to north-east-down (3, 3); increments of the
+#: last whole sample (6,); gyroscope and accelerometer bias, which decays (6,); averaged body rate (3,) [rad/s]; and the
+#: clock (15,): time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force;
+#: the mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a
+#: sample old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
+Moving: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array]
 
 
 @kernel()
@@ -192,17 +207,16 @@ def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array,
 
 @kernel()
 def next_stretch(
-    clock: Array, time: Array, interval: Array, rate: Array, force: Array, i: int, t: float, until: float,
-    nominal: float,
-) -> tuple[int, float, float, bool]:  # fmt: skip
+    clock: Array, samples: Samples, i: int, t: float, until: float, nominal: float
+) -> tuple[int, float, float, bool]:
     """The stretch from a time on in which one sample holds, or none.
 
     Parameters
     ----------
     clock : (15,) array
         As of `advance_inertial`; what it says of samples is updated.
-    time, interval, rate, force
-        The samples at hand.
+    samples : tuple of arrays
+        See `Samples`.
     i : int
         Index of the first that may not be used up.
     t, until, nominal : float
@@ -219,6 +233,7 @@ def next_stretch(
     hold : bool
         Whether there is no sample for it.
     """
+    time, interval, rate, force = samples
     eps = 1e-7
     n = time.size
     while i < n and (
@@ -250,13 +265,12 @@ def next_stretch(
 
 
 @kernel(
-    "UniTuple(i8, 2)(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], "
-    "f8[:, ::1], i8, f8, f8[::1], f8[:, ::1])"
+    "UniTuple(i8, 2)(Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1])), "
+    f"{SAMPLES}, i8, f8, f8[::1], f8[:, ::1])"
 )
 def advance_inertial(
-    position: Array, velocity: Array, dcm: Array, memory: Array, bias: Array, turn: Array, clock: Array, time: Array,
-    interval: Array, rate: Array, force: Array, first: int, until: float, noise: Array, blocks: Array,
-) -> tuple[int, int]:  # fmt: skip
+    state: Moving, samples: Samples, first: int, until: float, noise: Array, blocks: Array
+) -> tuple[int, int]:
     """Advance an inertial state to a time that need not be a sample's, in place.
 
     A sample that spans ``until`` is used in part, the rest by the next call. Where samples are missing or absurd the
@@ -264,24 +278,10 @@ def advance_inertial(
 
     Parameters
     ----------
-    position, velocity : (3,) arrays
-        Latitude, longitude [rad] and height [m]; velocity north, east, down [m/s]; overwritten.
-    dcm : (3, 3) array
-        Rotation from body to north-east-down; overwritten.
-    memory : (6,) array
-        Increments of the last whole sample.
-    bias : (6,) array
-        Gyroscope and accelerometer bias; it decays.
-    turn : (3,) array
-        Averaged body rate [rad/s].
-    clock : (15,) array
-        Time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force; the mean
-        rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
-        old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
-    time, interval : (k,) arrays
-        Times and intervals of the IMU samples [s].
-    rate, force : (k, 3) arrays
-        The samples at hand.
+    state : tuple of arrays
+        See `Moving`; overwritten.
+    samples : tuple of arrays
+        See `Samples`.
     first : int
         Index of the first that is not used up.
     until : float
@@ -296,6 +296,7 @@ def advance_inertial(
     int, int
         Index of the first sample that is not used up, and number of blocks.
     """
+    position, velocity, dcm, memory, bias, turn, clock = state
     eps = 1e-7
     before = np.empty(9)
     keep = np.empty(6)
@@ -311,7 +312,7 @@ def advance_inertial(
             block[7 + r] = 0.0
         held, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
         while t < end - eps:
-            i, stop, whole, hold = next_stretch(clock, time, interval, rate, force, i, t, end, nominal)
+            i, stop, whole, hold = next_stretch(clock, samples, i, t, end, nominal)
             dt = stop - t
             if hold:
                 meridian, prime = radii_scalar(sin(position[0]))
@@ -324,7 +325,7 @@ def advance_inertial(
                 w0, w1, w2 = clock[3] - bias[0], clock[4] - bias[1], clock[5] - bias[2]
                 f0, f1, f2 = clock[6] - bias[3], clock[7] - bias[4], clock[8] - bias[5]
                 keep[:] = memory
-                mechanize_step(position, velocity, dcm, memory, w0, w1, w2, f0, f1, f2, dt)
+                mechanize_step(position, velocity, dcm, memory, (w0, w1, w2), (f0, f1, f2), dt)
                 if whole > 0.0:
                     memory[0], memory[1], memory[2] = w0 * whole, w1 * whole, w2 * whole
                     memory[3], memory[4], memory[5] = f0 * whole, f1 * whole, f2 * whole
@@ -366,15 +367,12 @@ def advance_inertial(
 
 
 def propagate_inertial(
-    position: Array, velocity: Array, dcm: Array, memory: Array, bias: Array, turn: Array, clock: Array,
-    time: Array, interval: Array, rate: Array, force: Array, first: int, until: float, noise: Array,
-    transition: Array, process_noise: Array,
-) -> int:  # fmt: skip
+    state: Moving, samples: Samples, first: int, until: float, noise: Array, transition: Array, process_noise: Array
+) -> int:
     """`advance_inertial` and `accumulate_error` in one; returns the index of the first sample not used up."""
+    clock = state[-1]
     blocks = np.empty((int((until - clock[0]) / BLOCK) + 2, BLOCK_COLUMNS))
-    first, count = advance_inertial(
-        position, velocity, dcm, memory, bias, turn, clock, time, interval, rate, force, first, until, noise, blocks
-    )
+    first, count = advance_inertial(state, samples, first, until, noise, blocks)
     accumulate_error(blocks, count, noise, transition, process_noise)
     return first
 

@@ -81,11 +81,12 @@ def _linearise_motion(
 
 
 @kernel(
-    "void(i8, i8[::1], i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])"
+    "void(i8, Tuple((i8[::1], i8[::1], f8[:, ::1])), i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "f8[:, :, ::1])"
 )
 def _linearise_aids(
-    first: int, row: Integers, instrument: Integers, value: Array, codes: Integers, aids: Array, position: Array,
-    x: Array, residual: Array, jacobian: Array,
+    first: int, measured: tuple[Integers, Integers, Array], codes: Integers, aids: Array, position: Array, x: Array,
+    residual: Array, jacobian: Array,
 ) -> None:  # fmt: skip
     """Residuals and derivatives of M measurements at the states that they are attached to.
 
@@ -93,12 +94,8 @@ def _linearise_aids(
     ----------
     first : int
         Measurement to begin with.
-    row : (M,) int array
-        Number of the state of each measurement; -1: none of these states.
-    instrument : (M,) int array
-        Number of its instrument.
-    value : (M, 3) array
-        What was measured.
+    measured : (M,) int, (M,) int and (M, 3) arrays
+        Number of the state of each measurement, -1: none of these states; number of its instrument; what was measured.
     codes, aids : (i,), (i, ...) arrays
         Of each instrument, as `simnav.estimators.models.ship_kernels.residual_of` takes them.
     position, x : (K, 3), (K, n) arrays
@@ -108,6 +105,7 @@ def _linearise_aids(
     jacobian : (M, 3, n) array
         Overwritten: derivative of the prediction with respect to the state's error.
     """
+    row, instrument, value = measured
     for i in range(first, row.size):
         k, s = row[i], instrument[i]
         if k < 0:
@@ -121,12 +119,12 @@ def _linearise_aids(
 
 
 @kernel(
-    "void(i8, i8[::1], i8, f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, ::1], "
-    "f8[:, :, ::1])"
+    "void(i8, Tuple((i8[::1], i8, f8[::1])), Tuple((f8[::1], f8[:, ::1], f8[:, ::1])), f8[::1], f8, f8[:, ::1], "
+    "f8[:, ::1], f8[:, :, ::1])"
 )
 def _move_folds(
-    first: int, node: Integers, base: int, fold_time: Array, time: Array, position: Array, x: Array, rate: Array,
-    turn_time: float, now_position: Array, now_x: Array, jacobian: Array,
+    first: int, folds: tuple[Integers, int, Array], nodes: tuple[Array, Array, Array], rate: Array, turn_time: float,
+    now_position: Array, now_x: Array, jacobian: Array,
 ) -> None:  # fmt: skip
     """States at the times of folds, each from its node.
 
@@ -134,14 +132,10 @@ def _move_folds(
     ----------
     first : int
         Fold to begin with.
-    node : (F,) int array
-        Number of the node of each fold; ``base`` is that of the first node that is kept.
-    base : int
-        Number of the first node.
-    fold_time, time : (F,), (K,) arrays
-        Of the folds and of the nodes [s].
-    position, x : (K, 3), (K, n) arrays
-        States of the nodes.
+    folds : (F,) int array, int, (F,) array
+        Number of the node of each fold; number of the first node that is kept; times of the folds [s].
+    nodes : (K,), (K, 3) and (K, n) arrays
+        Times [s], positions and states of the nodes.
     rate, turn_time
         As of `_linearise_motion`.
     now_position, now_x : (F, 3), (F, n) arrays
@@ -149,6 +143,8 @@ def _move_folds(
     jacobian : (F, n, n) array
         Overwritten: derivative of the fold's state with respect to the node.
     """
+    node, base, fold_time = folds
+    time, position, x = nodes
     decay = np.empty(rate.size)
     for i in range(first, node.size):
         k = node[i] - base
@@ -249,7 +245,7 @@ class ShipChain(Chain):
         """As `Chain.observe`."""
         aids = self.aids
         _linearise_aids(
-            first, row, aids["instrument"], aids["value"], self._codes, self._aids,
+            first, (row, aids["instrument"], aids["value"]), self._codes, self._aids,
             states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
         )  # fmt: skip
 
@@ -257,8 +253,8 @@ class ShipChain(Chain):
         """As `Chain.move_folds`, by the model's own step."""
         nodes, folds, front = self.nodes, self.folds, self.front
         _move_folds(
-            first, folds["node"], self.base, folds["time"], nodes["time"], nodes["position"], nodes["x"], front.decay,
-            front.turn_time, folds["now_position"], folds["now_x"], folds["jacobian"],
+            first, (folds["node"], self.base, folds["time"]), (nodes["time"], nodes["position"], nodes["x"]),
+            front.decay, front.turn_time, folds["now_position"], folds["now_x"], folds["jacobian"],
         )  # fmt: skip
 
     def retract(self, step: Array) -> None:

@@ -41,26 +41,24 @@ _BIAS_ORDER = [3, 4, 5, 0, 1, 2]
 
 
 @kernel(
-    "i8(i8, f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])"
+    "i8(Tuple((i8, f8[::1])), f8[::1], f8[::1], f8[:, ::1], Tuple((f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1])), "
+    "f8[::1], f8[:, ::1])"
 )
 def observe_tangent(
-    code: int, arm: Array, value: Array, origin: Array, axes: Array, rotation: Array, place: Array, speed: Array,
-    rate: Array, bias: Array, error: Array, jacobian: Array,
+    aid: tuple[int, Array], value: Array, origin: Array, axes: Array, state: tuple[Array, Array, Array, Array, Array],
+    error: Array, jacobian: Array,
 ) -> int:  # fmt: skip
     """Prediction less measurement, and its Jacobian, of a state in a `TangentFrame`.
 
     Parameters
     ----------
-    code, arm, value
-        As in `simnav.estimators.models.measurements.observe_inertial`.
+    aid, value
+        Code and lever arm, and what was measured, as in `simnav.estimators.models.measurements.observe_inertial`.
     origin, axes : arrays
         Of the frame.
-    rotation : (3, 3) array
-        Body to frame.
-    place, speed, rate : (3,) arrays
-        Position and velocity in the frame; body rate as measured.
-    bias : (6,) array
-        Accelerometers, gyroscopes.
+    state : (3, 3), (3,), (3,), (3,) and (6,) arrays
+        Rotation from body to frame; position and velocity in the frame; body rate as measured; biases of the
+        accelerometers and of the gyroscopes.
     error : (3,) array
         Filled.
     jacobian : (3, 15) array
@@ -71,12 +69,15 @@ def observe_tangent(
     int
         Number of components; 0 where the measurement says nothing.
     """
+    code, arm = aid
+    rotation, place, speed, rate, bias = state
     position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
-    tangent_state(origin, axes, rotation, place, speed, position, velocity, dcm, error_map, np.empty(3))
+    tangent_state(origin, axes, (rotation, place, speed), (position, velocity, dcm), error_map, np.empty(3))
     gyroscope, nothing, ours = np.empty(3), np.empty(0), np.empty((3, 15))
     for r in range(3):
         gyroscope[r] = bias[3 + r]
-    d = observe_inertial(code, arm, -1, -1, value, position, velocity, dcm, rate, gyroscope, nothing, error, ours)
+    at = position, velocity, dcm, rate, gyroscope, nothing
+    d = observe_inertial((code, arm, -1, -1), value, at, error, ours)
     for i in range(d):
         error[i] = -error[i]
         for j in range(9):
@@ -238,9 +239,8 @@ class InertialGraph:
             speed = values.atPoint3(v) if moving else still
             bias = values.atConstantBias(b).vector() if levered else unbiased
             e, h = np.zeros(3), np.zeros((3, 15))
-            observe_tangent(
-                code, arm, value, origin, axes, rotation, np.array(pose.translation()), speed, rate, bias, e, h
-            )
+            state = rotation, np.array(pose.translation()), speed, rate, bias
+            observe_tangent((code, arm), value, origin, axes, state, e, h)
             if jacobians is not None:
                 jacobians[0] = h[:m, :6]
                 if moving:

@@ -27,7 +27,14 @@ from typing import Any
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.models.propagation import HELD_ATTITUDE, HELD_VELOCITY, TURN_TIME, next_stretch
+from simnav.estimators.models.propagation import (
+    HELD_ATTITUDE,
+    HELD_VELOCITY,
+    SAMPLES,
+    TURN_TIME,
+    Samples,
+    next_stretch,
+)
 from simnav.estimators.solvers.tangent_frame import TangentFrame
 from simnav.geometry.rotation import cross
 from simnav.types import Array, ImuSamples
@@ -45,11 +52,10 @@ HELD_PARTS, HELD_PART = 4, 0.1
 _EYE = np.eye(3)
 
 
-@kernel("UniTuple(i8, 2)(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8, f8[:, ::1])")
+@kernel(f"UniTuple(i8, 2)(f8[::1], f8[::1], f8[::1], {SAMPLES}, i8, f8, f8, f8[:, ::1])")
 def imu_pieces(
-    clock: Array, memory: Array, bias: Array, time: Array, interval: Array, rate: Array, force: Array, first: int,
-    until: float, nominal: float, pieces: Array,
-) -> tuple[int, int]:  # fmt: skip
+    clock: Array, memory: Array, bias: Array, samples: Samples, first: int, until: float, nominal: float, pieces: Array
+) -> tuple[int, int]:
     """Cut the stretch up to a time into pieces of constant rate and force, as GTSAM integrates them.
 
     A sample that spans ``until`` is used in part, the rest by the next call; where samples are missing there is a piece
@@ -58,15 +64,13 @@ def imu_pieces(
     Parameters
     ----------
     clock : (15,) array
-        As of `simnav.estimators.models.propagation.advance_inertial`, but for the seconds held; updated.
+        As of `simnav.estimators.models.propagation.Moving`, but for the seconds held; updated.
     memory : (6,) array
         Angle and velocity increment of the last whole sample; updated.
     bias : (6,) array
         Gyroscopes, accelerometers: taken off for coning and sculling, and put on again.
-    time, interval : (k,) arrays
-        Times and intervals of the IMU samples [s].
-    rate, force : (k, 3) arrays
-        Angular rates [rad/s] and specific forces [m/s^2].
+    samples : tuple of arrays
+        See `simnav.estimators.models.propagation.Samples`.
     first : int
         The first that is not used up.
     until, nominal : float
@@ -82,7 +86,7 @@ def imu_pieces(
     eps = 1e-7
     t, i, count = clock[0], first, 0
     while t < until - eps:
-        i, stop, whole, hold = next_stretch(clock, time, interval, rate, force, i, t, until, nominal)
+        i, stop, whole, hold = next_stretch(clock, samples, i, t, until, nominal)
         dt = stop - t
         piece = pieces[count]
         count += 1
@@ -209,7 +213,7 @@ class Preintegration:
             return
         pieces = np.empty((2 * len(self._samples[0]) + 4, 8))
         self._first, count = imu_pieces(
-            self._clock, self._memory, self._hat, *self._samples, self._first, until, float(self._noise[8]), pieces
+            self._clock, self._memory, self._hat, self._samples, self._first, until, float(self._noise[8]), pieces
         )
         pieces = pieces[:count]
         rates, forces = pieces[:, 1:4], pieces[:, 4:7]

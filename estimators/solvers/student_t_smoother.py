@@ -53,12 +53,16 @@ class _Used(NamedTuple):
     noise: Array
 
 
-@kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1])")  # fmt: skip  # noqa: E501
+@kernel(
+    "void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], "
+    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1])), "
+    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1])))"
+)
 def _forward(
-    transition: Array, process: Array, moved: Array, first: Integers, sizes: Integers, jacobians: Array, known: Array,
-    noises: Array, weights: Array, before: Array, predicted: Array, after: Array, covariance: Array,
+    transition: Array, process: Array, moved: Array, first: Integers,
+    used: tuple[Integers, Array, Array, Array, Array], filtered: tuple[Array, Array, Array, Array],
 ) -> None:  # fmt: skip
-    """Kalman filter over the stops; overwrites the last four arrays but for their first stop.
+    """Kalman filter over the stops; overwrites ``filtered`` but for the first stop.
 
     Parameters
     ----------
@@ -68,21 +72,15 @@ def _forward(
         d: what the filter added to its state at each stop.
     first : (k + 2,) array of int
         Index of the first measurement of each stop.
-    sizes : (j,) array of int
-        Components of each measurement; its other arrays are padded to the largest.
-    jacobians : (j, 3, n) array
-        Jacobians of the measurements, in order of time.
-    known : (j, 3) array
-        ``v + H p`` of each measurement: in the tangent space of the filter's trajectory.
-    noises : (j, 3, 3) array
-        Covariances of the measurements.
-    weights : (j,) array
-        Weights of the measurements, which divide their noise.
-    before, after : (k + 1, n) array
-        delta before the corrections of a stop, predicted; and what it is after them, minus d.
-    predicted, covariance : (k + 1, n, n) array
-        Their covariances.
+    used : (j,) int, (j, 3, n), (j, 3), (j, 3, 3) and (j,) arrays
+        Of the measurements, in order of time: components, the other arrays are padded to the largest; Jacobians;
+        ``v + H p``, in the tangent space of the filter's trajectory; covariances; and the weights that divide them.
+    filtered : (k + 1, n), (k + 1, n, n), (k + 1, n) and (k + 1, n, n) arrays
+        delta before the corrections of a stop, predicted, and its covariance; what it is after them, minus d, and its
+        covariance.
     """
+    sizes, jacobians, known, noises, weights = used
+    before, predicted, after, covariance = filtered
     stops, n = moved.shape
     correction = np.empty(n)
     for k in range(1, stops):
@@ -186,8 +184,8 @@ class StudentTSmoother(Smoother):
         predicted[0] = covariance[0] = first
         for _ in range(self.passes):
             _forward(
-                phi, process, moved, begin, sizes, jacobians, known, noises, weights, before, predicted, after,
-                covariance,
+                phi, process, moved, begin, (sizes, jacobians, known, noises, weights),
+                (before, predicted, after, covariance),
             )  # fmt: skip
             shift, spread = _smooth_back(phi, moved, before, predicted, after, covariance)
             new = np.ones(len(used))

@@ -40,10 +40,13 @@ __all__ = ["TangentFrame", "tangent_state"]
 _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
 
 
-@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
+@kernel(
+    "void(f8[::1], f8[:, ::1], Tuple((f8[:, ::1], f8[::1], f8[::1])), Tuple((f8[::1], f8[::1], f8[:, ::1])), "
+    "f8[:, ::1], f8[::1])"
+)
 def tangent_state(
-    origin: Array, axes: Array, rotation: Array, place: Array, speed: Array, position: Array, velocity: Array,
-    dcm: Array, error_map: Array, attraction: Array,
+    origin: Array, axes: Array, local: tuple[Array, Array, Array], state: tuple[Array, Array, Array],
+    error_map: Array, attraction: Array,
 ) -> None:  # fmt: skip
     """Geodetic state of a state in the frame, and how its error changes.
 
@@ -53,20 +56,18 @@ def tangent_state(
         Of the frame, Earth-centred [m].
     axes : (3, 3) array
         Earth-centred to frame.
-    rotation : (3, 3) array
-        Body to frame.
-    place, speed : (3,) arrays
-        Position [m] and velocity relative to the Earth [m/s] in the frame.
-    position, velocity : (3,) arrays
-        Filled: geodetic [rad, rad, m], north-east-down [m/s].
-    dcm : (3, 3) array
-        Filled: body to north-east-down.
+    local : (3, 3), (3,) and (3,) arrays
+        Rotation from body to frame; position [m] and velocity relative to the Earth [m/s] in the frame.
+    state : (3,), (3,) and (3, 3) arrays
+        Filled: geodetic position [rad, rad, m], velocity north-east-down [m/s], rotation from body to north-east-down.
     error_map : (9, 9) array
         Filled: error of position, velocity and attitude (north-east-down) by rotation and displacement in body axes and
         velocity change in the frame (equations in the module).
     attraction : (3,) array
         Filled: gravity in the frame [m/s^2].
     """
+    rotation, place, speed = local
+    position, velocity, dcm = state
     x = origin[0] + axes[0, 0] * place[0] + axes[1, 0] * place[1] + axes[2, 0] * place[2]
     y = origin[1] + axes[0, 1] * place[0] + axes[1, 1] * place[1] + axes[2, 1] * place[2]
     z = origin[2] + axes[0, 2] * place[0] + axes[1, 2] * place[1] + axes[2, 2] * place[2]
@@ -177,14 +178,16 @@ class TangentFrame:
         position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
         # GTSAM's arrays are in Fortran's order, or to be read only.
         rotation, place, speed = (np.array(a, dtype=np.float64, order="C") for a in (rotation, place, speed))
-        tangent_state(self.origin, self.axes, rotation, place, speed, position, velocity, dcm, error_map, np.empty(3))
+        tangent_state(
+            self.origin, self.axes, (rotation, place, speed), (position, velocity, dcm), error_map, np.empty(3)
+        )
         return position, velocity, dcm, error_map
 
     def gravity(self, place: Array) -> Array:
         """(3,) gravity at a place in the frame, less the centrifugal acceleration about the origin [m/s^2]."""
         attraction, zero, eye = np.empty(3), np.zeros(3), np.eye(3)
         tangent_state(
-            self.origin, self.axes, eye, np.array(place), zero, np.empty(3), np.empty(3), np.empty((3, 3)),
+            self.origin, self.axes, (eye, np.array(place), zero), (np.empty(3), np.empty(3), np.empty((3, 3))),
             np.empty((9, 9)), attraction,
         )  # fmt: skip
         w = self.rotation

@@ -387,10 +387,12 @@ class WindowEstimator(Solver):
         """Refer what the elimination left, and the residuals, to the nodes as they are after the step."""
         chain, nodes, motions, aids = self.chain, self.chain.nodes, self.chain.motions, self.chain.aids
         after_step(
-            nodes["step"], nodes["predicted_shift"], nodes["filtered_shift"],
-            motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"], motions["norm"],
-            aids["node"], chain.base, aids["jacobian"], aids["residual"], aids["whitener"], aids["whitened"],
-            aids["norm"],
+            nodes["step"], (nodes["predicted_shift"], nodes["filtered_shift"]),
+            (motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"], motions["norm"]),
+            (
+                aids["node"], chain.base, aids["jacobian"], aids["residual"], aids["whitener"], aids["whitened"],
+                aids["norm"],
+            ),
         )  # fmt: skip
 
     def _linearise(self, node: int = 0) -> None:
@@ -412,8 +414,8 @@ class WindowEstimator(Solver):
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
         first = keep_weights(
-            before[0], motions["norm"], motions["weight"], aids["node"], self.chain.base, before[1], aids["norm"],
-            aids["weight"], self.tolerance,
+            (before[0], motions["norm"], motions["weight"]), aids["node"], self.chain.base,
+            (before[1], aids["norm"], aids["weight"]), self.tolerance,
         )  # fmt: skip
         return settled, first
 
@@ -430,12 +432,18 @@ class WindowEstimator(Solver):
         chain, nodes = self.chain, self.chain.nodes
         motions, aids = chain.motions, chain.aids
         sizes: tuple[float, float] = solve_chain(
-            chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift,
-            motions["jacobian"], motions["noise"], motions["residual"], motions["weight"],
-            aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"],
-            aids["noise"], aids["weight"], damping, first,
-            nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
-            aids["cross"], aids["white"], aids["innovation"], aids["used"], nodes["step"], nodes["size"],
+            (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift),
+            (motions["jacobian"], motions["noise"], motions["residual"], motions["weight"]),
+            (
+                aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"],
+                aids["noise"], aids["weight"],
+            ),
+            damping, first,
+            (
+                nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
+                aids["cross"], aids["white"], aids["innovation"], aids["used"],
+            ),
+            nodes["step"], nodes["size"],
         )  # fmt: skip
         return sizes
 

@@ -78,12 +78,16 @@ def medians(values: Array, group: Integers, fewest: int, out: Array) -> None:
             out[g] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
 
-@kernel("void(f8[::1], f8[::1], i8[::1], i8[::1], f8[:, ::1], f8, f8, i8, f8[::1], f8[::1])")
+@kernel("void(f8[::1], f8[::1], i8[::1], i8[::1], f8[:, ::1], Tuple((f8, f8, i8)), f8[::1], f8[::1])")
 def _adapt(
-    norm: Array, kappa: Array, kind: Integers, group: Integers, shapes: Array, epsilon: float, floor: float,
-    fewest: int, scales: Array, weight: Array,
+    norm: Array, kappa: Array, kind: Integers, group: Integers, shapes: Array, settings: tuple[float, float, int],
+    scales: Array, weight: Array,
 ) -> None:  # fmt: skip
-    """Scales of the groups and weights of the members (eqs. 19-21); kappa is that of a norm's kind."""
+    """Scales of the groups and weights of the members (eqs. 19-21); kappa is that of a norm's kind.
+
+    The settings are epsilon, the least scale, and how many members a group needs for a scale of its own.
+    """
+    epsilon, floor, fewest = settings
     scaled = np.empty(norm.size)
     for i in range(norm.size):
         scaled[i] = kappa[kind[i]] * norm[i]
@@ -156,10 +160,10 @@ class GradientAdaptive(Weighting):
         constants, scales, zero = self._shapes, self._scales, np.zeros(len(motion), np.int64)
         settings = self.epsilon, self._floor, self._least
         _adapt(
-            norm, self._kappa, factors.components, factors.instrument, constants[:-1], *settings, scales[:-1],
+            norm, self._kappa, factors.components, factors.instrument, constants[:-1], settings, scales[:-1],
             factors.weight,
         )  # fmt: skip
-        _adapt(motion, self._kappa_motion, zero, zero, constants[-1:], *settings, scales[-1:], factors.motion_weight)
+        _adapt(motion, self._kappa_motion, zero, zero, constants[-1:], settings, scales[-1:], factors.motion_weight)
         return True
 
     def diagnostics(self) -> dict[str, float | Array]:

@@ -59,17 +59,20 @@ class Stretch:
                 yield stream.value[cut, :2], stream.faults[cut] != 0
 
 
-@kernel("i8(i8, i8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], i8, f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])")
+@kernel(
+    "i8(Tuple((i8, i8[::1], f8[::1], f8[:, ::1])), i8[::1], i8[::1], i8, f8[:, :, ::1], i1[:, :, ::1], "
+    "f8[:, :, :, ::1])"
+)
 def _place(
-    count: int, who: Integers, when: Array, value: Array, place: Integers, most: Integers, row: int, time: Array,
+    delivered: tuple[int, Integers, Array, Array], place: Integers, most: Integers, row: int, time: Array,
     valid: NDArray[np.int8], values: Array,
 ) -> int:  # fmt: skip
     """Put the measurements of one step into a row of padded arrays; -1, or the instrument that has too many.
 
     Parameters
     ----------
-    count, who, when, value
-        As of `simnav.simulation.steps.SteppedRuns`, of one run.
+    delivered : tuple
+        Count, who, when and value of `simnav.simulation.steps.SteppedRuns`, of one run.
     place, most : (i,) int arrays
         Of each of its instruments: its number in the padded arrays, and room for so many a step.
     row : int
@@ -78,6 +81,7 @@ def _place(
         Of S steps, A instruments and at most K measurements: times [s], which are there, and values;
         overwritten.
     """
+    count, who, when, value = delivered
     for j in range(count):
         i: int = who[j]
         a = place[i]
@@ -138,9 +142,8 @@ class LiveStretch(Stretch):
             imu["time"][i, :n], imu["length"][i, :n] = runs.imu_time[0, :n], runs.imu_interval[0, :n]
             imu["angular_rate"][i, :n], imu["specific_force"][i, :n] = runs.rate[0, :n], runs.force[0, :n]
             imu["valid"][i, :n] = 1
-        many = _place(
-            runs.count[0], runs.who[0], runs.when[0], runs.value[0], self._place, self._most, i, *self._arrays
-        )
+        delivered = runs.count[0], runs.who[0], runs.when[0], runs.value[0]
+        many = _place(delivered, self._place, self._most, i, *self._arrays)
         if many >= 0:
             raise ValueError(
                 f"{runs.names[0][many]} delivered more than {self._most[many]} samples in one step at "

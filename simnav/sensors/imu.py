@@ -15,7 +15,7 @@ Each process has its own random stream, and one that is zero draws nothing. g an
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Literal, Self
+from typing import Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -162,14 +162,23 @@ class ImuSpec(Spec):
         return Imu(self, seed)
 
 
+#: A bias that is held between the samples of a table (k, 3): the table, the number of its first sample, and how many
+#: samples there are in a second.
+Held: TypeAlias = tuple[Array, int, float]
+#: Of a triad: matrix of the scale factors and misalignments with the identity (3, 3), turn-on bias (3,), density of the
+#: white noise per sqrt(s), range, and least increment of the quantization, 0 for none.
+Triad: TypeAlias = tuple[Array, Array, float, float, float]
+
+_HELD = "Tuple((f8[:, ::1], i8, f8))"
+
+
 @kernel(
-    "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, ::1], f8[::1],"
-    " f8[:, ::1], i8, f8, f8[:, ::1], i8, f8, f8, f8, f8[::1])"
+    "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], Tuple((f8[:, ::1], f8[::1], f8, f8, f8)), "
+    f"{_HELD}, {_HELD}, f8[::1])"
 )
 def triad_errors(
-    ideal: Array, variates: Array, out: Array, time: Array, interval: Array, density: float, matrix: Array,
-    bias: Array, instability: Array, first_i: int, per_second_i: float, walk: Array, first_w: int, per_second_w: float,
-    limit: float, step: float, residual: Array,
+    ideal: Array, variates: Array, out: Array, time: Array, interval: Array, triad: Triad, in_run: Held, walk: Held,
+    residual: Array,
 ) -> None:  # fmt: skip
     """Errors of one triad (see the module).
 
@@ -181,23 +190,18 @@ def triad_errors(
         Overwritten; it may be ``ideal``.
     time, interval : (n,) arrays
         Ends of the sample intervals, and their lengths [s].
-    density : float
-        Of the white noise, per sqrt(s).
-    matrix, bias : (3, 3), (3,) arrays
-        Scale factors and misalignments with the identity; turn-on bias.
-    instability, walk : (a, 3), (b, 3) arrays
-        In-run bias and random walk of the rate, held between their samples.
-    first_i, first_w : int
-        Number of the first of these samples.
-    per_second_i, per_second_w : float
-        How many there are in a second.
-    limit, step : float
-        Range; least increment of the quantization, 0 for none.
+    triad : tuple
+        See `Triad`.
+    in_run, walk : tuple
+        In-run bias and random walk of the rate, see `Held`.
     residual : (3,) array
         What quantization has left over so far; updated.
     """
+    matrix, bias, density, limit, step = triad
+    instability, first_i, per_second_i = in_run
+    walked, first_w, per_second_w = walk
     last_i = len(instability) - 1
-    last_w = len(walk) - 1
+    last_w = len(walked) - 1
     for i in range(len(time)):
         dt = interval[i]
         noise = density / sqrt(dt)
@@ -206,7 +210,7 @@ def triad_errors(
         x, y, z = ideal[i, 0], ideal[i, 1], ideal[i, 2]
         for j in range(3):
             value = matrix[j, 0] * x + matrix[j, 1] * y + matrix[j, 2] * z
-            value += bias[j] + instability[ki, j] + walk[kw, j] + noise * variates[i, j]
+            value += bias[j] + instability[ki, j] + walked[kw, j] + noise * variates[i, j]
             value = min(max(value, -limit), limit)
             if step > 0.0:
                 increment, residual[j] = quantize_scalar(value * dt, step, residual[j])
@@ -262,17 +266,15 @@ class _Triad:
         ideal = ready(ideal)
         out = ideal if overwrite else np.empty(ideal.shape)
         until = float(time[-1])
-        instability, first_i = self.instability.table(until)
-        walk, first_w = self.walk.table(until)
+        triad: Triad = (self.matrix, self.bias, self.density, self.range, self.step)
+        in_run = (*self.instability.table(until), self.instability.per_second)
+        walk = (*self.walk.table(until), self.walk.per_second)
         for a in range(0, len(time), _CHUNK):
             part = slice(a, a + _CHUNK)
             if self.density > 0.0:
                 self._rng.standard_normal(out=self._variates[: len(time[part])])
             triad_errors(
-                ideal[part], self._variates, out[part], time[part], interval[part],
-                self.density, self.matrix, self.bias,
-                instability, first_i, self.instability.per_second, walk, first_w, self.walk.per_second,
-                self.range, self.step, self.residual,
+                ideal[part], self._variates, out[part], time[part], interval[part], triad, in_run, walk, self.residual
             )  # fmt: skip
         return out
 

@@ -23,14 +23,15 @@ UNTOUCHED = -2
 
 
 @kernel(
-    "void(b1[::1], i8[::1], i8[::1], f8[:, :, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, :, ::1], "
-    "f8[:, :, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1], b1[:, :, ::1], f8[:, :, :, ::1], f8[:, ::1], "
-    "f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])"
+    "void(b1[::1], i8[::1], i8[::1], Tuple((f8[:, :, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
+    "Tuple((f8[:, :, :, ::1], f8[:, :, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1])), "
+    "Tuple((b1[:, :, ::1], f8[:, :, :, ::1])), f8[:, ::1], "
+    "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])))"
 )
 def sense_imu(
-    active: Flags, at: Integers, samples: Integers, matrix: Array, bias: Array, triads: Array, residual: Array,
-    variates: Array, instability: Array, walk: Array, tables: Integers, disturbed: Flags, disturbance: Array,
-    clock: Array, imu_time: Array, imu_interval: Array, rate: Array, force: Array,
+    active: Flags, at: Integers, samples: Integers, triads: tuple[Array, Array, Array, Array],
+    drawn: tuple[Array, Array, Array, Integers], disturbances: tuple[Flags, Array], clock: Array,
+    imu: tuple[Array, Array, Array, Array],
 ) -> None:  # fmt: skip
     """Errors and disturbances of the IMUs of many runs, over one step each.
 
@@ -40,22 +41,24 @@ def sense_imu(
         Which runs.
     at, samples : (b,) int arrays
         Number of the step in the stretch that was drawn ahead, and samples a step.
-    matrix, bias, triads, residual : (b, 2, ...) arrays
-        Gyroscopes and accelerometers, as `simnav.sensors.imu.triad_errors` takes them; ``triads``: density of the white
-        noise, range, quantization, and points a second of both tables.
-    variates : (b, 2, s, 3) array
-        Of the samples of the stretch.
-    instability, walk : (b, 2, k, 3) arrays
-        Tables of the biases.
-    tables : (b, 2, 4) int array
-        Length and first grid point of both tables.
-    disturbed, disturbance : (b, d, s), (b, d, s, 6) arrays
-        What d disturbances do to the samples of the stretch.
+    triads : tuple of (b, 2, ...) arrays
+        Gyroscopes and accelerometers: matrix and bias, as `simnav.sensors.imu.triad_errors` takes them; density of the
+        white noise, range, quantization, and points a second of both tables; residual of the quantization.
+    drawn : (b, 2, s, 3), (b, 2, k, 3), (b, 2, k, 3) and (b, 2, 4) int arrays
+        Variates of the samples of the stretch; tables of the in-run biases and of the random walks; length and first
+        grid point of both tables.
+    disturbances : (b, d, s) bool and (b, d, s, 6) arrays
+        Which samples of the stretch d disturbances touch, and what they add to them.
     clock : (b, 2) array
         Number of the sample before the stretch, and samples a second.
-    imu_time, imu_interval, rate, force : (b, ...) arrays
-        Times and intervals are overwritten; the ideal samples become what the IMU delivers.
+    imu : tuple of (b, ...) arrays
+        Times and intervals, overwritten; angular rates and specific forces: the ideal samples become what the IMU
+        delivers.
     """
+    matrix, bias, numbers, residual = triads
+    variates, instability, walk, tables = drawn
+    disturbed, disturbance = disturbances
+    imu_time, imu_interval, rate, force = imu
     for b in range(active.size):
         if not active[b]:
             continue
@@ -66,11 +69,11 @@ def sense_imu(
             imu_interval[b, i] = 1.0 / clock[b, 1]
         for t in range(2):
             out = rate[b, :n] if t == 0 else force[b, :n]
-            q, table = triads[b, t], tables[b, t]
+            q, table = numbers[b, t], tables[b, t]
             triad_errors(
-                out, variates[b, t, begin : begin + n], out, imu_time[b, :n], imu_interval[b, :n], q[0], matrix[b, t],
-                bias[b, t], instability[b, t, : table[0]], table[1], q[3], walk[b, t, : table[2]], table[3], q[4],
-                q[1], q[2], residual[b, t],
+                out, variates[b, t, begin : begin + n], out, imu_time[b, :n], imu_interval[b, :n],
+                (matrix[b, t], bias[b, t], q[0], q[1], q[2]), (instability[b, t, : table[0]], table[1], q[3]),
+                (walk[b, t, : table[2]], table[3], q[4]), residual[b, t],
             )  # fmt: skip
         for d in range(disturbed.shape[1]):
             for i in range(n):
@@ -81,15 +84,16 @@ def sense_imu(
 
 
 @kernel(
-    "void(b1[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], "
-    "i8[:, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1], f8[:, :, ::1], i8[::1], i8[:, :, ::1], f8[:, :, :, ::1], "
-    "f8[:, :, :, ::1], i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], u4[:, ::1], f8[:, ::1])"
+    "void(b1[::1], Tuple((i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[:, ::1])), "
+    "Tuple((f8[:, :, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, :, :, ::1])), Tuple((i8[:, :, ::1], f8[:, :, ::1])), "
+    "Tuple((i8[::1], i8[:, :, ::1], f8[:, :, :, ::1], f8[:, :, :, ::1])), "
+    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], u4[:, ::1])), f8[:, ::1])"
 )
 def sense(
-    active: Flags, first: Integers, last: Integers, tap_time: Array, taps: Array, owner: Integers, error: Array,
-    white: Array, interval: Integers, fault: Array, layout: Integers, numbers: Array, layers: Integers,
-    operations: Integers, sizes: Array, held: Array, count: Integers, who: Integers, when: Array, value: Array,
-    faults: NDArray[np.uint32], truth: Array,
+    active: Flags, samples: tuple[Integers, Integers, Array, Array, Integers],
+    drawn: tuple[Array, Array, Integers, Array], instruments: tuple[Integers, Array],
+    layers: tuple[Integers, Integers, Array, Array],
+    delivered: tuple[Integers, Integers, Array, Array, NDArray[np.uint32]], truth: Array,
 ) -> None:  # fmt: skip
     """What the aiding instruments of many runs deliver in one step each, faults included.
 
@@ -97,43 +101,36 @@ def sense(
     ----------
     active : (b,) bool array
         Which runs.
-    first, last : (b,) int arrays
-        Of each run, the samples of the step, within the stretch that was drawn ahead.
-    tap_time : (b, s) array
-        Times of the samples of the stretch [s].
-    taps : (b, m, 14) array
-        True states at the samples of the step.
-    owner : (b, s) int array
-        Number of the instrument of each sample; -1: the end of a step.
-    error, white : (b, s, 3) arrays
-        Biases and unit variates of each sample.
-    interval : (b, s, k) int array
-        Of each layer of faults: number of the interval that a sample lies in; -1: none, -2: it is none of the layer's.
-    fault : (b, s, k, 3) array
-        What each layer has drawn for it.
-    layout : (b, i, 4) int array
-        Of each instrument: what it observes, components, and those of `simnav.kinds.Kind.layout`.
-    numbers : (b, i, 24) array
-        As of `simnav.sensors.observation.observe_one`.
-    layers : (b,) int array
-        How many layers of faults.
-    operations : (b, k, 3) int array
-        What each does (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and whether each interval has its own.
-    sizes : (b, i, k, 4) array
-        Of layers that step the noise: the new sigma of an instrument, or the factor on its sigma where that is not 0.
-    held : (b, i, k, 8) array
-        State of layers that repeat values.
-    count, who, when, value, faults : (b, ...) arrays
-        What is delivered: as of `simnav.simulation.steps.SteppedRuns`; overwritten.
+    samples : (b,) int, (b,) int, (b, s), (b, m, 14) and (b, s) int arrays
+        Of each run, the first sample of the step and the one after its last, within the stretch that was drawn ahead;
+        times of the samples of the stretch [s]; true states at the samples of the step; number of the instrument of
+        each sample, -1: the end of a step.
+    drawn : (b, s, 3), (b, s, 3), (b, s, k) int and (b, s, k, 3) arrays
+        Biases and unit variates of each sample; of each layer of faults, the number of the interval that a sample lies
+        in, -1: none, -2: it is none of the layer's; what each layer has drawn for it.
+    instruments : (b, i, 4) int and (b, i, 24) arrays
+        Of each: what it observes, components, and those of `simnav.kinds.Kind.layout`; its numbers, as of
+        `simnav.sensors.observation.observe_one`.
+    layers : (b,) int, (b, k, 3) int, (b, i, k, 4) and (b, i, k, 8) arrays
+        How many layers of faults; what each does (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and whether
+        each interval has its own; of layers that step the noise, the new sigma of an instrument, or the factor on its
+        sigma where that is not 0; state of layers that repeat values.
+    delivered : tuple of (b, ...) arrays
+        Overwritten: count, who, when, value and faults of `simnav.simulation.steps.SteppedRuns`.
     truth : (b, 9) array
         Likewise.
     """
+    first, last, tap_time, taps, owner = samples
+    error, white, interval, fault = drawn
+    layout, numbers = instruments
+    number_of_layers, operations, sizes, held = layers
+    count, who, when, value, faults = delivered
     state = np.zeros(15)
     reading, wrong, sigma = np.empty(3), np.empty(3), np.empty(3)
     for b in range(active.size):
         if not active[b]:
             continue
-        delivered = 0
+        known = 0
         for t in range(first[b], last[b]):
             tap = taps[b, t - first[b]]
             i = owner[b, t]
@@ -152,7 +149,7 @@ def sense(
                 continue
             add_error_scalar(positions, cyclic, reading[:d], wrong[:d])
             label = 0
-            for k in range(layers[b]):
+            for k in range(number_of_layers[b]):
                 number, what = interval[b, t, k], operations[b, k, 0]
                 if number == UNTOUCHED:
                     continue
@@ -184,11 +181,11 @@ def sense(
                 if touched:
                     label |= 1 << (operations[b, k, 1] + (number if operations[b, k, 2] else 0))
             if there:
-                who[b, delivered], when[b, delivered], faults[b, delivered] = i, tap_time[b, t], label
+                who[b, known], when[b, known], faults[b, known] = i, tap_time[b, t], label
                 for j in range(3):
-                    value[b, delivered, j] = reading[j] if j < d else 0.0
-                delivered += 1
-        count[b] = delivered
+                    value[b, known, j] = reading[j] if j < d else 0.0
+                known += 1
+        count[b] = known
 
 
 @kernel()

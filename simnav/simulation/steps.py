@@ -172,20 +172,22 @@ class SteppedRuns:
             self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
         self.samples[compiled] = self.samples_a_step[compiled]
         motion.advance(
-            compiled, self.x, self.index, self.p, self.sizes, self.rows, self.points, self.phase, self.table,
-            self.eddies, self.tap_time, first, last, self._taps, self.samples, self.rate, self.force,
+            compiled, (self.x, self.index), self.p, self.sizes, (self.rows, self.points),
+            (self.phase, self.table, self.eddies), (self.tap_time, first, last, self._taps),
+            (self.samples, self.rate, self.force),
         )  # fmt: skip
         inertial = compiled & self._imu
         if inertial.any():
             sense_imu(
-                inertial, self._at, self.samples, self.matrix, self.bias, self.triads, self.residual, self.variates,
-                self.instability, self.walk, self.tables, self.disturbed, self.disturbance, self.clock,
-                self.imu_time, self.imu_interval, self.rate, self.force,
+                inertial, self._at, self.samples, (self.matrix, self.bias, self.triads, self.residual),
+                (self.variates, self.instability, self.walk, self.tables), (self.disturbed, self.disturbance),
+                self.clock, (self.imu_time, self.imu_interval, self.rate, self.force),
             )  # fmt: skip
         sense(
-            compiled, first, last, self.tap_time, self._taps, self.owner, self.error, self.white, self.interval,
-            self.fault, self.layout, self.numbers, self._layers, self.operations, self.sizes_of_noise, self.held,
-            self.count, self.who, self.when, self.value, self.faults, self.truth,
+            compiled, (first, last, self.tap_time, self._taps, self.owner),
+            (self.error, self.white, self.interval, self.fault), (self.layout, self.numbers),
+            (self._layers, self.operations, self.sizes_of_noise, self.held),
+            (self.count, self.who, self.when, self.value, self.faults), self.truth,
         )  # fmt: skip
         self._at[compiled] += 1
         self.step[compiled] += 1

@@ -272,10 +272,13 @@ def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) ->
 
 @kernel()
 def _advance_one(
-    x: Array, index: Integers, p: Array, rows: Array, points: Array, phase: Array, table: Array, eddies: Array,
-    tap_time: Array, taps: Array, rate: Array, force: Array,
+    x: Array, index: Integers, p: Array, plan: tuple[Array, Array], water: tuple[Array, Array, Array],
+    tap_time: Array, taps: Array, imu: tuple[Array, Array],
 ) -> None:  # fmt: skip
-    """Advance one world by as many samples as there is room for in ``rate``; the arguments as of `advance`."""
+    """Advance one world by as many samples as there is room for in ``imu``; the arguments as of `advance`."""
+    rows, points = plan
+    phase, table, eddies = water
+    rate, force = imu
     dt = p[DT]
     decay_u, decay_r, decay_g = exp(-dt / p[TAU_U]), exp(-dt / p[TAU_R]), exp(-dt / p[TAU_G])
     memory = x[MEMORY : MEMORY + 6]
@@ -330,13 +333,14 @@ def _advance_one(
 
 
 @kernel(
-    "void(b1[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-    "f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1])"
+    "void(b1[::1], Tuple((f8[:, ::1], i8[:, ::1])), f8[:, ::1], i8[:, ::1], UniTuple(f8[:, ::1], 2), "
+    "UniTuple(f8[:, ::1], 3), Tuple((f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1])), "
+    "Tuple((i8[::1], f8[:, :, ::1], f8[:, :, ::1])))"
 )
 def advance(
-    active: Flags, x: Array, index: Integers, p: Array, sizes: Integers, rows: Array, points: Array, phase: Array,
-    table: Array, eddies: Array, tap_time: Array, first: Integers, last: Integers, taps: Array, samples: Integers,
-    rate: Array, force: Array,
+    active: Flags, state: tuple[Array, Integers], p: Array, sizes: Integers, plan: tuple[Array, Array],
+    water: tuple[Array, Array, Array], wanted: tuple[Array, Integers, Integers, Array],
+    imu: tuple[Integers, Array, Array],
 ) -> None:  # fmt: skip
     """Advance w worlds, each by its own number of samples.
 
@@ -347,41 +351,41 @@ def advance(
     ----------
     active : (w,) bool array
         Which worlds are advanced.
-    x : (w, 59) array
-        State; updated.
-    index : (w, 4) int array
-        Sample, segment, waypoint, whether the segment has begun; updated.
+    state : (w, 59) and (w, 4) int arrays
+        The state; sample, segment, waypoint, whether the segment has begun. Both are updated.
     p : (w, 11) array
         Constants of the vessel, the water and the step, at the places that this module names.
     sizes : (w, 4) int array
         How many manoeuvres, points, waves and eddies each world has.
-    rows, points : (w, ...) arrays
-        The manoeuvre tables, each flat and with room behind it, like all that follow.
-    phase, table : (w, ...) arrays
-        The wave components (`simnav.world.sea.components`); the phases are updated.
-    eddies : (w, ...) array
-        The part of the current that changes (`simnav.world.current.eddies`).
-    tap_time : (w, ...) array
-        Ascending times at which the state is wanted [s].
-    first, last : (w,) int arrays
-        Those of them, from first up to, not including, last, that are within the block.
-    taps : (w, ..., 14) array
-        Filled with the states at those times.
-    samples : (w,) int array
-        By how many samples each world is advanced.
-    rate, force : (w, ..., 3) arrays
-        Filled with the ideal mean angular rate and specific force.
+    plan : two (w, ...) arrays
+        Rows and points of the manoeuvre tables, each flat and with room behind it, like those of ``water``.
+    water : three (w, ...) arrays
+        Phases, updated, and table of the wave components (`simnav.world.sea.components`); the part of the current that
+        changes (`simnav.world.current.eddies`).
+    wanted : (w, ...), (w,) int, (w,) int and (w, ..., 14) arrays
+        Ascending times at which the state is wanted [s]; those of them, from the first up to, not including, the last,
+        that are within the block; filled with the states at those times.
+    imu : (w,) int, (w, ..., 3) and (w, ..., 3) arrays
+        By how many samples each world is advanced; filled with the ideal mean angular rate and specific force.
     """
+    x, index = state
+    rows, points = plan
+    phase, table, eddies = water
+    tap_time, first, last, taps = wanted
+    samples, rate, force = imu
     for w in range(active.size):
         if not active[w]:
             continue
         r, q, c, e = sizes[w, 0], sizes[w, 1], sizes[w, 2], sizes[w, 3]
         n, m = samples[w], last[w] - first[w]
         _advance_one(
-            x[w], index[w], p[w], rows[w, : COLUMNS * r].reshape((r, COLUMNS)), points[w, : 2 * q].reshape((q, 2)),
-            phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
-            eddies[w, : EDDY_COLUMNS * e].reshape((e, EDDY_COLUMNS)),
-            tap_time[w, first[w] : last[w]], taps[w, :m], rate[w, :n], force[w, :n],
+            x[w], index[w], p[w],
+            (rows[w, : COLUMNS * r].reshape((r, COLUMNS)), points[w, : 2 * q].reshape((q, 2))),
+            (
+                phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
+                eddies[w, : EDDY_COLUMNS * e].reshape((e, EDDY_COLUMNS)),
+            ),
+            tap_time[w, first[w] : last[w]], taps[w, :m], (rate[w, :n], force[w, :n]),
         )  # fmt: skip
 
 

@@ -172,10 +172,13 @@ class World:
         """The heading that commands are steered by is off by this much [rad] from now on."""
         self._x[motion.ERROR_HEADING] = heading
 
-    def _one(self) -> tuple[NDArray[Any], ...]:
+    def _one(self) -> tuple[Any, ...]:
         """The first arguments of `simnav.world.motion.advance` for this world alone."""
-        flat = (a.reshape(1, -1) for a in (self._rows, self._points, self._phase, self._waves, self._eddies))
-        return (_ON, self._x[None], self._index[None], self._p[None], self.sizes[None], *flat)
+        rows, points, phase, waves, eddies = (
+            a.reshape(1, -1) for a in (self._rows, self._points, self._phase, self._waves, self._eddies)
+        )
+        state = self._x[None], self._index[None]
+        return _ON, state, self._p[None], self.sizes[None], (rows, points), (phase, waves, eddies)
 
     def trace(self, seconds: int) -> tuple[Array, Array]:
         """Advance second by second, without a look at what instruments would say.
@@ -194,8 +197,9 @@ class World:
         """
         n = round(self.rate)
         room = np.empty((1, n, 3))
-        none, states, samples = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS)), np.array([n])
-        arguments: Any = (*self._one(), np.empty((1, 0)), none, none, states, samples, room, room.copy())
+        none, states = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS))
+        nowhere, imu = (np.empty((1, 0)), none, none, states), (np.array([n]), room, room.copy())
+        arguments: Any = (*self._one(), nowhere, imu)
         track, position = np.empty((seconds, 4)), np.empty((seconds, 3))
         for i in range(seconds):
             motion.advance(*arguments)
@@ -244,7 +248,7 @@ class World:
         order = np.argsort(times, kind="stable")
         sorted_states = np.empty((1, len(times), motion.TAP_COLUMNS))
         within = times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
-        arguments: Any = (*self._one(), *within, np.array([n]), rate, force)
+        arguments: Any = (*self._one(), within, (np.array([n]), rate, force))
         motion.advance(*arguments)
         states = np.empty_like(sorted_states[0])
         states[order] = sorted_states[0]

@@ -1,4 +1,4 @@
-"""A copy of an estimator, made in mid-run, goes on as the estimator itself does: nothing in it is shared or left behind."""
+"""A copy of an estimator, made in mid-run, goes on as the estimator itself does: nothing is shared or left behind."""
 
 from __future__ import annotations
 

@@ -50,8 +50,9 @@ class Problem:
             ours[:rows] = theirs[:rows]
         step = np.empty((COUNT, N))
         size = solve_chain(
-            self.prior, self.shift, self.F, self.Q, self.e, self.w, self.node + 7, 7, self.instrument, self.m, self.H,
-            self.r, self.R, self.v, damping, first, *nodes, *aids, step, np.empty(COUNT),
+            (self.prior, self.shift), (self.F, self.Q, self.e, self.w),
+            (self.node + 7, 7, self.instrument, self.m, self.H, self.r, self.R, self.v), damping, first,
+            (*nodes, *aids), step, np.empty(COUNT),
         )  # fmt: skip
         self.left = *nodes, *aids
         return size, (*nodes, step)
@@ -170,7 +171,8 @@ def test_after_a_step_there_is_none_to_take():
     left = p.left
     motion, aids = (np.empty((COUNT - 1, N)), np.empty(COUNT - 1)), (np.empty_like(p.r), np.empty(len(p.node)))
     unit, one = np.tile(np.eye(N), (COUNT - 1, 1, 1)), np.tile(np.eye(3), (len(p.node), 1, 1))
-    after_step(step, predicted_shift, filtered_shift, p.F, p.e, unit, *motion, p.node + 7, 7, p.H, p.r, one, *aids)
+    shifts = predicted_shift, filtered_shift
+    after_step(step, shifts, (p.F, p.e, unit, *motion), (p.node + 7, 7, p.H, p.r, one, *aids))
     p.shift -= step[0]
     assert np.abs(step).max() > 0.1
     for first in (0, 3, COUNT):  # whatever is eliminated anew
@@ -266,7 +268,7 @@ def test_weights_that_have_hardly_changed_are_kept(motion: int | None, aid: int 
         if which is not None:
             weights[which] += 0.03 / max(norms[which], 1.0)
             changed.append((weights, which, weights[which]))
-    assert keep_weights(before, norm, weight, node + 7, 7, aid_before, aid_norm, aid_weight, 0.01) == first
+    assert keep_weights((before, norm, weight), node + 7, 7, (aid_before, aid_norm, aid_weight), 0.01) == first
     for weights, which, wanted in changed:
         assert weights[which] == wanted
     kept = [np.delete(w, [] if i is None else i) for w, i in ((weight, motion), (aid_weight, aid))]
