@@ -362,7 +362,7 @@ _BOUNDS = {
 
 
 def _sentence(cls: type[Spec], error: ValidationError, table: Mapping[str, Any], source: str, path: str) -> str:
-    """The first problem of a ValidationError, in the words and units of the TOML file."""
+    """The first problem of a ValidationError, or all keys that are missing, in the words and units of the TOML file."""
     first = error.errors()[0]
     location, context = first["loc"], first.get("ctx", {})
     message = str(first["msg"]).removeprefix("Value error, ").removeprefix("Input ")
@@ -372,7 +372,12 @@ def _sentence(cls: type[Spec], error: ValidationError, table: Mapping[str, Any],
     key, info = keys.get(str(location[0]), (str(location[0]), None))
     where = f"{path}.{key}" if path else key
     if first["type"] == "missing" and len(location) == 1:
-        return f"{source}: required key '{where}' is missing"
+        absent = [str(e["loc"][0]) for e in error.errors() if e["type"] == "missing" and len(e["loc"]) == 1]
+        named = [keys.get(name, (name, None))[0] for name in absent]
+        *others, last = [f"'{path}.{name}'" if path else f"'{name}'" for name in named]
+        if others:
+            return f"{source}: required keys {', '.join(others)} and {last} are missing"
+        return f"{source}: required key {last} is missing"
     if first["type"] in _BOUNDS:
         name, words = _BOUNDS[first["type"]]
         unit = unit_of(info) if info is not None else None

@@ -75,7 +75,7 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
         self._action_shape = action_space.shape
         self._voyages = voyages
         self._rngs: list[np.random.Generator] = []
-        self._over, self._begun = np.ones(num_envs, np.bool_), False
+        self._over, self._under_way = np.ones(num_envs, np.bool_), False
 
     @abstractmethod
     def _begin_voyage(self, i: int, seed: int) -> dict[str, Any]:
@@ -118,7 +118,7 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
         """
         seeds = seeds_of(seed, self.num_envs, self._independent)
         mask = reset_mask(options, self.num_envs)
-        if not self._begun and not mask.all():
+        if not self._under_way and not mask.all():
             raise gymnasium.error.ResetNeeded("the first reset begins all voyages: leave reset_mask out")
         while len(self._rngs) < self.num_envs:
             self._rngs.append(seeding.np_random()[0])
@@ -139,7 +139,7 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
             If no voyage is under way.
         """
         mode = self.autoreset_mode
-        if not self._begun or (mode == AutoresetMode.DISABLED and self._over.all()):
+        if not self._under_way or (mode == AutoresetMode.DISABLED and self._over.all()):
             raise gymnasium.error.ResetNeeded("no voyage is under way: call reset() first")
         over = self._over.copy()
         active = ~over
@@ -172,7 +172,7 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
             run = run_seed(None if seeds is None else seeds[i], self._rngs[i], self._voyages)
             infos = self._add_info(infos, self._begin_voyage(i, run), i)
             self._over[i] = False
-        self._begun = True
+        self._under_way = True
         self._look(mask)
         return infos
 

@@ -133,9 +133,9 @@ class Policy:
         actions = _ACTIONS[task](len(self.kinds), self.most)
         shape = self.layers[0][0].shape[1], size
         if shape != (wanted, actions):
-            told = f"{task} with {', '.join(self.kinds)}" if self.kinds else task
+            setting = f"{task} with {', '.join(self.kinds)}" if self.kinds else task
             raise PolicyError(
-                f"{source}: it takes {shape[0]} numbers and gives {shape[1]}; {told} has {wanted} and {actions}"
+                f"{source}: it takes {shape[0]} numbers and gives {shape[1]}; {setting} has {wanted} and {actions}"
             )
         arrays = [self.mean, self.deviation, *(a for layer in self.layers for a in layer)]
         if self.mean.shape != self.deviation.shape or self.mean.shape != (self.layers[0][0].shape[1],):
@@ -209,13 +209,13 @@ class Policy:
             raise PolicyError(f"{path}: not a policy of simnav, or damaged ({error})") from None
 
 
-def _learned_from(told: Mapping[str, Any], source: str) -> list[tuple[int, int]]:
-    """First and last number of the runs that were learned from; PolicyError where that is not told."""
-    streams = told.get("streams")
-    numbers = [told.get("first_seed"), told.get("voyages"), *(streams if isinstance(streams, list) else [])]
+def _learned_from(record: Mapping[str, Any], source: str) -> list[tuple[int, int]]:
+    """First and last number of the runs that were learned from; PolicyError where the record does not say."""
+    streams = record.get("streams")
+    numbers = [record.get("first_seed"), record.get("voyages"), *(streams if isinstance(streams, list) else [])]
     if len(numbers) != 4 or not all(type(n) is int and n >= 0 for n in numbers) or numbers[2] > numbers[3]:
         raise PolicyError(
-            f"{source}: trained_on should tell first_seed, voyages and streams (first and last) of the voyages that it "
-            f"learned from, as record_of_training gives them; it is {dict(told)!r}"
+            f"{source}: trained_on should state first_seed, voyages and streams (first and last) of the voyages that "
+            f"it learned from, as record_of_training gives them; it is {dict(record)!r}"
         )
     return [(numbers[2], numbers[3])]

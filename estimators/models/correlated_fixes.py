@@ -41,11 +41,11 @@ def with_correlated_fixes(instruments: Instruments, slow: float, slow_time: floa
     sheets = []
     for sheet in instruments.values():
         if sheet.role == "fix":
-            told, least = np.any(sheet.bias_instability), slow * sheet.sigma
+            stated, least = np.any(sheet.bias_instability), slow * sheet.sigma
             sheet = replace(
                 sheet,
                 bias_instability=np.maximum(sheet.bias_instability, least),
-                correlation_time=sheet.correlation_time if told else slow_time,
+                correlation_time=sheet.correlation_time if stated else slow_time,
             )
         sheets.append(sheet)
     return Instruments(sheets, instruments.imu, instruments.step)

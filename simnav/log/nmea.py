@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -219,11 +219,13 @@ class NmeaFile:
     """The sentences of one file: a table for each (talker, sentence).
 
     Each table has the columns of its sentence, and ``logger`` and ``sentence``: UTC seconds since 1970 (or since
-    midnight where the file has no stamps).
+    midnight where the file has no stamps). ``invalid`` are the numbers of the lines of each (talker, sentence) that say
+    that they are invalid.
     """
 
     path: str
     tables: Mapping[tuple[str, str], Table]
+    invalid: Mapping[tuple[str, str], Sequence[int]]
 
     def table(self, sentence: str, talker: str | None = None) -> Table:
         """The table of a sentence.
@@ -231,12 +233,20 @@ class NmeaFile:
         Raises
         ------
         LogError
-            If the file has no such sentence, or several talkers say it and none was chosen.
+            If the file has no such sentence, if all of them are invalid, or if several talkers say it and none was
+            chosen.
         """
         found = [key for key in self.tables if key[1] == sentence and talker in (None, key[0])]
         if not found:
             have = sorted({s if t == "P" else t + s for t, s in self.tables})
             want = sentence if talker is None else talker + sentence
+            lines = [n for key, lines in self.invalid.items() if key[1] == sentence and talker in (None, key[0])
+                     for n in lines]  # fmt: skip
+            if lines:
+                raise LogError(
+                    f"{self.path}: none of {len(lines)} sentences {want!r} holds a measurement: each says that it is "
+                    f"invalid (quality, status or mode), the first is line {min(lines)}"
+                )
             known = "" if sentence in SENTENCES else f" (sentences that are understood: {', '.join(SENTENCES)})"
             raise LogError(f"{self.path}: there is no sentence {want!r}{closest(want, have)}{known}")
         if len(found) > 1:
@@ -301,6 +311,7 @@ def _near(tod: float, about: float) -> float:
 @lru_cache(maxsize=64)
 def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
     rows: dict[tuple[str, str], list[tuple[int, float, float, Row]]] = {}
+    without: dict[tuple[str, str], list[int]] = {}
     bad_sum: list[int] = []
     bad_line: list[int] = []
     epoch = math.nan  # the last time of day that a sentence gave, as a moment
@@ -331,6 +342,7 @@ def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
                 tod = row.pop("time_of_day", math.nan)
             except _InvalidError as invalid:
                 tod = invalid.time_of_day
+                without.setdefault((talker, sentence), []).append(number)
             except (ValueError, IndexError):
                 bad_line.append(number)
                 continue
@@ -346,7 +358,7 @@ def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
             warnings.warn(
                 f"{path}: {len(bad)} lines {what} and are left out, the first is line {bad[0]}", LogWarning, 4
             )
-    if not rows:
+    if not rows and not without:
         raise LogError(f"{path}: there is no NMEA sentence that is understood ({', '.join(SENTENCES)})")
     tables = {}
     for (talker, sentence), entries in rows.items():
@@ -358,4 +370,4 @@ def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
             columns[key] = np.array([e[3][key] for e in entries])
         source = f"{path} ({sentence if talker == 'P' else talker + sentence})"
         tables[talker, sentence] = Table(source, columns, np.array([e[0] for e in entries]), numbered=False)
-    return NmeaFile(str(path), tables)
+    return NmeaFile(str(path), tables, without)

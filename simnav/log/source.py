@@ -89,7 +89,7 @@ class LogSource:
             self._imu, resampled = _regrid(imu, begin, self.instruments.imu.rate, self.duration)  # type: ignore[union-attr]
             notes.append(f"IMU samples were {log.imu.samples}" + (", resampled" if resampled else ""))
         self.initial_truth = self._states(np.zeros(1))
-        told, made = _start(reference, self.initial_truth, imu, begin)
+        true_start, made = _start(reference, self.initial_truth, imu, begin)
         if made:
             notes.append(f"start {' and '.join(made)} not from the reference")
         self._aids = self._measure(scenario, log, root)
@@ -97,7 +97,7 @@ class LogSource:
         if simulated:
             notes.append(f"simulated from the reference: {', '.join(simulated)}")
         self.note = "; ".join(notes)
-        self.start = draw_start(told, scenario.initial_error.covariance(), root, scenario.initial_error.factors())
+        self.start = draw_start(true_start, scenario.initial_error.covariance(), root, scenario.initial_error.factors())
         self._imu_labels: ImuLabels | None = None
         if self._imu is not None and any("imu" in f.instruments for f in scenario.faults):
             n = len(self._imu)

@@ -220,11 +220,11 @@ class SteppedRuns:
         """Draw what instruments and faults of a run draw for the next stretch of steps."""
         simulator = self.simulators[b]
         assert simulator is not None
-        steps, begun = int(self._stretch[b]), int(self.step[b])
+        steps, done = int(self._stretch[b]), int(self.step[b])
         self._stretch[b] = min(2 * steps, LONGEST_STRETCH)
         self._at[b], self._end[b] = 0, steps
-        ends = np.arange(begun + 1, begun + steps + 1) * simulator.step
-        start = begun * simulator.step
+        ends = np.arange(done + 1, done + steps + 1) * simulator.step
+        start = done * simulator.step
         times, owners, at = [], [], []
         for i, spec in enumerate([*simulator.scenario.aids.values(), None]):
             rate, phase = (1.0 / simulator.step, simulator.step) if spec is None else (spec.rate, spec.phase)
@@ -256,13 +256,13 @@ class SteppedRuns:
                     interval[part, j], fault[part, j, :d] = layer.ahead(aid.name, aid.kind, own)
         for name, value in (("error", error), ("white", white), ("interval", interval), ("fault", fault)):
             self._put(name, b, value[order])
-        self._draw_imu(b, simulator, steps, begun)
+        self._draw_imu(b, simulator, steps, done)
 
-    def _draw_imu(self, b: int, simulator: Simulator, steps: int, begun: int) -> None:
+    def _draw_imu(self, b: int, simulator: Simulator, steps: int, done: int) -> None:
         rate = simulator.world.rate
         samples = round(rate * simulator.step)
         self._put("samples_a_step", b, samples)
-        first, n = begun * samples, steps * samples
+        first, n = done * samples, steps * samples
         for name in ("imu_time", "imu_interval"):
             self._put(name, b, np.zeros(samples))
         for name in ("rate", "force"):

@@ -187,9 +187,9 @@ def run(recording: Recording, estimator: str) -> dict[str, Any]:
     """The errors of an estimator, ``name`` or ``name:parameter=value``, on a voyage."""
     name, *given = estimator.split(":")
     parameters = dict(pair.split("=", 1) for pair in given)
-    begun = process_time()
+    start = process_time()
     trial = simnav.run_trial(make(name, **parameters), recording)
-    seconds = process_time() - begun
+    seconds = process_time() - start
     found: dict[str, Any] = {"status": trial.status, "milliseconds": 1e3 * seconds / max(len(trial), 1)}
     if len(trial):
         scores = simnav.score(trial, recording)

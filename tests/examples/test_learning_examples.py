@@ -1,4 +1,4 @@
-"""The examples learn: a few steps of each, and what they learn beats the plain filter where it was told the truth."""
+"""The examples learn: a few steps of each, and what they learn beats the plain filter where it was record the truth."""
 
 from __future__ import annotations
 
@@ -109,13 +109,13 @@ def test_a_policy_in_plain_arrays_is_the_network_of_the_library(example):
     module = example("stable_baselines")
     envs, model = module.made(num_envs=2, same=2, voyages=1, length=20)
     observation = np.random.default_rng(1).normal(size=(50, 24)).astype(np.float32)
-    told = module.record_of_training(module.FAMILY, 1)
-    assert np.abs(module.policy_of(model, envs, told)(observation)).max() < 0.1
+    record = module.record_of_training(module.FAMILY, 1)
+    assert np.abs(module.policy_of(model, envs, record)(observation)).max() < 0.1
     model.learn(80)
     normalisation = model.get_vec_normalize_env()
     assert normalisation.obs_rms.var.max() < 0.5  # it has seen observations, not only its start at 1
     actions = model.predict(normalisation.normalize_obs(observation), deterministic=True)[0]
-    policy = module.policy_of(model, envs, told)
+    policy = module.policy_of(model, envs, record)
     assert np.abs(actions).max() > 0.01
     np.testing.assert_allclose(policy(observation)[:, :1], actions, atol=1e-5)
     assert (policy(observation)[:, 1] == 0.0).all()  # the process noise

@@ -32,16 +32,16 @@ def outer(x):
 RUN = """
 import sys, warnings
 from simnav import compiled, warmup
-told = []
+reported = []
 with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
     # Only the plug-in's kernels: those of the project are other tests' business.
     ours = lambda: [k for k in compiled._kernels if "plugin" in k.__module__ and k.signature]
     warmup.kernels = ours
-    warmup.warmup(lambda *p: told.append(p))
+    warmup.warmup(lambda *p: reported.append(p))
 assert sum("broken_plugin" in str(w.message) for w in caught) == 1, caught
 modules = {k.__module__ for k in compiled._kernels}
-print(told, sorted(modules & {"simnav.strapdown", "simnav.world.motion", "simnav_plugin.kernels"}))
+print(reported, sorted(modules & {"simnav.strapdown", "simnav.world.motion", "simnav_plugin.kernels"}))
 assert "matplotlib" not in sys.modules and "gtsam" not in sys.modules
 """
 
@@ -56,13 +56,13 @@ def test_plug_ins_are_warm_too_and_a_broken_one_is_named(tmp_path: Path) -> None
         "SIMNAV_CACHE_DIR": str(tmp_path / "cache"),
     }
     modules = "['simnav.strapdown', 'simnav.world.motion', 'simnav_plugin.kernels']"
-    for told in (
+    for reported in (
         "[(0, 1, ''), (1, 1, 'simnav_plugin.kernels.outer')]",
         "[(1, 1, '')]",  # the second time there is nothing left to do
     ):
         done = subprocess.run([sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-        assert done.stdout.strip() == f"{told} {modules}"
+        assert done.stdout.strip() == f"{reported} {modules}"
 
 
 SEVERAL = "\n".join(f"@kernel('f8(f8)')\ndef k{i}(x):\n    return x + {i}.0\n" for i in range(5))
@@ -95,10 +95,10 @@ def test_several_are_compiled_beside_each_other(
         return original(self, directory)
 
     monkeypatch.setattr(compiled.Kernel, "_jit", jit)
-    told: list[tuple[int, int, str]] = []
-    warmup.warmup(lambda *p: told.append(p), processes=processes)
-    assert [t[0] for t in told] == [0, 1, 2, 3, 4, 5]
-    assert {t[2] for t in told[1:]} == {f"several.k{i}" for i in range(5)}
+    reported: list[tuple[int, int, str]] = []
+    warmup.warmup(lambda *p: reported.append(p), processes=processes)
+    assert [t[0] for t in reported] == [0, 1, 2, 3, 4, 5]
+    assert {t[2] for t in reported[1:]} == {f"several.k{i}" for i in range(5)}
     assert here.count("cached") == (5 if processes == 2 else 0)
     assert [k(1.0) for k in ours] == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert several.k4(0.5) == 4.5

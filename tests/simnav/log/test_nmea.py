@@ -112,6 +112,19 @@ def test_a_file_without_sentences(tmp_path):
         read_nmea(path)
 
 
+def test_a_log_in_which_all_sentences_of_a_kind_are_invalid_says_so(tmp_path):
+    invalid = checksum("GPGGA,000001.00,,,,,0,00,,,M,,M,,")
+    file = read_nmea(write(tmp_path / "log", checksum("HEHDT,1.0,T"), invalid, invalid))
+    assert len(file.table("HDT")) == 1
+    expected = r"none of 2 sentences 'GPGGA' holds a measurement: .* invalid .*, the first is line 2"
+    with pytest.raises(LogError, match=expected):
+        file.table("GGA", "GP")
+    with pytest.raises(LogError, match="none of 2 sentences 'GGA'"):
+        read_nmea(write(tmp_path / "nothing", invalid, invalid)).table("GGA")
+    with pytest.raises(LogError, match="there is no sentence 'GLL'"):
+        file.table("GLL")
+
+
 def test_a_sentence_that_says_that_it_is_invalid_is_not_used_but_its_time_is(tmp_path):
     place = "2200.1,N,00100.0,E"
     knots = "5.0,1.0"

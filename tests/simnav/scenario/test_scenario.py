@@ -175,6 +175,11 @@ def test_a_recorded_scenario_has_no_world():
         ),
         ("duration_s = 60.0", "", "required key 'duration_s' is missing"),
         ("sigma_m_s = 0.01", "", "required key 'instruments.dvl.sigma_m_s' is missing"),
+        (
+            "latitude_deg = 54.0\nlongitude_deg = 10.0",
+            "",
+            "required keys 'start.latitude_deg' and 'start.longitude_deg' are missing",
+        ),
         # wrong sign, range, type
         ("rate_hz = 2.0", "rate_hz = 2e6", "instruments.dvl.rate_hz = 2e+06: should be at most 100000"),
         ("rate_hz = 2.0", "rate_hz = -2.0", "instruments.dvl.rate_hz = -2.0: should be greater than 0"),
