@@ -18,11 +18,20 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.standard.carrying import Carried
     from simnav.leaderboard.standard.currency import Outdated
     from simnav.leaderboard.standard.publication import Published
     from simnav.leaderboard.submission.verifying import SubmissionReport
 
-__all__ = ["Submission", "check_standard", "publish_standard", "run_standard", "submit", "verify_bundle"]
+__all__ = [
+    "Submission",
+    "carry_standard",
+    "check_standard",
+    "publish_standard",
+    "run_standard",
+    "submit",
+    "verify_bundle",
+]
 
 
 @dataclass(frozen=True)
@@ -277,6 +286,50 @@ def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
         raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
     with mistakes(StoreError):
         return outdated(folder)
+
+
+def carry_standard(
+    *,
+    runs: int = 1,
+    shipped: str | os.PathLike[str] | None = None,
+    record: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    progress: CampaignProgress = None,
+) -> Carried:
+    """Carry the standard result over to the code of today, where runs that are repeated give the same scores.
+
+    Parameters
+    ----------
+    runs : int
+        How many runs of each scenario and estimator that are out of date are repeated.
+    shipped, record : path, optional
+        Folder of the packed results, and file that says what was carried over; default: those that come with simnav.
+    workers : int
+        Processes.
+    progress : callable, optional
+        As for `simnav.leaderboard.interface.campaign`.
+
+    Returns
+    -------
+    simnav.leaderboard.standard.carrying.Carried
+
+    Raises
+    ------
+    RequestError
+        If there are no results, or the code differs from its commit.
+    """
+    from simnav.leaderboard import standard
+    from simnav.leaderboard.results.store import StoreError
+    from simnav.leaderboard.standard.carrying import carry
+
+    folder = standard.RESULTS if shipped is None else absolute(shipped)
+    if not standard.shipped(folder):
+        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    with mistakes(StoreError):
+        return carry(
+            folder, standard.CARRIED if record is None else absolute(record), runs=runs, workers=workers,
+            progress=progress,
+        )  # fmt: skip
 
 
 def publish_standard(

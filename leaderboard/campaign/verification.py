@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
-__all__ = ["CLOSE", "Verification", "verify_results"]
+__all__ = ["CLOSE", "Comparison", "Verification", "compared", "listed", "verify_results"]
 
 #: Relative difference of a score that was computed from a trial in single precision.
 CLOSE = 1e-6
@@ -130,12 +130,12 @@ def verify_results(
             if again.status != result.status:
                 different.append(f"{what}: {result.status} is stored, {again.status} came out")
                 continue
-            comparison = _compared(result, again)
+            comparison = compared(result, again)
             unknown |= dict.fromkeys(comparison.unknown)
             if comparison.different:
-                different.append(f"{what}: {_listed(comparison.different)}")
+                different.append(f"{what}: {listed(comparison.different)}")
             elif comparison.close:
-                close.append(f"{what}: {_listed(comparison.close)}")
+                close.append(f"{what}: {listed(comparison.close)}")
         report(len(chosen), len(chosen))
     return Verification(
         str(folder), len(found), wanted, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
@@ -162,7 +162,7 @@ def _repeat(
     return next(r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)
 
 
-class _Comparison(NamedTuple):
+class Comparison(NamedTuple):
     """Scores that differ, each with both values in words, and those that are not known here."""
 
     close: list[str]
@@ -170,7 +170,7 @@ class _Comparison(NamedTuple):
     unknown: list[str]
 
 
-def _compared(stored: Result, again: Result) -> _Comparison:
+def compared(stored: Result, again: Result) -> Comparison:
     """Compare scores to the bit, wall times aside; NaN is equal to NaN.
 
     What was stored in single precision (`simnav.leaderboard.results.packing`) is compared with the rounded score. A
@@ -178,7 +178,7 @@ def _compared(stored: Result, again: Result) -> _Comparison:
     """
     from simnav.scoring import SCORES
 
-    found = _Comparison([], [], [])
+    found = Comparison([], [], [])
     homes = same_code(stored.scoring, scoring_code())
     for name in dict.fromkeys((*stored.scores, *again.scores)):
         if name.startswith("update_"):
@@ -197,6 +197,7 @@ def _compared(stored: Result, again: Result) -> _Comparison:
     return found
 
 
-def _listed(scores: Sequence[str], most: int = 3) -> str:
+def listed(scores: Sequence[str], most: int = 3) -> str:
+    """The first few of them, and how many more there are."""
     more = f"; and {len(scores) - most} more" if len(scores) > most else ""
     return "; ".join(scores[:most]) + more

@@ -70,6 +70,34 @@ def check(
 
 
 @_app.command()
+def carry(
+    runs: Annotated[int, typer.Option(min=1, help="Runs of each scenario and row that are repeated.")] = 1,
+    shipped: _Shipped = None,
+    record: Annotated[
+        Path | None, typer.Option(help="File that says what was carried over. Default: that of simnav.")
+    ] = None,
+    workers: Workers = 2,
+    json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Carry the standard result over to the code of today, where repeated runs give the same scores to the bit."""
+    with session(json, debug) as out:
+        from simnav.leaderboard import publishing
+
+        with out.progress("starting") as bar:
+            made = publishing.carry_standard(
+                runs=runs, shipped=shipped, record=record, workers=workers, progress=campaign_progress(bar)
+            )
+        out.document(made.to_dict())
+        out.print(
+            f"results:   {made.folder} ({made.results} carried over, {made.repeated} runs were repeated)",
+            *(f"different: {text}" for text in made.different),
+            *(f"left:      {text}" for text in made.left),
+        )
+        out.code = FAILED if made.different or made.left else 0
+
+
+@_app.command()
 def publish(
     results: _Results = _WORKING,
     profile: _Profile = "standard",

@@ -24,7 +24,7 @@ from simnav.leaderboard.results.result import Result, to_table, write_tables
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["pack", "shortened"]
+__all__ = ["pack", "shortened", "write_packed"]
 
 _ROWS = 4096  # of a group in a file
 
@@ -70,6 +70,18 @@ def pack(
     ]
     if single:
         found = shortened(found)
+    write_packed(found, place)
+    return found
+
+
+def write_packed(found: Iterable[Result], place: Path) -> None:
+    """Write results without series as a packed folder, in the place of one that is there.
+
+    Raises
+    ------
+    StoreError
+        If there is a folder of something else, or it cannot be written. Then it is as it was.
+    """
     if place.exists():
         store.create(place)  # refuses a folder of something else
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -93,7 +105,6 @@ def pack(
         os.replace(made, place)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-    return found
 
 
 def shortened(results: Iterable[Result]) -> list[Result]:

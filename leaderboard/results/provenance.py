@@ -33,6 +33,7 @@ _LIBRARIES = ("simnav", "numpy", "numba", "gtsam")
 _CODE = (
     "pyproject.toml", "simnav", "estimators", "scenarios", "leaderboard",
     ":(exclude)leaderboard/standard/results", ":(exclude)leaderboard/standard/history.csv",
+    ":(exclude)leaderboard/standard/carried.csv",
 )  # fmt: skip
 
 

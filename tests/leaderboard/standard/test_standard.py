@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,11 @@ from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.packing import write_packed
+from simnav.leaderboard.results.provenance import Provenance
+from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site.content import SiteFacts
-from simnav.leaderboard.standard import currency, history, readme
+from simnav.leaderboard.standard import carrying, currency, history, readme
 from simnav.leaderboard.standard.currency import outdated
 from simnav.leaderboard.standard.editions import pages_of
 
@@ -132,6 +136,68 @@ def test_a_change_of_one_row_runs_that_row_only(home: Path, tmp_path: Path, monk
     codes = [{line.row: line.code for line in lines if line.edition == n} for n in (1, 2)]
     assert codes[0]["gnss-only"] != codes[1]["gnss-only"]
     assert codes[0]["dead-reckoning"] == codes[1]["dead-reckoning"]
+
+
+@pytest.fixture
+def copied(home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the standard result, after an edit of one row."""
+
+    def edited(cls: type) -> str:
+        return ("tidied" if cls.name == "gnss-only" else "") + estimator_source(cls)
+
+    for module in (currency, resolution):
+        monkeypatch.setattr(module, "estimator_source", edited)
+    monkeypatch.setattr(carrying, "here", lambda: Provenance(commit="0123456789abcdef", dirty=False))
+    shutil.copytree(home / "shipped", tmp_path / "shipped")
+    for name in ("small.toml", "README.md", "history.csv"):
+        shutil.copy(home / name, tmp_path / name)
+    return tmp_path
+
+
+def test_results_are_carried_over_to_code_that_gives_the_same_numbers(home: Path, copied: Path) -> None:
+    before = store.load(home / "shipped", series=False)
+    arguments = ["standard", "carry", "--shipped", str(copied / "shipped"), "--record", str(copied / "carried.csv")]
+    done = CliRunner().invoke(app, [*arguments, "--workers", "1"])
+    assert done.exit_code == 0, done.output
+    assert "(2 carried over, 1 runs were repeated)" in done.stdout
+    assert not publishing.check_standard(copied / "shipped")
+    after = store.load(copied / "shipped", series=False)
+    assert {r.key for r in after} & {r.key for r in before} == {r.key for r in before if r.estimator != "gnss-only"}
+    kept = [f.name for f in fields(Result) if f.name not in ("key", "scores", "series")]
+    assert [[getattr(r, n) for n in kept] for r in after] == [[getattr(r, n) for n in kept] for r in before]
+    for a, b in zip(after, before, strict=True):
+        np.testing.assert_array_equal([*a.scores.values()], [*b.scores.values()])
+    last = max(line.edition for line in history.read(copied / "history.csv"))
+    assert publish(copied, copied / "shipped").edition == last  # nothing new
+    header, *lines = (copied / "carried.csv").read_text().splitlines()
+    assert header == "date,commit,rows,results,repeated"
+    assert [line.partition(",")[2] for line in lines] == ["0123456789ab,1,2,1"]
+    again = publishing.carry_standard(shipped=copied / "shipped", record=copied / "carried.csv", workers=1)
+    assert (again.rows, again.repeated) == (0, 0)
+
+
+def test_results_that_come_out_differently_are_not_carried_over(
+    home: Path, copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = store.load(copied / "shipped", series=False)
+    wrong = next(r for r in results if r.estimator == "gnss-only" and r.seed == 1)
+    others = {k: v * (1.0 + 1e-6) if k == "horizontal_rmse" else v for k, v in wrong.scores.items()}
+    write_packed([replace(r, scores=others) if r is wrong else r for r in results], copied / "shipped")
+    found = publishing.carry_standard(runs=5, shipped=copied / "shipped", record=copied / "carried.csv", workers=1)
+    assert (found.rows, found.results, found.repeated) == (0, 0, 2)
+    (text,) = found.different
+    assert text.startswith(f"gnss-only on {wrong.scenario}, run 1: horizontal_rmse ")
+    assert publishing.check_standard(copied / "shipped").rows == ("gnss-only",)
+    assert not (copied / "carried.csv").exists()
+    write_packed([replace(r, scenario_digest="another") for r in results], copied / "shipped")
+    found = publishing.carry_standard(shipped=copied / "shipped", record=copied / "carried.csv", workers=1)
+    assert found.left == (f"gnss-only on {wrong.scenario}: the scenario itself has changed",)
+    assert found.repeated == 0
+    monkeypatch.setattr(carrying, "here", lambda: Provenance(commit="0123", dirty=True))
+    with pytest.raises(RequestError, match="the code differs from its commit"):
+        publishing.carry_standard(shipped=copied / "shipped", record=copied / "carried.csv")
+    with pytest.raises(RequestError, match="runs = 0"):
+        publishing.carry_standard(runs=0, shipped=copied / "shipped", record=copied / "carried.csv")
 
 
 def test_what_the_profile_does_not_name_is_left_out_when_it_is_out_of_date(
