@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +37,18 @@ def test_files_stay_short():
     ]
     long = {str(p.relative_to(ROOT)): n for p in files if (n := len(p.read_text().splitlines())) > 600}
     assert not long
+
+
+def test_a_kernel_has_few_arguments():
+    """What belongs together goes to a kernel as one tuple."""
+    many = {}
+    for package in ("simnav", "estimators", "leaderboard"):
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.FunctionDef) and any("kernel(" in ast.unparse(d) for d in node.decorator_list):
+                    many[f"{path.relative_to(ROOT)}: {node.name}"] = len(node.args.args)
+    assert len(many) > 100
+    assert not {name: n for name, n in many.items() if n > 9}
 
 
 def test_no_import_cycle_between_files():

@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
+from simnav.estimators.learning.reference import Events
 
-__all__ = ["EVENTS", "MEMORY_COLUMNS", "STEPS", "Events", "Steps", "observe", "set_scales", "take"]
+__all__ = ["EVENTS", "MEMORY_COLUMNS", "STEPS", "Steps", "observe", "set_scales", "take"]
 
-#: The events of all voyages: the fields of `simnav.estimators.learning.reference.Linear`, in their order.
-Events: TypeAlias = tuple[Array, Array, Flags, Integers, Array, Integers, Array, Array, Array, Array]
 #: Of each filter of a bank: whether it takes the step, and its events in it, from the first up to, not including, the
 #: last; all (b,).
 Steps: TypeAlias = tuple[Flags, Integers, Integers]
-#: Their types.
+#: Types of `simnav.estimators.learning.reference.Events`, and of `Steps`.
 EVENTS = (
     "Tuple((f8[:, :, ::1], f8[:, :, ::1], b1[::1], i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], "
     "f8[:, :, ::1], f8[:, ::1]))"
@@ -82,7 +81,7 @@ def observe(
     Parameters
     ----------
     steps, events : tuples of arrays
-        See `Steps` and `Events`.
+        See `Steps` and `simnav.estimators.learning.reference.Events`.
     end : (b,) array
         End of each filter's step [s].
     context : (b, 11) array
@@ -235,7 +234,7 @@ def take(
     Parameters
     ----------
     steps, events : tuples of arrays
-        See `Steps` and `Events`.
+        See `Steps` and `simnav.estimators.learning.reference.Events`.
     place : (k,) int array
         Of each instrument: its place in the observation; -1 for none.
     scale : (b, p, k) array

@@ -15,20 +15,21 @@ the square of the difference in heading times the velocity.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from simnav.estimators.algebra.joseph import joseph_update, project
-from simnav.estimators.learning.bank import Events
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, Flags, InitialState, Instruments, Integers, Measurement, Measurements
 
-__all__ = ["LARGEST_MEASUREMENT", "Linear", "ReferenceFilter"]
+__all__ = ["LARGEST_MEASUREMENT", "Events", "Linear", "ReferenceFilter"]
 
 #: Components of the largest measurement.
 LARGEST_MEASUREMENT = 3
+#: The events of all voyages, as kernels take them: the fields of `Linear`, in their order.
+Events: TypeAlias = tuple[Array, Array, Flags, Integers, Array, Integers, Array, Array, Array, Array]
 
 
 class Linear(NamedTuple):

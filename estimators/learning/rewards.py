@@ -26,7 +26,8 @@ from math import log, sqrt
 import numpy as np
 
 from simnav.compiled import Array, Flags, Integers, kernel
-from simnav.estimators.learning.bank import EVENTS, STEPS, Events, Steps
+from simnav.estimators.learning.bank import EVENTS, STEPS, Steps
+from simnav.estimators.learning.reference import Events
 
 __all__ = ["NEED_ORACLE", "REWARDS", "reward"]
 

@@ -281,6 +281,8 @@ def tables_of(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table
         yield from batches(path, columns)
     except FileNotFoundError:
         raise  # another process compacts: see `steadily`
+    except MemoryError:  # pyarrow's is an ArrowException, too; the file is whole
+        raise StoreError(f"{path} cannot be read: there is not enough memory") from None
     except (pa.ArrowException, ValueError, OSError, KeyError) as error:
         if isinstance(error, PermissionError):
             raise StoreError(f"{path} cannot be read: {error.strerror}") from None

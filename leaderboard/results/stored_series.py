@@ -74,6 +74,8 @@ def _group(path: str, group: int) -> SeriesColumn:
         return SeriesColumn(table.column("series"))
     except (FileNotFoundError, PermissionError) as error:
         raise LostSeriesError(f"{path} cannot be read any more: {error.strerror}") from None
+    except MemoryError:  # pyarrow's is an ArrowException, too; the file is whole
+        raise StoreError(f"{path} cannot be read: there is not enough memory") from None
     except (pa.ArrowException, ValueError, OSError) as error:
         set_aside(Path(path), error)
         raise LostSeriesError(

@@ -6,12 +6,14 @@ import pickle
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.gathering import gather
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.results.store import StoreWarning
+from simnav.leaderboard.results.store import StoreError, StoreWarning
 from simnav.leaderboard.results.stored_series import LostSeriesError, StoredSeries, read_ahead
 
 
@@ -88,6 +90,22 @@ def test_series_that_are_looked_at_alone_name_their_damaged_file(folder: Path):
         pytest.warns(StoreWarning, match="set aside"),
     ):
         first.series["time"]
+
+
+def test_a_lack_of_memory_sets_no_file_aside(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    first = store.load(folder)[0]
+
+    def no_memory(*_: object, **__: object) -> None:
+        raise pa.ArrowMemoryError("malloc of size 1 failed")
+
+    for name in ("read_row_group", "read_row_groups"):
+        monkeypatch.setattr(pq.ParquetFile, name, no_memory)
+    for read in (lambda: store.load(folder), lambda: StoredSeries(first.series.path, 0, 0)["time"]):
+        with pytest.raises(StoreError, match="cannot be read: there is not enough memory"):
+            read()
+    monkeypatch.undo()
+    assert len(store.load(folder)) == 5
+    assert not list(folder.rglob("*.broken"))
 
 
 def test_what_is_damaged_is_not_merged(folder: Path, tmp_path: Path):
