@@ -83,7 +83,7 @@ class DeadReckoningEstimator(Solver):
         self._body = self._dcm.T @ start.velocity  # velocity of the reference point, body axes
         self._memory = np.zeros(6)
         self._heard = {s.name: start.time for s in speeds}
-        self._time = self._begun = start.time
+        self._time = self._started = start.time
         self._start = start.covariance
         self._skipped = 0
         self._silent = False
@@ -261,7 +261,7 @@ class DeadReckoningEstimator(Solver):
             drift = (hypot(g.bias, g.bias_instability) * LEVEL_TIME) ** 2
             tilt = np.diag(start)[6:8] + slow + drift
         full[range(6, 8), range(6, 8)] = tilt
-        age = self._time - self._begun
+        age = self._time - self._started
         drift_down = float(tilt.mean()) * float(v[:2] @ v[:2]) * age**2 + sigma**2 * age
         full[2, 2] = start[2, 2] + drift_down
         if self._depth is not None:

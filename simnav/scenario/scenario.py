@@ -297,14 +297,14 @@ class Scenario(Spec):
     def actual_sheet(self) -> Instruments | None:
         """The datasheets that would be true; None where those of `instruments_sheet` are.
 
-        Among their details are the figures that no datasheet tells (`AidSpec.untold`), where they are not zero.
+        Among their details are the figures that no datasheet states (`AidSpec.unstated`), where they are not zero.
         """
         actual = self.actual()
-        untold = {name: {u: getattr(s, u) for u in s.untold if getattr(s, u)} for name, s in actual.aids.items()}
-        if actual is self and not any(untold.values()):
+        unstated = {name: {u: getattr(s, u) for u in s.unstated if getattr(s, u)} for name, s in actual.aids.items()}
+        if actual is self and not any(unstated.values()):
             return None
         sheet = actual.instruments_sheet()
-        aids = [replace(s, details={**s.details, **untold[s.name]}) for s in sheet.values()]
+        aids = [replace(s, details={**s.details, **unstated[s.name]}) for s in sheet.values()]
         return Instruments(aids, sheet.imu, sheet.step)
 
     def content_hash(self) -> str:

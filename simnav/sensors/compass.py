@@ -26,7 +26,7 @@ class MagneticCompass(AidSpec):
     """
 
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "deviation")
-    untold: ClassVar[tuple[str, ...]] = ("deviation",)
+    unstated: ClassVar[tuple[str, ...]] = ("deviation",)
 
     kind: Literal["magnetic_compass"] = "magnetic_compass"
     sigma: NonNegative = quantity("deg")

@@ -158,7 +158,7 @@ class AidSpec(Spec):
         A table of a scenario file with an instrument of this kind; likewise.
     errors : tuple of str
         Fields that make a measurement wrong (with ``fixed_`` before them, too); zero for an ideal instrument.
-    untold : tuple of str
+    unstated : tuple of str
         Those of them whose one-sigma figure is in no datasheet. Only the oracles know it, see
         `simnav.scenario.Scenario.actual_sheet`.
     """
@@ -166,7 +166,7 @@ class AidSpec(Spec):
     definition: ClassVar[Kind]
     example: ClassVar[Mapping[str, Any]]
     errors: ClassVar[tuple[str, ...]] = ("sigma", "bias", "bias_instability", "scale", "misalignment")
-    untold: ClassVar[tuple[str, ...]] = ()
+    unstated: ClassVar[tuple[str, ...]] = ()
 
     kind: str
     rate: Positive = quantity("hz", 1.0)

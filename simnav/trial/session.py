@@ -136,9 +136,9 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
         lack = lacking(session.needs, recording.instruments)
         if lack:
             return log.trial(session.name, "unsuitable", lack)
-        begun = time.perf_counter()
+        started = time.perf_counter()
         session.begin(recording, packets)
-        reset_seconds = time.perf_counter() - begun
+        reset_seconds = time.perf_counter() - started
         where = ""
         try:
             session.run(packets, log)
@@ -148,9 +148,9 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
         log.settle()
         log.check_covariances()
         where = "smooth()"
-        begun = time.perf_counter()
+        started = time.perf_counter()
         smoothed = log.trajectory(session.smooth())
-        smooth_seconds = time.perf_counter() - begun
+        smooth_seconds = time.perf_counter() - started
     except LostError:
         raise
     except (Exception, SystemExit) as error:
@@ -201,9 +201,9 @@ class _LocalSession:
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
         for k in range(len(packets)):
             measurements = self._decode(bytearray(b"".join(packets[k])))
-            begun = time.perf_counter_ns()
+            started = time.perf_counter_ns()
             estimate = self.estimator.update(measurements)
-            seconds = 1e-9 * (time.perf_counter_ns() - begun)
+            seconds = 1e-9 * (time.perf_counter_ns() - started)
             log.add(self._encode(estimate), seconds)
 
     def smooth(self) -> NavigationStates | None:

@@ -84,7 +84,7 @@ class World:
             raise ValueError(f"rate = {rate!r} Hz should be positive")
         self.rate = float(rate)
         self._plan: PlannedTrack | None = None
-        self._told = start, vessel, manoeuvres, current
+        self._voyage = start, vessel, manoeuvres, current
         p = np.zeros(motion.PARAMETERS)
         p[motion.DT] = 1.0 / rate
         p[motion.TAU_U], p[motion.TAU_R] = vessel.speed_time_constant, vessel.turn_time_constant
@@ -143,7 +143,7 @@ class World:
         x = self._x
         x[motion.ERROR_NORTH], x[motion.ERROR_EAST], x[motion.ERROR_HEADING] = north, east, heading
         if self._plan is None:
-            self._plan = World.plan(*self._told)
+            self._plan = World.plan(*self._voyage)
         aside, speed = self._plan.aside(float(x[motion.NORTH]) + north, float(x[motion.EAST]) + east, self.time)
         ahead = max(LEAST_LOOKAHEAD, LOOKAHEAD_TIME * speed)
         x[motion.TO_TRACK] = -np.arctan(aside / ahead)
