@@ -170,7 +170,7 @@ class Comparison(NamedTuple):
     unknown: list[str]
 
 
-def compared(stored: Result, again: Result) -> Comparison:
+def compared(stored: Result, again: Result, close: float = CLOSE) -> Comparison:
     """Compare scores to the bit, wall times aside; NaN is equal to NaN.
 
     What was stored in single precision (`simnav.leaderboard.results.packing`) is compared with the rounded score. A
@@ -193,7 +193,7 @@ def compared(stored: Result, again: Result) -> Comparison:
             if a.hex() in (b.hex(), float(np.float32(b)).hex()):
                 continue
             words = f"{name} {a:.9g} is stored, {b:.9g} came out"
-            (found.close if abs(a - b) <= CLOSE * max(abs(a), abs(b)) else found.different).append(words)
+            (found.close if abs(a - b) <= close * max(abs(a), abs(b)) else found.different).append(words)
     return found
 
 

@@ -80,7 +80,7 @@ def carry(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Carry the standard result over to the code of today, where repeated runs give the same scores to the bit."""
+    """Carry the standard result over to the code of today, where repeated runs give the same scores."""
     with session(json, debug) as out:
         from simnav.leaderboard import publishing
 

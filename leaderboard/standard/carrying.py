@@ -2,8 +2,8 @@
 
 The key of a result names the code that decides it, so a tidied kernel or a clearer message makes all results that it
 can reach out of date, and changes none of them. `carry` repeats some of their runs with the code of today. A scenario
-and estimator of which every repeated run gives the stored scores, to the bit, gets the keys of today. All others stay
-out of date, and have to be run again.
+and estimator of which every repeated run gives the stored scores, to the last digit that is stored, gets the keys of
+today. All others stay out of date, and have to be run again.
 
 A result that is carried over says of itself what it said before: the commit, the versions and the digest of the code
 that computed it. What was repeated is recorded in a CSV file, one line for each time.
@@ -34,7 +34,10 @@ from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.standard.currency import changes
 from simnav.scenario import Scenario, load
 
-__all__ = ["Carried", "carry"]
+__all__ = ["LAST_DIGIT", "Carried", "carry"]
+
+#: Relative difference that the last digit in single precision makes. Another processor may round a score to the next.
+LAST_DIGIT = 2.0**-23
 
 _Row = tuple[str, str]
 
@@ -196,11 +199,10 @@ def _request(result: Result) -> EstimatorRequest:
 
 
 def _difference(stored: Result, fresh: Result) -> str:
-    """What is not the same; empty where all scores are, to the bit (those in single precision: once rounded)."""
+    """What is not the same; empty where all scores are, to the last digit that is stored."""
     if stored.status != fresh.status:
         return f"{stored.status} is stored, {fresh.status} came out"
-    found = compared(stored, fresh)
-    return listed([*found.different, *found.close])
+    return listed(compared(stored, fresh, LAST_DIGIT).different)
 
 
 def _rekeyed(result: Result, fresh: Result) -> Result:
