@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,13 +66,16 @@ def command(
         lines += [f"close: {text}" for text in done.close]
         lines += [f"not repeatable: {text}" for text in done.not_repeatable]
         if done.unknown:
-            names = ", ".join(done.unknown)
-            lines.append(f"not known here: {names} ('simnav --plugin FILE verify ...' loads a file of scores)")
+            lines.append(f"{_unknown(done.unknown)} ('simnav --plugin FILE verify ...' loads a file of scores)")
         same = done.repeated - len(done.close) - len(done.different) - len(done.not_repeatable)
         more = f", {len(done.close)} more within {CLOSE:.0e}" if done.close else ""
         lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")
         out.print(*lines)
         out.code = 0 if done.passed else FAILED
+
+
+def _unknown(scores: Sequence[str]) -> str:
+    return f"not known here: {', '.join(scores)}"
 
 
 def _print(out: Output, report: SubmissionReport) -> None:
@@ -89,6 +93,8 @@ def _print(out: Output, report: SubmissionReport) -> None:
             f"sealed:  {s.label} on {s.scenario}: {worse}, {s.ratio:.3g} times the median error, p = {s.p_value:.2g} "
             f"({s.sealed} sealed and {s.public} public runs, {s.failed} sealed runs failed)"
         )
+    if report.unknown:
+        lines.append(_unknown(report.unknown))
     lines.append(
         f"{report.identical} of {report.repeated} repeated runs are the same to the bit, {report.close} more within "
         f"{report.tolerance:.0e}"

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
+from simnav.leaderboard.campaign.verification import listed
 from simnav.leaderboard.profiles import load as load_profile
 from simnav.leaderboard.profiles import profiles
 from simnav.leaderboard.results import store
@@ -24,6 +26,7 @@ from simnav.leaderboard.submission.bundle import Bundle, open_bundle
 from simnav.leaderboard.submission.environment import clean_python, install_requirements, search_variables
 from simnav.leaderboard.submission.repetition import Again, Asked, Wanted
 from simnav.scenario import load as load_scenario
+from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.seal import Seal
@@ -92,6 +95,9 @@ class SubmissionReport:
         Largest relative difference of a score that counts as the same.
     different : tuple of str
         Runs that gave something else, and what.
+    unknown : tuple of str
+        Scores of the results that are not known where the runs were repeated, because a plug-in registers them. They
+        were not looked at.
     sealed : tuple of SealedRuns
         By estimator and scenario; empty without a key.
     """
@@ -109,6 +115,7 @@ class SubmissionReport:
     close: int
     tolerance: float
     different: tuple[str, ...]
+    unknown: tuple[str, ...]
     sealed: tuple[SealedRuns, ...]
 
     @property
@@ -181,13 +188,14 @@ def verify_bundle(
         )  # fmt: skip
         again, where = _repeated(python, asked, home, not present, report)
     known = {(r.scenario, r.estimator, r.seed): r for r in chosen}
-    identical, close, different = 0, 0, list[str]()
+    identical, close, different, unknown = 0, 0, list[str](), dict[str, None]()
     for run in (a for a in again if not a.sealed):
         before = known[run.scenario, run.label, run.seed]
         said = _difference(before, run, tolerance, where)
         identical += said == "" and _same_bits(before, run)
         close += said == "" and not _same_bits(before, run)
         different += [f"{run.label} on {run.scenario}, seed {run.seed}: {said}"] if said else []
+        unknown |= dict.fromkeys(n for n in before.scores if run.scores and n not in run.scores)
     missing = len(chosen) - identical - close - len(different)
     if missing > 0:
         findings.append(f"{missing} runs of the sample gave no answer")
@@ -195,7 +203,7 @@ def verify_bundle(
     return SubmissionReport(
         str(path), bundle.digest, contents.title, tuple(r.label for r in contents.estimators), contents.profile,
         len(results), tuple(findings), f"{'present' if present else 'clean'} environment: {_versions(where)}",
-        len(chosen), identical, close, tolerance, tuple(different),
+        len(chosen), identical, close, tolerance, tuple(different), tuple(unknown),
         _compared(results, [a for a in again if a.sealed]),
     )  # fmt: skip
 
@@ -346,12 +354,19 @@ def _versions(where: Provenance) -> str:
 
 
 def _compared_scores(before: Result, again: Again) -> dict[str, tuple[float, float]]:
-    """The scores of both but wall times; NaN where one lacks a score."""
-    names = [n for n in dict.fromkeys([*before.scores, *again.scores]) if not n.startswith("update_")]
+    """The scores that both have, wall times aside; a score of a plug-in may be known in one place only."""
     return {
-        n: (before.scores.get(n, math.nan), float.fromhex(again.scores[n]) if n in again.scores else math.nan)
-        for n in names
+        name: (value, float.fromhex(again.scores[name]))
+        for name, value in before.scores.items()
+        if name in again.scores and not name.startswith("update_")
     }
+
+
+def _removed(before: Result, again: Again) -> list[str]:
+    """Scores that the results lack, though simnav computed them then: the main one, and all of unchanged code."""
+    homes = same_code(before.scoring, scoring_code())
+    absent = (name for name in again.scores if name not in before.scores and not name.startswith("update_"))
+    return [name for name in absent if name == _SCORE or (name in SCORES and SCORES[name].__module__ in homes)]
 
 
 def _same_bits(before: Result, again: Again) -> bool:
@@ -374,6 +389,8 @@ def _difference(before: Result, again: Again, tolerance: float, where: Provenanc
         return "the results were not made with this source, this name and these parameters"
     if again.status != before.status:
         return f"it ended with {again.status} ({again.reason or 'no reason'}), and in the results with {before.status}"
+    if removed := _removed(before, again):
+        return f"the results lack {listed(removed)}"
     worst, text = tolerance, ""
     for name, (a, b) in _compared_scores(before, again).items():
         if a == b or (math.isnan(a) and math.isnan(b)):

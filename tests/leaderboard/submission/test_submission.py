@@ -198,12 +198,27 @@ def changed(made: Path, target: Path, change: Callable[[Path], None], *, hashes:
     return target
 
 
-def better_result(folder: Path) -> None:
+Scores = list[tuple[str, float]]
+
+
+def with_scores(folder: Path, change: Callable[[Scores], Scores]) -> None:
     (part,) = folder.glob("results/compacted/*.parquet")
     table = pq.read_table(part)
-    scores = [[(k, 0.9 * v if k == "horizontal_rmse" else v) for k, v in row] for row in table["scores"].to_pylist()]
     at = table.schema.get_field_index("scores")
-    pq.write_table(table.set_column(at, "scores", pa.array(scores, table.schema.field(at).type)), part)
+    scores = pa.array([change(row) for row in table["scores"].to_pylist()], table.schema.field(at).type)
+    pq.write_table(table.set_column(at, "scores", scores), part)
+
+
+def better_result(folder: Path) -> None:
+    with_scores(folder, lambda row: [(k, 0.9 * v if k == "horizontal_rmse" else v) for k, v in row])
+
+
+def without_a_score(folder: Path) -> None:
+    with_scores(folder, lambda row: [(k, v) for k, v in row if k != "r95"])
+
+
+def with_the_score_of_a_plug_in(folder: Path) -> None:
+    with_scores(folder, lambda row: [*row, ("my_score", 1.5)])
 
 
 def better_source(folder: Path) -> None:
@@ -246,6 +261,7 @@ def worse_and_fewer(folder: Path) -> None:
     [
         (worse_and_fewer, ("1 runs are missing, such as seed 1", "horizontal_rmse is", "relative difference 0.1)")),
         (better_source, ("the results were not made with this source",)),
+        (without_a_score, ("my_last_fix:MyLastFix(gain=0.9) on clean-voyages-v1, seed 0: the results lack r95",)),
     ],
 )
 @pytest.mark.usefixtures("here")
@@ -258,6 +274,15 @@ def test_a_change_that_renews_the_hashes_does_not_hold(
     for text in said:
         assert text in " ".join(done.stdout.split())
     assert "the submission does not hold" in done.stdout
+
+
+@pytest.mark.usefixtures("here")
+def test_a_score_of_a_plug_in_that_is_not_here_is_named_and_left_out(made: Path, tmp_path: Path) -> None:
+    bundle = changed(made, tmp_path / "own.zip", with_the_score_of_a_plug_in, hashes=True)
+    done = CliRunner().invoke(app, ["verify", str(bundle), "--present"])
+    assert done.exit_code == 0, done.stdout
+    assert "not known here: my_score" in done.stdout
+    assert "2 of 2 repeated runs are the same to the bit" in done.stdout
 
 
 def entry(name: str, *, mode: int = stat.S_IFREG | 0o644) -> zipfile.ZipInfo:
