@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.joseph import joseph_update, project
+from simnav.estimators.models.own_observation import OwnObservation
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
 
 __all__ = ["ErrorModel", "GaussMarkov", "Linearised", "Observation", "gauss_markov", "triad_bias"]
@@ -53,10 +56,13 @@ class ErrorModel(ABC):
         n.
     time : float
         Of the state [s].
+    own : mapping of str to OwnObservation
+        The instruments observed whose kind has a measurement equation of its own.
     """
 
     size: int
     time: float
+    own: Mapping[str, OwnObservation] = MappingProxyType({})
     #: Names of the arrays that `correct` changes.
     state: ClassVar[tuple[str, ...]] = ()
     #: Names of further arrays that `propagate` keeps from one call to the next.
@@ -106,6 +112,31 @@ class ErrorModel(ABC):
     @abstractmethod
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise at the present state; None where the measurement says nothing usable."""
+
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...]
+    ) -> tuple[Array, Array] | None:
+        """Innovation and Jacobian of a measurement of an instrument in ``own``, at any state.
+
+        Parameters
+        ----------
+        name : str
+            Name of the instrument.
+        time : float
+            Time of validity [s].
+        value : (d,) array
+            The measured value.
+        state : tuple of array
+            The arrays that describe a state of this model, as its chain keeps them.
+
+        Returns
+        -------
+        innovation : (d,) array
+            Measured minus predicted.
+        jacobian : (d, n) array
+            Derivative of the prediction. None in place of both where the state has no reading.
+        """
+        raise NotImplementedError(f"{type(self).__name__} observes no instrument with an equation of its own")
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
         """The noise alone, or None, as of `measure`; a model may know it without linearising."""

@@ -463,6 +463,27 @@ class Chain(ABC):
             Of the prediction with respect to the state there.
         """
 
+    def observe_own(self, first: int, row: NDArray[np.int64], jacobian: Array, *state: Array) -> None:
+        """`observe` for the aids whose kind has a measurement equation of its own.
+
+        Parameters
+        ----------
+        first, row, jacobian
+            As of `observe`.
+        *state : (K, ...) array
+            The states, as `simnav.estimators.models.base.ErrorModel.observe_own` takes one of them.
+        """
+        aids, own = self.aids, self.front.own
+        of_its_own = np.array([name in own for name in self.names])
+        for i in first + np.flatnonzero(of_its_own[aids["instrument"][first:]] & (row[first:] >= 0)):
+            name = self.names[aids["instrument"][i]]
+            d = len(own[name].kind.components)
+            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
+            at = tuple(column[row[i]] for column in state)
+            found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at)
+            if found is not None:
+                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
+
     @abstractmethod
     def move_folds(self, first: int) -> None:
         """Fill ``now_...`` and ``jacobian`` of the folds, from a row on, for the nodes as they are."""

@@ -364,11 +364,10 @@ class InertialModel(ErrorModel):
     def _state(self) -> State:
         return self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration
 
-    def observe_own(self, name: str, time: float, value: Array, state: State) -> tuple[Array, Array] | None:
-        """Innovation and Jacobian of a measurement whose kind has an equation of its own, at any state.
-
-        See `simnav.estimators.models.own_observation.OwnObservation.linearise`.
-        """
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...]
+    ) -> tuple[Array, Array] | None:
+        """As `ErrorModel.observe_own`; the state is position, velocity, DCM, angular rate, bias and calibration."""
         *moving, calibration = state
         own, size = self.own[name], _NAV + len(calibration)
         point = own.point(time, *moving)

@@ -400,7 +400,7 @@ class InertialChain(Chain):
             aids["components"],
         )  # fmt: skip
         if self.front.own:
-            self._observe_own(first, row, states, prefix, wide)
+            self.observe_own(first, row, wide, position, velocity, dcm, states["raw_rate"], bias, calibration)
         if wide is not jacobian:
             here = np.flatnonzero(row[first:] >= 0) + first
             jacobian[here] = wide[here, :, : self.size]
@@ -413,20 +413,6 @@ class InertialChain(Chain):
         position, velocity, dcm, bias, calibration = (folds[f"now_{name}"] for name in names)
         states = position, velocity, dcm, bias, calibration
         _move_folds(first, folds["transition"], folds["shift"], states, folds["jacobian"])
-
-    def _observe_own(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
-        """`observe` for the aids whose kind has a measurement equation of its own."""
-        aids, front = self.aids, self.front
-        position, velocity, dcm, bias, calibration = (states[prefix + name] for name in front.state)
-        for i in first + np.flatnonzero((self._known[0][aids["instrument"][first:]] == OWN) & (row[first:] >= 0)):
-            name = self.names[aids["instrument"][i]]
-            d = len(front.noise[name])
-            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
-            k = row[i]
-            at = position[k], velocity[k], dcm[k], states["raw_rate"][k], bias[k], calibration[k]
-            found = front.observe_own(name, aids["time"][i], aids["value"][i, :d], at)
-            if found is not None:
-                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""

@@ -2,7 +2,8 @@
 
 A kind may name one of the compiled equations (`simnav.kinds.EQUATIONS`), or be declared with a function that predicts a
 reading and gives its Jacobian (`simnav.kinds.Observation`; see ``docs/how-to/add-an-instrument.md``). Such functions
-are used here, for every model over the inertial state, in filters and graphs.
+are used here, for every model over the inertial state, in filters and graphs; for a ship without an IMU see
+`simnav.estimators.models.ship_observation`.
 """
 
 from __future__ import annotations

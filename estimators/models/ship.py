@@ -43,7 +43,8 @@ from simnav.estimators.models.ship_kernels import (
     describe_ship,
     observe_ship,
 )
-from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from simnav.estimators.models.ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
+from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 
@@ -51,8 +52,6 @@ __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 POSITIONS = (kinds.POSITION, kinds.HORIZONTAL_POSITION)
 VELOCITIES = (kinds.VELOCITY, kinds.BODY_VELOCITY, kinds.WATER_SPEED)
 OBSERVED = (*POSITIONS, *VELOCITIES, kinds.HEADING)
-#: Roll and pitch that a lever arm is not corrected for, one sigma [rad].
-HEEL = 0.03
 
 
 class ShipModel(ErrorModel):
@@ -83,6 +82,8 @@ class ShipModel(ErrorModel):
         Inverse of the correlation times [1/s], and noise densities.
     aids : dict of str to (3,) array of int, (7,) array, int
         The instruments observed, as `simnav.estimators.models.ship_kernels` has them, and their number of components.
+    own : dict of str to ShipObservation
+        The instruments observed whose kind has a measurement equation of its own.
     bias_at, scale_at : dict of str to int
         Index in the state of an instrument's first bias, and of its scale factor.
     """
@@ -105,8 +106,8 @@ class ShipModel(ErrorModel):
         self.sway = sway
 
     def observes(self, instrument: Datasheet) -> bool:
-        """Whether it is a position, velocity, speed or heading."""
-        return instrument.equation in OBSERVED
+        """Whether it is a position, velocity, speed or heading, or of a kind with an observation of its own."""
+        return instrument.equation in OBSERVED or KINDS[instrument.kind].observation is not None
 
     @property
     def needs(self) -> Needs:
@@ -139,9 +140,10 @@ class ShipModel(ErrorModel):
         self.bias_at: dict[str, int] = {}
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
-            if sheet.equation not in (kinds.HEADING, *POSITIONS, kinds.WATER_SPEED):
+            own = KINDS[sheet.kind].observation is not None
+            if not own and sheet.equation not in (kinds.HEADING, *POSITIONS, kinds.WATER_SPEED):
                 continue
-            d = 2 if sheet.equation in POSITIONS else 1
+            d = len(sheet.sigma) if own else 2 if sheet.equation in POSITIONS else 1
             biases = [
                 gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
                 for b, s in zip(sheet.bias[:d], sheet.bias_instability[:d])
@@ -156,6 +158,7 @@ class ShipModel(ErrorModel):
         self.decay = np.array([0.0, 0.0, *(s.decay for s in states)])
         self.density = np.array([0.0, 0.0, *(s.noise for s in states)])
         self.transition = np.eye(n)
+        self._height_variance = float(start.covariance[2, 2])
         self._tabulate()
         psi = float(start.attitude[2])
         self.x = np.zeros(n)  # u, psi, r, c, biases at their indices; the position is kept apart
@@ -176,14 +179,17 @@ class ShipModel(ErrorModel):
         self.x += gain @ residual
         joseph = np.eye(n) - gain @ H
         P = joseph @ P @ joseph.T + gain @ noise @ gain.T
-        self._height_variance = float(start.covariance[2, 2])
         return np.ascontiguousarray(P)
 
     def _tabulate(self) -> None:
-        """The instruments, for the kernels."""
+        """The instruments: those for the kernels, and those with an equation of their own."""
         self.aids: dict[str, tuple[NDArray[np.int64], Array, int]] = {}
+        self.own: dict[str, ShipObservation] = {}
         for name, sheet in self.instruments.items():
-            if self.observes(sheet):
+            if KINDS[sheet.kind].observation is not None:
+                bias_at, white = self.bias_at.get(name, -1), _white(sheet)
+                self.own[name] = ShipObservation(sheet, bias_at, white, self._height_variance, self.sway**2)
+            elif self.observes(sheet):
                 kind, numbers = _aid(sheet, self.sway)
                 code = np.array([kind, self.bias_at.get(name, -1), self.scale_at.get(name, -1)], dtype=np.int64)
                 self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
@@ -203,11 +209,21 @@ class ShipModel(ErrorModel):
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement."""
+        if measurement.instrument in self.own:
+            own = self.own[measurement.instrument]
+            return own.measure(measurement.time, measurement.value, self.position, self.x)
         code, aid, m = self.aids[measurement.instrument]
         residual, jacobian, noise = np.empty(m), np.zeros((m, self.size)), np.empty((m, m))
         first, second = float(measurement.value[0]), float(measurement.value[m - 1])
         observe_ship(code, aid, self.position, self.x, first, second, residual, jacobian, noise)
         return Linearised(residual, jacobian, noise)
+
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...]
+    ) -> tuple[Array, Array] | None:
+        """As `ErrorModel.observe_own`; the state is ``position, x``."""
+        found = self.own[name].measure(time, value, *state)
+        return None if found is None else (found.innovation, found.jacobian)
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
@@ -218,7 +234,7 @@ class ShipModel(ErrorModel):
         psi = float(self.x[PSI])
         velocity, full = np.zeros(3), np.zeros((9, 9))
         describe_ship(self.x, covariance, self.sway, velocity, full)
-        full[2, 2], full[5, 5] = self._height_variance, 1.0
+        full[2, 2], full[5, 5] = self._height_variance, VERTICAL_SPEED**2
         full[6, 6] = full[7, 7] = HEEL**2
         return Estimate(self.time, self.position.copy(), velocity, np.array([0.0, 0.0, wrap(psi)]), full, ESTIMATED)
 
@@ -226,8 +242,7 @@ class ShipModel(ErrorModel):
 def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
     """Kind and numbers of an instrument, for the kernels (`simnav.estimators.models.ship_kernels`)."""
     lx, ly, lz = sheet.lever_arm.tolist()
-    fast = sheet.correlation_time < 0.5 / sheet.rate
-    white = sheet.sigma**2 + (sheet.bias_instability**2 if fast else 0.0)
+    fast, white = _fast(sheet), _white(sheet)
     if sheet.equation in (kinds.HEADING, kinds.WATER_SPEED):
         kind = LOG if sheet.equation == kinds.WATER_SPEED else HEADING
         return kind, [lx, ly, float(white[0]), 0.0, 0.0, 0.0, 0.0]
@@ -240,6 +255,16 @@ def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
         return VELOCITY, [lx, ly, *white.tolist(), sway**2, 0.0, 0.0]
     white = white + (HEEL * sway) ** 2
     return BODY_VELOCITY, [lx, ly, *white.tolist(), sway**2, sheet.scale**2, float(sheet.misalignment[2]) ** 2]
+
+
+def _fast(sheet: Datasheet) -> bool:
+    """Whether the in-run bias changes from one measurement to the next, so that it is white noise."""
+    return sheet.correlation_time < 0.5 / sheet.rate
+
+
+def _white(sheet: Datasheet) -> Array:
+    """(d,) variances of the white noise."""
+    return np.asarray(sheet.sigma**2 + (sheet.bias_instability**2 if _fast(sheet) else 0.0))
 
 
 def _stationary(sigma: float, time: float) -> GaussMarkov:

@@ -20,6 +20,7 @@ from simnav.compiled import kernel
 from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_kernels import (
+    VELOCITY,
     E,
     N,
     decay_of,
@@ -231,6 +232,8 @@ class ShipChain(Chain):
         for i, name in enumerate(self.names):
             if name in known:
                 self._codes[i], self._aids[i], _ = known[name]
+            else:  # no bias: what the compiled loop writes for it is overwritten
+                self._codes[i] = VELOCITY, -1, -1
         return covariance
 
     def linearise_motion(self, first: int = 0) -> None:
@@ -248,6 +251,8 @@ class ShipChain(Chain):
             first, (row, aids["instrument"], aids["value"]), self._codes, self._aids,
             states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
         )  # fmt: skip
+        if self.front.own:
+            self.observe_own(first, row, jacobian, states[f"{prefix}position"], states[f"{prefix}x"])
 
     def move_folds(self, first: int) -> None:
         """As `Chain.move_folds`, by the model's own step."""

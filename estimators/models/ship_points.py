@@ -48,6 +48,9 @@ class ShipPoints(ShipModel, PointModel):
 
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
         """What the instrument should read at the points, minus what it should read at the state."""
+        if measurement.instrument in self.own:
+            own = self.own[measurement.instrument]
+            return own.differences_at(measurement.time, self.position, self.x, errors)
         reading = self.read(measurement, self.states(np.concatenate([np.zeros((1, self.size)), errors])))
         difference = reading[1:] - reading[0]
         if self.instruments[measurement.instrument].equation == HEADING:

@@ -1,0 +1,125 @@
+"""Readings of instruments whose kind has a measurement equation of its own, at the state of a ship.
+
+Such an equation takes a whole navigation state (`simnav.kinds.Observation`). A ship's state has fewer components
+(`simnav.estimators.models.ship`): the vessel is level, at the height of the start, and moves ahead through the water.
+What a reading depends on beyond that is noise: height, vertical speed, roll and pitch, and the sideways velocity.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+
+from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.ship_kernels import CE, CN, PSI, E, N, R, U, displace_ship
+from simnav.kinds import NavigationPoint
+from simnav.types import Array, Datasheet
+
+__all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation"]
+
+#: Roll and pitch, which the model takes for zero, one sigma [rad].
+HEEL = 0.03
+#: Vertical speed, which the model takes for zero, one sigma [m/s].
+VERTICAL_SPEED = 1.0
+
+
+class ShipObservation(OwnObservation):
+    """The measurement equation of one instrument on a ship.
+
+    Parameters
+    ----------
+    sheet : Datasheet
+        Datasheet of the instrument, of a kind with an observation.
+    bias_at : int
+        Index of the instrument's first bias in the state; -1 if it has none.
+    white : (d,) array
+        Variance of the white noise of each component, in the units of the kind.
+    height, sway : float
+        Variance of the height [m^2], and of the sideways velocity [(m/s)^2].
+    """
+
+    def __init__(self, sheet: Datasheet, bias_at: int, white: Array, height: float, sway: float):
+        super().__init__(sheet)
+        self._bias_at, self._white, self._sway = bias_at, np.diag(white), sway
+        self._unknown = np.diag([0.0, 0.0, height, 0.0, 0.0, VERTICAL_SPEED**2, HEEL**2, HEEL**2, 0.0])
+
+    def measure(self, time: float, value: Array, position: Array, x: Array) -> Linearised | None:
+        """Linearise one measurement.
+
+        Parameters
+        ----------
+        time : float
+            Time of validity [s].
+        value : (d,) array
+            The measured value.
+        position, x : (3,), (n,) array
+            State of the ship (`simnav.estimators.models.ship_kernels`).
+
+        Returns
+        -------
+        Linearised or None
+            None where the state has no reading.
+        """
+        predicted = self.predict(_point(time, position, x))
+        if predicted is None:
+            return None
+        reading, own = predicted
+        jacobian, at, d = own @ _navigation(x), self._bias_at, len(reading)
+        if at >= 0:
+            jacobian[:, at : at + d] = np.eye(d)
+            reading = self.kind.add_error(reading, x[at : at + d])
+        aside = self._sway**0.5 * (own[:, 4] * cos(x[PSI]) - own[:, 3] * sin(x[PSI]))
+        noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
+        return Linearised(self.kind.difference(value, reading), jacobian, noise)
+
+    def differences_at(self, time: float, position: Array, x: Array, errors: Array) -> Array:
+        """What the instrument should read at k states, minus what it should read at one.
+
+        Parameters
+        ----------
+        time : float
+            Time of validity [s].
+        position, x : (3,), (n,) array
+            The state that the k states are compared with; it has a reading.
+        errors : (k, n) array
+            Differences of the k states from it: metres north and east, then those of ``x``.
+
+        Returns
+        -------
+        (k, d) array
+            A state that has no reading gets the difference by the Jacobian.
+        """
+        predicted = self.predict(_point(time, position, x))
+        assert predicted is not None, "the model's own state has a reading"
+        reading, own = predicted
+        differences = errors @ (own @ _navigation(x)).T
+        for k, error in enumerate(errors):
+            there = position.copy()
+            displace_ship(there, error[N], error[E])
+            found = self.predict(_point(time, there, x + error))
+            if found is not None:
+                differences[k] = self.kind.difference(found[0], reading)
+        at = self._bias_at
+        if at >= 0:
+            differences += errors[:, at : at + len(reading)]
+        return differences
+
+
+def _point(time: float, position: Array, x: Array) -> NavigationPoint:
+    """The navigation state of a ship."""
+    c, s = cos(x[PSI]), sin(x[PSI])
+    velocity = np.array([x[U] * c + x[CN], x[U] * s + x[CE], 0.0])
+    dcm = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return NavigationPoint(time, position, velocity, dcm, np.array([0.0, 0.0, x[R]]))
+
+
+def _navigation(x: Array) -> Array:
+    """(9, n) derivative of the navigation state's error with respect to that of the ship's state."""
+    c, s = cos(x[PSI]), sin(x[PSI])
+    G = np.zeros((9, len(x)))
+    G[0, N] = G[1, E] = G[3, CN] = G[4, CE] = G[8, PSI] = 1.0
+    G[3, U], G[3, PSI] = c, -x[U] * s
+    G[4, U], G[4, PSI] = s, x[U] * c
+    return G
