@@ -286,12 +286,16 @@ def _hints(make: Callable[..., Any]) -> dict[str, Any]:
 def documented(make: Callable[..., Any]) -> dict[str, tuple[str, str]]:
     """What numpydoc docstrings say of parameters: type and meaning by name, a class's own before its bases'.
 
+    An entry without a type, as "window, tolerance / As for `WindowEstimator`.", refers to the documentation of a base,
+    and counts where there is none.
+
     Parameters
     ----------
     make : callable
         A class or a function.
     """
     found: dict[str, tuple[str, str]] = {}
+    references: dict[str, tuple[str, str]] = {}
     for each in make.__mro__ if isinstance(make, type) else (make,):
         text = inspect.cleandoc(vars(each).get("__doc__") or "") if isinstance(each, type) else inspect.getdoc(each)
         for section in re.findall(
@@ -300,5 +304,5 @@ def documented(make: Callable[..., Any]) -> dict[str, tuple[str, str]]:
             for head, body in re.findall(r"^(\S[^\n]*)\n?((?:(?:[ ]+[^\n]*)?(?:\n|\Z))*)", section, re.M):
                 names, _, sort = head.partition(" : ")
                 for name in names.split(", "):
-                    found.setdefault(name, (sort, inspect.cleandoc(body)))
-    return found
+                    (found if sort else references).setdefault(name, (sort, inspect.cleandoc(body)))
+    return references | found

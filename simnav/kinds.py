@@ -1,4 +1,4 @@
-"""Kinds of aiding instruments: what each of them measures, and what follows from that for everybody else.
+"""Kinds of aiding instruments, and their datasheets: what each measures, and what follows from that for everybody else.
 
 A kind is declared once, beside the instrument of its name (``simnav/sensors/gnss.py`` and others, or a file of a third
 party; see ``docs/how-to/add-an-instrument.md``). Whatever depends on the kind of an instrument asks `KINDS`: how an
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, nextafter, pi
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from simnav.compiled import Array, kernel
 from simnav.geometry.earth import displace_scalar, relative_position
 from simnav.geometry.rotation import wrap_angle, wrap_scalar
 from simnav.plugins import PluginError, Registry
-
-if TYPE_CHECKING:
-    from simnav.types import Datasheet
 
 __all__ = [
     "BODY_VELOCITY",
@@ -36,6 +33,7 @@ __all__ = [
     "VELOCITY",
     "WATER_SPEED",
     "Component",
+    "Datasheet",
     "Kind",
     "NavigationPoint",
     "Observation",
@@ -358,6 +356,74 @@ class _Kinds(Mapping[str, Kind]):
 
 #: Every kind of aiding instrument that is known. A scenario may carry several instruments of one kind.
 KINDS: Mapping[str, Kind] = _Kinds()
+
+
+def _zeros3() -> Array:
+    return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Datasheet:
+    """Datasheet of one aiding instrument, as an estimator sees it.
+
+    All error figures are one sigma, in the units of ``KINDS[kind].errors`` (d components).
+
+    Attributes
+    ----------
+    name, kind : str
+        ``name`` is unique in a scenario; ``kind`` is a key of `KINDS`.
+    rate, phase : float
+        Sample rate [Hz] and time of the first sample [s].
+    sigma : (d,) array
+        White noise of a measurement.
+    bias : (d,) array
+        Turn-on bias, constant in a run.
+    bias_instability : (d,) array
+        Stationary sigma of the in-run (first-order Gauss-Markov) bias.
+    correlation_time : float
+        Of the in-run bias [s]; where it is infinite, ``bias_instability`` is a random walk per
+        sqrt(s).
+    scale : float
+        Scale-factor error [-].
+    misalignment : (3,) array
+        Mounting misalignment about the body axes [rad].
+    lever_arm : (3,) array
+        From the IMU (or the vessel's reference point) to the instrument, body axes [m].
+    details : mapping
+        What the datasheet of this kind holds beyond the above (``KINDS[kind].datasheet``), SI units and radians.
+    """
+
+    name: str
+    kind: str
+    rate: float
+    sigma: Array
+    phase: float = 0.0
+    bias: Array = field(default_factory=lambda: np.zeros(1))
+    bias_instability: Array = field(default_factory=lambda: np.zeros(1))
+    correlation_time: float = inf
+    scale: float = 0.0
+    misalignment: Array = field(default_factory=_zeros3)
+    lever_arm: Array = field(default_factory=_zeros3)
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"unknown kind of instrument {self.kind!r}; there are: {', '.join(KINDS)}")
+        d = len(KINDS[self.kind].errors)
+        for name in ("sigma", "bias", "bias_instability"):
+            value = np.broadcast_to(np.asarray(getattr(self, name), dtype=np.float64), (d,)).copy()
+            object.__setattr__(self, name, value)
+
+    @property
+    def role(self) -> Role:
+        """What an instrument of this kind is to a navigator (`Kind`)."""
+        return KINDS[self.kind].role
+
+    @property
+    def equation(self) -> str:
+        """The compiled measurement equation of this kind; empty where it has none, or one of its own."""
+        equation = KINDS[self.kind].equation
+        return equation if isinstance(equation, str) else ""
 
 
 def kinds_with(*equations: str) -> list[str]:

@@ -32,7 +32,15 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.geometry.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
-from simnav.geometry.rotation import cross, dcm_from_rpy, rotation_coefficients, rpy_from_dcm
+from simnav.geometry.rotation import (
+    cross,
+    dcm_from_rpy,
+    rotate_left,
+    rotate_right,
+    rotated,
+    rotation_coefficients,
+    rpy_from_dcm,
+)
 from simnav.types import Array, ImuSamples, NavigationStates
 
 #: Divisions by constants are products here: the compiler may not turn one into the other by itself.
@@ -136,26 +144,7 @@ def mechanize_step(
     position[2] -= dt * m2
     rotate_right(dcm, r0, r1, r2, sa, b)
     sz, bz = rotation_coefficients(z0 * z0 + z1 * z1 + z2 * z2)
-    for j in range(3):
-        c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
-        x0, x1, x2 = cross(z0, z1, z2, c0, c1, c2)
-        y0, y1, y2 = cross(z0, z1, z2, x0, x1, x2)
-        dcm[0, j] = c0 - sz * x0 + bz * y0
-        dcm[1, j] = c1 - sz * x1 + bz * y1
-        dcm[2, j] = c2 - sz * x2 + bz * y2
-
-
-@kernel()
-def rotate_right(dcm: Array, r0: float, r1: float, r2: float, a: float, b: float) -> None:
-    """``dcm = dcm exp(r x)`` in place, with the coefficients a, b of `rotation_coefficients`."""
-    for i in range(3):
-        c0, c1, c2 = dcm[i, 0], dcm[i, 1], dcm[i, 2]
-        # A row times [r x] is row x r.
-        x0, x1, x2 = cross(c0, c1, c2, r0, r1, r2)
-        y0, y1, y2 = cross(x0, x1, x2, r0, r1, r2)
-        dcm[i, 0] = c0 + a * x0 + b * y0
-        dcm[i, 1] = c1 + a * x1 + b * y1
-        dcm[i, 2] = c2 + a * x2 + b * y2
+    rotate_left(dcm, z0, z1, z2, -sz, bz, dcm)  # the other way round: exp(-zeta x)
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
@@ -280,9 +269,9 @@ def sample_from_motion(
     z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
     # Body rotation: exp(phi x) = C' exp(zeta x) D
     sz, bz = rotation_coefficients(z0 * z0 + z1 * z1 + z2 * z2)
-    b00, b10, b20 = _rotated(z0, z1, z2, sz, bz, d[0], d[3], d[6])
-    b01, b11, b21 = _rotated(z0, z1, z2, sz, bz, d[1], d[4], d[7])
-    b02, b12, b22 = _rotated(z0, z1, z2, sz, bz, d[2], d[5], d[8])
+    b00, b10, b20 = rotated(z0, z1, z2, sz, bz, d[0], d[3], d[6])
+    b01, b11, b21 = rotated(z0, z1, z2, sz, bz, d[1], d[4], d[7])
+    b02, b12, b22 = rotated(z0, z1, z2, sz, bz, d[2], d[5], d[8])
     # Twice the sine of the angle times its axis, from the skew part; and twice the cosine plus one from the trace.
     x0 = (c[2] * b01 + c[5] * b11 + c[8] * b21) - (c[1] * b02 + c[4] * b12 + c[7] * b22)
     x1 = (c[0] * b02 + c[3] * b12 + c[6] * b22) - (c[2] * b00 + c[5] * b10 + c[8] * b20)
@@ -338,16 +327,6 @@ def sample_from_motion(
         a0 * inverse, a1 * inverse, a2 * inverse, n0 * inverse, n1 * inverse, n2 * inverse,
         dt * m0 * per_north, dt * m1 * per_east, -dt * m2, e0, e2,
     )  # fmt: skip
-
-
-@kernel()
-def _rotated(
-    z0: float, z1: float, z2: float, a: float, b: float, c0: float, c1: float, c2: float
-) -> tuple[float, float, float]:
-    """``exp(z x) c`` with the coefficients a, b of `rotation_coefficients`."""
-    x0, x1, x2 = cross(z0, z1, z2, c0, c1, c2)
-    y0, y1, y2 = cross(z0, z1, z2, x0, x1, x2)
-    return c0 + a * x0 + b * y0, c1 + a * x1 + b * y1, c2 + a * x2 + b * y2
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")

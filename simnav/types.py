@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import Array, Flags, Integers
-from simnav.kinds import KINDS, Kind, Role
+from simnav.kinds import KINDS, Datasheet, Kind, Role
 
 __all__ = [
     "COMPONENTS",
@@ -112,74 +112,6 @@ class ImuDatasheet:
     gyroscope: TriadDatasheet
     accelerometer: TriadDatasheet
     name: str = "imu"
-
-
-def _zeros3() -> Array:
-    return np.zeros(3)
-
-
-@dataclass(frozen=True, eq=False)
-class Datasheet:
-    """Datasheet of one aiding instrument, as an estimator sees it.
-
-    All error figures are one sigma, in the units of ``KINDS[kind].errors`` (d components).
-
-    Attributes
-    ----------
-    name, kind : str
-        ``name`` is unique in a scenario; ``kind`` is a key of `KINDS`.
-    rate, phase : float
-        Sample rate [Hz] and time of the first sample [s].
-    sigma : (d,) array
-        White noise of a measurement.
-    bias : (d,) array
-        Turn-on bias, constant in a run.
-    bias_instability : (d,) array
-        Stationary sigma of the in-run (first-order Gauss-Markov) bias.
-    correlation_time : float
-        Of the in-run bias [s]; where it is infinite, ``bias_instability`` is a random walk per
-        sqrt(s).
-    scale : float
-        Scale-factor error [-].
-    misalignment : (3,) array
-        Mounting misalignment about the body axes [rad].
-    lever_arm : (3,) array
-        From the IMU (or the vessel's reference point) to the instrument, body axes [m].
-    details : mapping
-        What the datasheet of this kind holds beyond the above (``KINDS[kind].datasheet``), SI units and radians.
-    """
-
-    name: str
-    kind: str
-    rate: float
-    sigma: Array
-    phase: float = 0.0
-    bias: Array = field(default_factory=lambda: np.zeros(1))
-    bias_instability: Array = field(default_factory=lambda: np.zeros(1))
-    correlation_time: float = np.inf
-    scale: float = 0.0
-    misalignment: Array = field(default_factory=_zeros3)
-    lever_arm: Array = field(default_factory=_zeros3)
-    details: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ValueError(f"unknown kind of instrument {self.kind!r}; there are: {', '.join(KINDS)}")
-        d = len(KINDS[self.kind].errors)
-        for name in ("sigma", "bias", "bias_instability"):
-            value = np.broadcast_to(np.asarray(getattr(self, name), dtype=np.float64), (d,)).copy()
-            object.__setattr__(self, name, value)
-
-    @property
-    def role(self) -> Role:
-        """What an instrument of this kind is to a navigator (`simnav.kinds.Kind`)."""
-        return KINDS[self.kind].role
-
-    @property
-    def equation(self) -> str:
-        """The compiled measurement equation of this kind; empty where it has none, or one of its own."""
-        equation = KINDS[self.kind].equation
-        return equation if isinstance(equation, str) else ""
 
 
 class Instruments(Mapping[str, Datasheet]):

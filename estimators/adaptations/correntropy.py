@@ -10,7 +10,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import NoiseAdaptation, posterior
-from simnav.types import Array, Instruments
+from simnav.types import Array
 
 __all__ = ["MaximumCorrentropy", "correntropy_noise"]
 
@@ -105,11 +105,6 @@ class MaximumCorrentropy(NoiseAdaptation):
             raise ValueError(f"begin = {begin!r}: it must be 'update' or 'prediction'")
         self.bandwidth, self.iterations, self.smallest, self.begin = bandwidth, iterations, smallest, begin
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self._weights = {name: f"weight.{name}" for name in instruments}
-
     def choose(self, innovation: Innovation) -> Array:
         """The noise over the weights; reports the least of them."""
         nominal = innovation.noise
@@ -118,5 +113,5 @@ class MaximumCorrentropy(NoiseAdaptation):
             innovation.residual, innovation.predicted, nominal, self.bandwidth, self.smallest, self.iterations,
             self.begin == "update", noise,
         )  # fmt: skip
-        self.report(self._weights[innovation.measurement.instrument], least)
+        self.report(f"weight.{innovation.measurement.instrument}", least)
         return noise

@@ -204,7 +204,6 @@ class InnovationBased(EstimatedNoise):
         """Begin a run."""
         super().reset(instruments)
         self._windows: dict[str, _Window] = {}
-        self._lengths = {name: f"window.{name}" for name in instruments}
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate."""
@@ -243,7 +242,7 @@ class InnovationBased(EstimatedNoise):
             window.estimate,
         )  # fmt: skip
         self._length = length
-        self.report(self._lengths[name], length)
+        self.report(f"window.{name}", length)
         return window.estimate
 
 

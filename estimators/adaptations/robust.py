@@ -8,7 +8,7 @@ from functools import partial
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import NoiseAdaptation, scaled
 from simnav.estimators.adaptations.prediction import standardised
-from simnav.types import Array, Instruments
+from simnav.types import Array
 
 __all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "igg3"]
 
@@ -61,16 +61,11 @@ class EquivalentWeights(NoiseAdaptation):
             raise ValueError(f"smallest = {smallest:g}: it must lie in (0, 1]")
         self.weight, self.smallest = weight, smallest
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self._weights = {name: f"weight.{name}" for name in instruments}
-
     def choose(self, innovation: Innovation) -> Array:
         """The noise over the weights; reports the least of them."""
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
         least = max(self.weight(max(map(abs, components))), self.smallest)
-        self.report(self._weights[innovation.measurement.instrument], least)
+        self.report(f"weight.{innovation.measurement.instrument}", least)
         if least == 1.0:
             return innovation.noise
         weights = [max(self.weight(u), self.smallest) for u in components[: len(innovation.residual)]]

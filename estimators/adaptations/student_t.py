@@ -7,8 +7,8 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import NoiseAdaptation, posterior
-from simnav.estimators.algebra.cholesky import factorise
-from simnav.types import Array, Instruments
+from simnav.estimators.algebra.cholesky import factorise, invert_factor
+from simnav.types import Array
 
 __all__ = ["StudentT", "normalised_trace", "student_weight"]
 
@@ -17,16 +17,10 @@ __all__ = ["StudentT", "normalised_trace", "student_weight"]
 def normalised_trace(noise: Array, residual: Array, spread: Array) -> float:
     """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A; -1 where R is singular."""
     m = residual.size
-    L, pivot = noise.copy(), np.empty(m)
-    if not factorise(L, m, 1e-14, pivot):
+    L, inverse = noise.copy(), np.empty((m, m))
+    if not factorise(L, m, 1e-14, np.empty(m)):
         return -1.0
-    inverse = np.zeros((m, m))  # of L
-    for c in range(m):
-        for r in range(c, m):
-            x = 1.0 if r == c else 0.0
-            for k in range(c, r):
-                x -= L[r, k] * inverse[k, c]
-            inverse[r, c] = x / L[r, r]
+    invert_factor(L, m, inverse)
     total = 0.0
     for r in range(m):
         for i in range(r + 1):
@@ -97,13 +91,8 @@ class StudentT(NoiseAdaptation):
             raise ValueError(f"turns = {turns}: it must be at least 1")
         self.dof, self.turns = min(dof, 1e12), turns
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self._weights = {name: f"weight.{name}" for name in instruments}
-
     def choose(self, innovation: Innovation) -> Array:
         """The noise over the weight, which is reported."""
         weight = student_weight(innovation.residual, innovation.predicted, innovation.noise, self.dof, self.turns)
-        self.report(self._weights[innovation.measurement.instrument], weight)
+        self.report(f"weight.{innovation.measurement.instrument}", weight)
         return np.asarray(innovation.noise / weight)

@@ -40,7 +40,9 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.cholesky import factorise
 from simnav.types import Array, Integers
 
-__all__ = ["Aids", "Elimination", "after_step", "half_squares", "keep_weights", "solve_chain", "whiten"]
+__all__ = [
+    "Aids", "Elimination", "after_step", "error_after_step", "half_squares", "keep_weights", "solve_chain", "whiten",
+]  # fmt: skip
 
 #: A factor of less weight than this counts for nothing.
 LEAST_WEIGHT = 1e-9
@@ -352,6 +354,17 @@ def solve_chain(
     return largest, older
 
 
+@kernel()
+def error_after_step(error: Array, F: Array, older: Array, newer: Array, after: Array) -> None:
+    """The error of a motion that a step of the nodes at its ends leaves, ``after = e + dx_k+1 - F dx_k``."""
+    n = error.size
+    for r in range(n):
+        x = error[r] + newer[r]
+        for c in range(n):
+            x -= F[r, c] * older[c]
+        after[r] = x
+
+
 @kernel(
     "void(f8[:, ::1], UniTuple(f8[:, ::1], 2), "
     "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
@@ -384,11 +397,7 @@ def after_step(
             predicted_shift[k, r] -= step[k, r]
             filtered_shift[k, r] -= step[k, r]
     for k in range(error.shape[0]):
-        for r in range(n):
-            x = error[k, r] + step[k + 1, r]
-            for c in range(n):
-                x -= transition[k, r, c] * step[k, c]
-            error[k, r] = x
+        error_after_step(error[k], transition[k], step[k], step[k + 1], error[k])
         norm[k] = _whiten(error[k], whitener[k], whitened[k])
     for i in range(node.size):
         k = node[i] - base

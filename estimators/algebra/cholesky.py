@@ -1,4 +1,4 @@
-"""The Cholesky factor of a small covariance, in place, for all kernels that need one."""
+"""The Cholesky factor of a small covariance, its inverse, and what it solves, for all kernels that need one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import sqrt
 from simnav.compiled import kernel
 from simnav.types import Array
 
-__all__ = ["factorise"]
+__all__ = ["factorise", "invert_factor", "solve_factor"]
 
 
 @kernel()
@@ -45,3 +45,49 @@ def factorise(L: Array, m: int, least: float, pivot: Array) -> bool:
                 L[i, i], pivot[i] = 0.0, 0.0
                 definite = False
     return definite
+
+
+@kernel()
+def solve_factor(L: Array, m: int, v: Array) -> None:
+    """Overwrite the first m components of a vector with ``L^-1 v``.
+
+    Parameters
+    ----------
+    L : (>= m, >= m) array
+        As `factorise` leaves it. A component that has no pivot becomes zero.
+    m : int
+        Number of components.
+    v : (>= m,) array
+        Overwritten.
+    """
+    for i in range(m):
+        x = v[i]
+        for k in range(i):
+            x -= L[i, k] * v[k]
+        v[i] = x / L[i, i] if L[i, i] > 0.0 else 0.0
+
+
+@kernel()
+def invert_factor(L: Array, m: int, inverse: Array) -> None:
+    """The inverse of a Cholesky factor.
+
+    Parameters
+    ----------
+    L : (>= m, >= m) array
+        As `factorise` leaves it.
+    m : int
+        Number of components.
+    inverse : (m, m) array
+        Overwritten: lower triangular, with a row of zeros for a component that has no pivot.
+    """
+    for i in range(m):
+        for j in range(m):
+            inverse[i, j] = 0.0
+        if L[i, i] == 0.0:
+            continue
+        for j in range(i):
+            x = 0.0
+            for k in range(j, i):
+                x -= L[i, k] * inverse[k, j]
+            inverse[i, j] = x / L[i, i]
+        inverse[i, i] = 1.0 / L[i, i]

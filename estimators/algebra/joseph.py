@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.cholesky import factorise
+from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.types import Array
 
 __all__ = ["joseph_update", "project"]
@@ -94,12 +94,11 @@ def joseph_update(
             for k in range(i + 1, m):
                 x -= L[k, i] * gain[r, k]
             gain[r, i] = x / L[i, i]
+    for i in range(m):
+        white[i] = residual[i]
+    solve_factor(L, m, white)
     nis = 0.0
     for i in range(m):
-        x = residual[i]
-        for k in range(i):
-            x -= L[i, k] * white[k]
-        white[i] = x / L[i, i]
         nis += white[i] * white[i]
     for r in range(n):
         x = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.cholesky import factorise
+from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.types import Array
 
 __all__ = ["whitening"]
@@ -25,14 +25,4 @@ def whitening(covariance: Array, whitener: Array) -> None:
     n = covariance.shape[0]
     L = covariance.copy()
     factorise(L, n, 1e-13, np.empty(n))
-    for i in range(n):
-        for j in range(n):
-            whitener[i, j] = 0.0
-        if L[i, i] == 0.0:
-            continue
-        for j in range(i):
-            x = 0.0
-            for k in range(j, i):
-                x += L[i, k] * whitener[k, j]
-            whitener[i, j] = -x / L[i, i]
-        whitener[i, i] = 1.0 / L[i, i]
+    invert_factor(L, n, whitener)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
 from simnav.estimators.learning.reference import Events
@@ -104,7 +105,7 @@ def observe(
     ahead, moved = np.empty(n), np.empty(n)
     counts = np.empty(places, np.int64)
     spread = np.empty((3, 3))
-    white = np.empty(3)
+    white, pivot = np.empty(3), np.empty(3)
     for b in range(first.size):
         if not active[b]:
             continue
@@ -152,22 +153,10 @@ def observe(
                     memory[b, at, 1 + i] += gain * (_clipped(x) - memory[b, at, 1 + i])
                     if seen:
                         row[base + 1 + i] = _clipped(x / WHITE)
-                # Normalised innovation squared by the Cholesky factor, in place
+                factorise(spread, m, 0.0, pivot)
+                solve_factor(spread, m, white)
                 nis = 0.0
                 for i in range(m):
-                    for j in range(i):
-                        x = spread[i, j]
-                        for k in range(j):
-                            x -= spread[i, k] * spread[j, k]
-                        spread[i, j] = x / spread[j, j]
-                    x = spread[i, i]
-                    for k in range(i):
-                        x -= spread[i, k] * spread[i, k]
-                    spread[i, i] = sqrt(max(x, 1e-300))
-                    x = white[i]
-                    for k in range(i):
-                        x -= spread[i, k] * white[k]
-                    white[i] = x / spread[i, i]
                     nis += white[i] * white[i]
                 surprise = log1p(sqrt(nis / m))
                 memory[b, at, 0] += gain * (surprise - memory[b, at, 0])

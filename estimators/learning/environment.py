@@ -32,7 +32,7 @@ from simnav.geometry.earth import displace
 from simnav.scenario import Scenario, load
 from simnav.types import KINDS
 
-__all__ = ["FilterTaskEnv", "TaskOptions", "run_seed"]
+__all__ = ["FilterTaskEnv", "TaskOptions", "check_counts", "run_seed"]
 
 _ON = np.ones(1, np.bool_)
 
@@ -72,9 +72,7 @@ class TaskOptions:
     ):  # fmt: skip
         if task not in TASKS:
             raise ValueError(f"task is one of {', '.join(TASKS)}, not {task!r}")
-        for name, value in (("steps", steps), ("voyages", voyages)):
-            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
-                raise ValueError(f"{name} is a positive integer or None, not {value!r}")
+        check_counts(steps=steps, voyages=voyages)
         self.scenario = load(scenario) if isinstance(scenario, (str, Path)) else scenario
         self.steps, self.voyages, self.reveal_truth = steps, voyages, reveal_truth
         self.layout = layout_of_scenario(self.scenario, instruments)
@@ -91,6 +89,13 @@ class TaskOptions:
     def oracle(self) -> bool:
         """Whether the oracle has to come along."""
         return self.reward in NEED_ORACLE or self.reveal_truth
+
+
+def check_counts(**counts: object) -> None:
+    """ValueError, with the name, where one is neither None nor a positive integer."""
+    for name, value in counts.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
+            raise ValueError(f"{name} is a positive integer or None, not {value!r}")
 
 
 def run_seed(seed: int | None, rng: np.random.Generator, voyages: int | None) -> int:

@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 from simnav.environment.charted import ChartedEnv
 from simnav.environment.rendering import Chart
 from simnav.estimator import Estimator, make
-from simnav.estimators.learning.environment import run_seed
+from simnav.estimators.learning.environment import check_counts, run_seed
 from simnav.estimators.learning.features import LIMIT, Numbers
 from simnav.estimators.learning.filters import checked_actions
 from simnav.estimators.learning.guidance_kernels import ASIDE, LARGEST_TURN, SIZE, judge, look, steer
@@ -119,9 +119,7 @@ class GuidanceOptions:
             raise ValueError(f"route is one of {', '.join(ROUTES)}, not {route!r}")
         if not half_width > 0.0:
             raise ValueError(f"half_width = {half_width!r} m should be positive")
-        for name, value in (("steps", steps), ("voyages", voyages)):
-            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
-                raise ValueError(f"{name} is a positive integer or None, not {value!r}")
+        check_counts(steps=steps, voyages=voyages)
         self.scenario, self.route, self.half_width, self.steps = scenario, route, half_width, steps
         self.voyages, self.reveal_truth = voyages, reveal_truth
         if isinstance(navigator, str):

@@ -69,19 +69,16 @@ class Navigators:
         UnsuitableScenario
             If it lacks an instrument.
         """
-        plain = navigator is None
-        navigator = KalmanEstimator(Suitable()) if navigator is None else navigator
-        navigator.reset(start, instruments)
-        model = navigator.model if plain and isinstance(navigator, KalmanEstimator) else None
-        arrays = None
-        if type(model) is InertialModel and isinstance(navigator, KalmanEstimator):
-            arrays = model.arrays(self.runs.names[b])
+        plain = KalmanEstimator(Suitable())
+        chosen = plain if navigator is None else navigator
+        chosen.reset(start, instruments)
+        model = plain.model if navigator is None else None
+        arrays = model.arrays(self.runs.names[b]) if type(model) is InertialModel else None
         self._banked[b] = arrays is not None
-        self._others[b] = navigator if arrays is None else None
-        if arrays is not None and isinstance(navigator, KalmanEstimator):
-            n = navigator.model.size
-            self._size[b], self._now[b] = n, start.time
-            arrays["covariance"] = navigator.covariance.ravel()
+        self._others[b] = chosen if arrays is None else None
+        if arrays is not None:
+            self._size[b], self._now[b] = plain.model.size, start.time
+            arrays["covariance"] = plain.covariance.ravel()
             arrays["used"] = np.full(len(self.runs.names[b]), -np.inf)
             for name, array in arrays.items():
                 self._put(name, b, array)

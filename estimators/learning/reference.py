@@ -19,7 +19,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from simnav.estimators.algebra.joseph import joseph_update, project
+from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, Flags, InitialState, Instruments, Integers, Measurement, Measurements
@@ -70,11 +70,8 @@ class Linear(NamedTuple):
 
     @property
     def events(self) -> Events:
-        """The same as the kernels take it."""
-        return (
-            self.transition, self.process_noise, self.moves, self.instrument, self.time, self.size, self.innovation,
-            self.jacobian, self.noise, self.correction,
-        )  # fmt: skip
+        """The same as the kernels take it: a plain tuple."""
+        return self[:]
 
     @staticmethod
     def empty(events: int, n: int) -> Linear:
@@ -155,25 +152,13 @@ class ReferenceFilter(KalmanEstimator):
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         found = self.model.measure(m)
-        if found is None:
+        if found is None or self._absorb(found.project(self.covariance)) < 0.0:
             self._admission.skipped += 1
             return
-        innovation, jacobian, noise = found
-        jacobian = np.array(jacobian)  # the model may use its array again
-        d, n = jacobian.shape
-        cross, predicted = np.empty((n, d)), np.empty((d, d))
-        project(self.covariance, jacobian, cross, predicted)
-        nis: float = joseph_update(self.covariance, cross, predicted + noise, innovation, self._correction)
-        if nis < 0.0:
-            self._admission.skipped += 1
-            return
-        self.model.correct(self._correction)
-        self._append(self._number[m.instrument], m.time, innovation, jacobian, noise)
+        self._append(self._number[m.instrument], m.time, found)
 
-    def _append(
-        self, instrument: int = -1, time: float = 0.0, innovation: Array | None = None,
-        jacobian: Array | None = None, noise: Array | None = None,
-    ) -> None:  # fmt: skip
+    def _append(self, instrument: int = -1, time: float = 0.0, found: Linearised | None = None) -> None:
+        """An event: the propagation since the last one, and a measurement that was used."""
         if self.count == len(self.linear.size):
             room = Linear.empty(2 * self.count, self.model.size)
             room.put(0, self.linear, self.count)
@@ -185,7 +170,7 @@ class ReferenceFilter(KalmanEstimator):
             linear.transition[e], linear.process_noise[e] = self._moved
             self._moved = None
         linear.instrument[e], linear.time[e], linear.size[e], linear.correction[e] = instrument, time, 0, 0.0
-        if innovation is not None and jacobian is not None and noise is not None:
-            d = len(innovation)
+        if found is not None:
+            d = len(found.innovation)
             linear.size[e], linear.correction[e] = d, self._correction
-            linear.innovation[e, :d], linear.jacobian[e, :d], linear.noise[e, :d, :d] = innovation, jacobian, noise
+            linear.innovation[e, :d], linear.jacobian[e, :d], linear.noise[e, :d, :d] = found

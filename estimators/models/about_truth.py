@@ -27,13 +27,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import atan2, hypot, remainder, tau
+from math import remainder, tau
 from typing import NamedTuple
 
 import numpy as np
 
-from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.estimators.models.inertial import CURRENT, CURRENT_TIME, InertialModel
+from simnav.estimators.models.base import ErrorModel, Linearised, is_fast, stationary
+from simnav.estimators.models.inertial import CURRENT, CURRENT_TIME, InertialModel, roll_pitch_yaw
 from simnav.estimators.models.propagation import correct_inertial
 from simnav.geometry.earth import principal_radii
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
@@ -162,7 +162,7 @@ class AboutTruthModel(ErrorModel):
         """Make the states of an aid; return its datasheet with what is left for the inertial model."""
         bias = [(i, self._state(b * b)) for i, b in enumerate(sheet.bias.tolist()) if b]
         time = sheet.correlation_time
-        fast = time < 0.5 / sheet.rate
+        fast = is_fast(sheet)
         if not fast:
             for i, s in enumerate(sheet.bias_instability.tolist()):
                 if s and np.isfinite(time):
@@ -170,7 +170,7 @@ class AboutTruthModel(ErrorModel):
                 elif s:
                     bias.append((i, self._state(0.0, 0.0, s * s)))
         if sheet.equation == WATER_SPEED and self.water is None:
-            bias.append((0, self._state(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME)))
+            bias.append((0, self._state(*stationary(CURRENT, CURRENT_TIME)[:3])))
         scale = misalignment = deviation = -1
         if sheet.equation in (BODY_VELOCITY, WATER_SPEED, DEPTH) and sheet.scale:
             scale = self._state(sheet.scale**2)
@@ -316,7 +316,5 @@ class AboutTruthModel(ErrorModel):
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""
-        position, velocity, c = self._navigation()
-        c20, c21, c22 = float(c[2, 0]), float(c[2, 1]), float(c[2, 2])
-        attitude = np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(c[1, 0]), float(c[0, 0]))])
-        return Estimate(self.time, position, velocity, attitude, covariance[:_NAV, :_NAV].copy())
+        position, velocity, dcm = self._navigation()
+        return Estimate(self.time, position, velocity, roll_pitch_yaw(dcm), covariance[:_NAV, :_NAV].copy())

@@ -12,9 +12,13 @@ import numpy as np
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.own_observation import OwnObservation
+from simnav.geometry.rotation import left_jacobian
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
 
-__all__ = ["ErrorModel", "GaussMarkov", "Linearised", "Observation", "gauss_markov", "triad_bias"]
+__all__ = [
+    "ErrorModel", "GaussMarkov", "Linearised", "Observation", "aid_biases", "gauss_markov", "is_fast", "stationary",
+    "triad_bias",
+]  # fmt: skip
 
 #: Of m components and n states: innovation (m,), P H' (n, m), H P H' (m, m) and noise (m, m).
 Observation = tuple[Array, Array, Array, Array]
@@ -218,6 +222,25 @@ class ErrorModel(ABC):
         sigmas = np.sqrt(factors)
         covariance *= sigmas[:, None] * sigmas
 
+    def by_correction(self, jacobian: Array, correction: Array) -> Array:
+        """A (m, n) Jacobian at the corrected state, taken with respect to the correction that led there.
+
+        Its derivative of the error by the correction is the identity, but the left Jacobian of SO(3) for the attitude.
+        """
+        taken = jacobian.copy()
+        if self.attitude_at is not None:
+            attitude = slice(self.attitude_at, self.attitude_at + 3)
+            taken[:, attitude] = taken[:, attitude] @ left_jacobian(correction[attitude])
+        return taken
+
+    def to_corrected(self, covariance: Array, correction: Array) -> None:
+        """Bring a covariance of the correction to the corrected state, in place."""
+        if self.attitude_at is not None:
+            attitude = slice(self.attitude_at, self.attitude_at + 3)
+            J = left_jacobian(correction[attitude])
+            covariance[attitude] = J @ covariance[attitude]
+            covariance[:, attitude] = covariance[:, attitude] @ J.T
+
     def snapshot(self) -> list[Array]:
         """Copies of what `correct` changes, for `restore`."""
         return [getattr(self, name).copy() for name in self.state]
@@ -294,6 +317,24 @@ def gauss_markov(
         return GaussMarkov(constant, 0.0, walk, 0.0)
     total = constant + moving
     return GaussMarkov(total, moving / (total * correlation_time), 2.0 * moving / correlation_time + walk, 0.0)
+
+
+def stationary(sigma: float, correlation_time: float) -> GaussMarkov:
+    """A state of a stationary sigma and a correlation time [s], which begins with that sigma."""
+    return GaussMarkov(sigma**2, 1.0 / correlation_time, 2.0 * sigma**2 / correlation_time, 0.0)
+
+
+def is_fast(sheet: Datasheet) -> bool:
+    """Whether the in-run bias of an aid changes from sample to sample, so that it is white noise."""
+    return sheet.correlation_time < 0.5 / sheet.rate
+
+
+def aid_biases(sheet: Datasheet) -> list[GaussMarkov]:
+    """The bias state of each component of an aid; a bias that `is_fast` has no part in it."""
+    return [
+        gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
+        for b, s in zip(sheet.bias, sheet.bias_instability)
+    ]
 
 
 def triad_bias(triad: TriadDatasheet, extra: float = 0.0) -> GaussMarkov:

@@ -36,7 +36,15 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
-from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, Observation, gauss_markov, triad_bias
+from simnav.estimators.models.base import (
+    ErrorModel,
+    Linearised,
+    Observation,
+    aid_biases,
+    is_fast,
+    stationary,
+    triad_bias,
+)
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from simnav.estimators.models.measurements import (
     CODES,
@@ -70,7 +78,7 @@ from simnav.types import (
     Measurement,
 )
 
-__all__ = ["InertialModel"]
+__all__ = ["InertialModel", "roll_pitch_yaw"]
 
 #: Sigma and correlation time of each component of the current, for a speed log [m/s], [s].
 CURRENT, CURRENT_TIME = 0.5, 1800.0
@@ -229,14 +237,10 @@ class InertialModel(ErrorModel):
         for sheet in self.instruments.values():
             if not self.observes(sheet):
                 continue
-            states = [
-                gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
-                for b, s in zip(sheet.bias, sheet.bias_instability)
-            ]
-            fast = sheet.correlation_time < 0.5 / sheet.rate
-            white = sheet.bias_instability**2 if fast else np.zeros(len(states))
+            states = aid_biases(sheet)
+            white = sheet.bias_instability**2 if is_fast(sheet) else np.zeros(len(states))
             if sheet.equation == WATER_SPEED and self.calibrate:
-                states += 2 * [GaussMarkov(CURRENT**2, 1.0 / CURRENT_TIME, 2.0 * CURRENT**2 / CURRENT_TIME, 0.0)]
+                states += 2 * [stationary(CURRENT, CURRENT_TIME)]
             if not self.calibrate:
                 along_keel = CURRENT**2 if sheet.equation == WATER_SPEED else 0.0
                 white = white + [s.variance + along_keel for s in states]
@@ -422,7 +426,11 @@ class InertialModel(ErrorModel):
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""
-        c = self.dcm
-        c20, c21, c22 = float(c[2, 0]), float(c[2, 1]), float(c[2, 2])
-        attitude = np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(c[1, 0]), float(c[0, 0]))])
+        attitude = roll_pitch_yaw(self.dcm)
         return Estimate(self.time, self.position.copy(), self.velocity.copy(), attitude, covariance[:9, :9].copy())
+
+
+def roll_pitch_yaw(dcm: Array) -> Array:
+    """(3,) array: `simnav.geometry.rotation.rpy_from_dcm` of one matrix, without the overhead of stacks."""
+    c20, c21, c22 = float(dcm[2, 0]), float(dcm[2, 1]), float(dcm[2, 2])
+    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(dcm[1, 0]), float(dcm[0, 0]))])

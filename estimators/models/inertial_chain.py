@@ -22,27 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.block_tridiagonal import error_after_step
 from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import OWN, State, observe_inertial
 from simnav.estimators.models.propagation import correct_inertial
-from simnav.geometry.rotation import cross, rotation_coefficients
+from simnav.geometry.rotation import cross, rotated, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments, Integers
 
 __all__ = ["InertialChain"]
 
 #: Rotations below this are composed by a series [rad].
 SERIES_ANGLE = 0.014
-
-
-@kernel()
-def _turn(
-    a: float, b: float, r0: float, r1: float, r2: float, v0: float, v1: float, v2: float
-) -> tuple[float, float, float]:
-    """``exp(r x) v``, with a and b the `rotation_coefficients` of r."""
-    x0, x1, x2 = cross(r0, r1, r2, v0, v1, v2)
-    y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
-    return v0 + a * x0 + b * y0, v1 + a * x1 + b * y1, v2 + a * x2 + b * y2
 
 
 @kernel()
@@ -103,13 +94,13 @@ def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
     if n >= 15:  # the bias columns turn with the attitude
         for j in range(9, 15):
             for i in range(0, 9, 3):
-                J[i, j], J[i + 1, j], J[i + 2, j] = _turn(a, b, p0, p1, p2, F[i, j], F[i + 1, j], F[i + 2, j])
+                J[i, j], J[i + 1, j], J[i + 2, j] = rotated(p0, p1, p2, a, b, F[i, j], F[i + 1, j], F[i + 2, j])
     for i in range(0, 6, 3):
         u0 = 0.5 * (F[i + 1, 8] - F[i + 2, 7])
         u1 = 0.5 * (F[i + 2, 6] - F[i, 8])
         u2 = 0.5 * (F[i, 7] - F[i + 1, 6])
         # E (u + F_b b) - u: what the bias shift adds turns with the node, so the attitude has a share in it.
-        w0, w1, w2 = _turn(a, b, p0, p1, p2, u0, u1, u2)
+        w0, w1, w2 = rotated(p0, p1, p2, a, b, u0, u1, u2)
         w0, w1, w2 = w0 - u0, w1 - u1, w2 - u2
         x0, x1, x2 = cross(p0, p1, p2, u0, u1, u2)
         moved[i] += w0 - x0
@@ -136,7 +127,7 @@ def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
             b1 += F[7, j] * s[j]
             b2 += F[8, j] * s[j]
         a0, a1, a2 = a0 - b0, a1 - b1, a2 - b2
-        h0, h1, h2 = _turn(a, b, p0, p1, p2, 0.5 * b0, 0.5 * b1, 0.5 * b2)
+        h0, h1, h2 = rotated(p0, p1, p2, a, b, 0.5 * b0, 0.5 * b1, 0.5 * b2)
         for j in range(9, 12):  # the left Jacobian of exp(b x), to first order
             x0, x1, x2 = cross(h0, h1, h2, J[6, j], J[7, j], J[8, j])
             J[6, j] += x0
@@ -172,9 +163,7 @@ def _turn_covariance(P: Array, shift: Array, out: Array) -> None:
     for side in range(2):
         for i in range(n):
             v0, v1, v2 = (out[6, i], out[7, i], out[8, i]) if side == 0 else (out[i, 6], out[i, 7], out[i, 8])
-            x0, x1, x2 = cross(p0, p1, p2, v0, v1, v2)
-            y0, y1, y2 = cross(p0, p1, p2, x0, x1, x2)
-            v0, v1, v2 = v0 + a * x0 + b * y0, v1 + a * x1 + b * y1, v2 + a * x2 + b * y2
+            v0, v1, v2 = rotated(p0, p1, p2, a, b, v0, v1, v2)  # with the coefficients of the left Jacobian
             if side == 0:
                 out[6, i], out[7, i], out[8, i] = v0, v1, v2
             else:
@@ -226,11 +215,7 @@ def _along_motion(
     shift, moved, error, J = np.empty(n), np.empty(n), np.empty(n), np.zeros((n, n))
     along[0] = step[0]
     for k in range(count):
-        for r in range(n):  # the motion error that the linear solution leaves
-            x = residual[k, r] + step[k + 1, r]
-            for c in range(n):
-                x -= jacobian[k, r, c] * step[k, c]
-            error[r] = x
+        error_after_step(residual[k], jacobian[k], step[k], step[k + 1], error)
         _add(along[k], begin_shift[k], shift)
         _move(transition[k], shift, moved, J)
         _add(error, moved, shift)
@@ -363,9 +348,6 @@ class InertialChain(Chain):
     node_arrays = ("raw_rate",)
     coupled = 15
     front: InertialModel
-
-    def __init__(self, front: InertialModel):
-        super().__init__(front)
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """One node, at the start; its covariance. UnsuitableScenario without an IMU."""

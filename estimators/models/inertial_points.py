@@ -36,7 +36,7 @@ from simnav.estimators.models.measurements import (
 )
 from simnav.estimators.models.points import PointModel
 from simnav.geometry.earth import radii_scalar
-from simnav.geometry.rotation import cross, rotation_coefficients
+from simnav.geometry.rotation import rotate_left, rotation_coefficients
 from simnav.strapdown import mechanize_step, sample_from_motion
 from simnav.types import Array, Measurement
 
@@ -50,11 +50,7 @@ PIECE = 0.5
 def _turn(dcm: Array, r0: float, r1: float, r2: float, turned: Array) -> None:
     """``turned = exp(r x) dcm``."""
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
-    for j in range(3):
-        c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
-        x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
-        y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
-        turned[0, j], turned[1, j], turned[2, j] = c0 + a * x0 + b * y0, c1 + a * x1 + b * y1, c2 + a * x2 + b * y2
+    rotate_left(dcm, r0, r1, r2, a, b, turned)
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8[:, ::1])")

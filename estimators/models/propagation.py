@@ -15,7 +15,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.geometry.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
-from simnav.geometry.rotation import cross, rotation_coefficients
+from simnav.geometry.rotation import rotate_left, rotation_coefficients
 from simnav.strapdown import mechanize_step
 from simnav.types import Array
 
@@ -446,13 +446,7 @@ def correct_inertial(position: Array, velocity: Array, dcm: Array, bias: Array, 
     position[2] -= dx[2]
     r0, r1, r2 = dx[6], dx[7], dx[8]
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
-    for j in range(3):
-        c0, c1, c2 = dcm[0, j], dcm[1, j], dcm[2, j]
-        x0, x1, x2 = cross(r0, r1, r2, c0, c1, c2)
-        y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
-        dcm[0, j] = c0 + a * x0 + b * y0
-        dcm[1, j] = c1 + a * x1 + b * y1
-        dcm[2, j] = c2 + a * x2 + b * y2
+    rotate_left(dcm, r0, r1, r2, a, b, dcm)
     for j in range(3):
         velocity[j] += dx[3 + j]
     for j in range(6):

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from simnav import kinds
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
-from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, gauss_markov
+from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, aid_biases, is_fast, stationary
 from simnav.estimators.models.measurements import wrap
 from simnav.estimators.models.ship_kernels import (
     BODY_VELOCITY,
@@ -133,9 +133,9 @@ class ShipModel(ErrorModel):
         states: list[GaussMarkov] = [
             GaussMarkov(0.0, 0.0, self.acceleration**2, 0.0),
             GaussMarkov(float(start.covariance[8, 8]), 0.0, 0.0, 0.0),
-            _stationary(self.turn_rate, self.turn_time),
-            _stationary(self.current, self.current_time),
-            _stationary(self.current, self.current_time),
+            stationary(self.turn_rate, self.turn_time),
+            stationary(self.current, self.current_time),
+            stationary(self.current, self.current_time),
         ]
         self.bias_at: dict[str, int] = {}
         self.scale_at: dict[str, int] = {}
@@ -144,10 +144,7 @@ class ShipModel(ErrorModel):
             if not own and sheet.equation not in (kinds.HEADING, *POSITIONS, kinds.WATER_SPEED):
                 continue
             d = len(sheet.sigma) if own else 2 if sheet.equation in POSITIONS else 1
-            biases = [
-                gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
-                for b, s in zip(sheet.bias[:d], sheet.bias_instability[:d])
-            ]
+            biases = aid_biases(sheet)[:d]
             if any(b.variance or b.noise for b in biases):
                 self.bias_at[sheet.name] = 2 + len(states)
                 states += biases
@@ -242,7 +239,7 @@ class ShipModel(ErrorModel):
 def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
     """Kind and numbers of an instrument, for the kernels (`simnav.estimators.models.ship_kernels`)."""
     lx, ly, lz = sheet.lever_arm.tolist()
-    fast, white = _fast(sheet), _white(sheet)
+    fast, white = is_fast(sheet), _white(sheet)
     if sheet.equation in (kinds.HEADING, kinds.WATER_SPEED):
         kind = LOG if sheet.equation == kinds.WATER_SPEED else HEADING
         return kind, [lx, ly, float(white[0]), 0.0, 0.0, 0.0, 0.0]
@@ -257,18 +254,9 @@ def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
     return BODY_VELOCITY, [lx, ly, *white.tolist(), sway**2, sheet.scale**2, float(sheet.misalignment[2]) ** 2]
 
 
-def _fast(sheet: Datasheet) -> bool:
-    """Whether the in-run bias changes from one measurement to the next, so that it is white noise."""
-    return sheet.correlation_time < 0.5 / sheet.rate
-
-
 def _white(sheet: Datasheet) -> Array:
     """(d,) variances of the white noise."""
-    return np.asarray(sheet.sigma**2 + (sheet.bias_instability**2 if _fast(sheet) else 0.0))
-
-
-def _stationary(sigma: float, time: float) -> GaussMarkov:
-    return GaussMarkov(sigma**2, 1.0 / time, 2.0 * sigma**2 / time, 0.0)
+    return np.asarray(sheet.sigma**2 + (sheet.bias_instability**2 if is_fast(sheet) else 0.0))
 
 
 #: North, east, their velocities, and heading.

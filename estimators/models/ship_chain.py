@@ -17,18 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.block_tridiagonal import error_after_step
 from simnav.estimators.models.chain import Chain, Columns, chain_of
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_kernels import (
     VELOCITY,
     E,
     N,
+    correct_ship,
     decay_of,
     fill_jacobian,
     residual_of,
     sail_step,
     set_identity,
-    shift_ship,
     steps_of,
 )
 from simnav.geometry.earth import radii_scalar
@@ -163,7 +164,7 @@ def _move_folds(
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
 def _retract(step: Array, position: Array, x: Array) -> None:
     for k in range(step.shape[0]):
-        shift_ship(position[k], x[k], step[k])
+        correct_ship(position[k], x[k], step[k])
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])")
@@ -186,16 +187,12 @@ def _along_motion(
     p, y, decay, error, F = np.empty(3), np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
     along[0] = step[0]
     for k in range(count):
-        for r in range(n):  # the motion error that the linear solution leaves
-            e = residual[k, r] + step[k + 1, r]
-            for c in range(n):
-                e -= jacobian[k, r, c] * step[k, c]
-            error[r] = e
+        error_after_step(residual[k], jacobian[k], step[k], step[k + 1], error)
         for i in range(3):
             p[i] = position[k, i]
         for i in range(n):
             y[i] = x[k, i]
-        shift_ship(p, y, along[k])
+        correct_ship(p, y, along[k])
         set_identity(F)
         steps, dt, turning = steps_of(time[k + 1] - time[k], turn_time)
         decay_of(rate, dt, decay)
@@ -219,9 +216,6 @@ class ShipChain(Chain):
     """
 
     front: ShipModel
-
-    def __init__(self, front: ShipModel):
-        super().__init__(front)
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """One node, at the start; its covariance. UnsuitableScenario without any aid."""

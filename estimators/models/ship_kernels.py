@@ -318,18 +318,12 @@ def read_ships(code: Integers, aid: Array, states: Array, readings: Array) -> No
             readings[k, 1] = b
 
 
-@kernel()
-def shift_ship(position: Array, x: Array, dx: Array) -> None:
-    """Add an error to a state, in place."""
-    displace_ship(position, dx[N], dx[E])
-    for i in range(2, x.size):
-        x[i] += dx[i]
-
-
 @kernel("void(f8[::1], f8[::1], f8[::1])")
 def correct_ship(position: Array, x: Array, dx: Array) -> None:
     """Add the correction ``dx`` (n,) to a state, in place."""
-    shift_ship(position, x, dx)
+    displace_ship(position, dx[N], dx[E])
+    for i in range(2, x.size):
+        x[i] += dx[i]
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1])")

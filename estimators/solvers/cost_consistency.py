@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-__all__ = ["CostTest", "chi_square_deviate"]
+__all__ = ["ConsistencyTest", "CostTest", "chi_square_deviate"]
 
 #: Standard normal deviate beyond which a cost is improbable (one in 30 000).
 IMPROBABLE = 4.0
@@ -46,15 +46,15 @@ def chi_square_deviate(value: float, freedom: float) -> float:
     return deviate
 
 
-class CostTest:
-    """The test of the module, epoch by epoch.
+class ConsistencyTest:
+    """A sum of squares of unit variance, tested epoch by epoch.
 
     Attributes
     ----------
     variance_factor : float
-        Twice the cost over the degrees of freedom, of the last epoch; NaN before the first.
+        The sum over its degrees of freedom, of the last epoch; NaN before the first.
     inconsistent : bool
-        Whether the cost has been improbable for `PATIENCE` epochs.
+        Whether it has been improbable for `PATIENCE` epochs.
     """
 
     def __init__(self) -> None:
@@ -63,8 +63,17 @@ class CostTest:
 
     @property
     def inconsistent(self) -> bool:
-        """Whether the window does not explain its measurements."""
+        """Whether the solver does not explain its measurements."""
         return self._improbable >= PATIENCE
+
+    def judge(self, squares: float, freedom: float) -> None:
+        """Take the sum of an epoch, and its degrees of freedom, above 0."""
+        self.variance_factor = squares / freedom
+        self._improbable = self._improbable + 1 if chi_square_deviate(squares, freedom) > IMPROBABLE else 0
+
+
+class CostTest(ConsistencyTest):
+    """The test of the module; the sum of squares is twice the cost."""
 
     @property
     def inflation(self) -> float:
@@ -73,7 +82,5 @@ class CostTest:
 
     def add(self, cost: float, freedom: float) -> None:
         """Take the cost of an epoch, half a sum of squares, and its degrees of freedom; none without any."""
-        if freedom <= 0.0:
-            return
-        self.variance_factor = 2.0 * cost / freedom
-        self._improbable = self._improbable + 1 if chi_square_deviate(2.0 * cost, freedom) > IMPROBABLE else 0
+        if freedom > 0.0:
+            self.judge(2.0 * cost, freedom)

@@ -11,7 +11,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
-from simnav.estimators.algebra.cholesky import factorise
+from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
@@ -62,7 +62,7 @@ def mixture_update(
     count = variances.size
     inverses, solved = np.zeros((count, m, m)), np.zeros((count, m))
     likelihood, distance = np.empty(count), np.empty(count)
-    L, W, pivot = np.zeros((m, m)), np.zeros((m, m)), np.empty(m)
+    L, W, pivot = np.zeros((m, m)), np.empty((m, m)), np.empty(m)  # W: L^-1
     for j in range(count):
         for r in range(m):
             for c in range(r + 1):
@@ -72,12 +72,7 @@ def mixture_update(
         determinant = 0.0
         for r in range(m):
             determinant += log(pivot[r])
-        for c in range(m):  # W = L^-1
-            for r in range(c, m):
-                x = 1.0 if r == c else 0.0
-                for k in range(c, r):
-                    x -= L[r, k] * W[k, c]
-                W[r, c] = x / L[r, r]
+        invert_factor(L, m, W)
         for r in range(m):
             for c in range(m):
                 x = 0.0

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from simnav.estimators.solvers.cost_consistency import IMPROBABLE, PATIENCE, chi_square_deviate
+from simnav.estimators.solvers.cost_consistency import ConsistencyTest
 
 __all__ = ["InnovationTest"]
 
@@ -25,28 +25,13 @@ __all__ = ["InnovationTest"]
 EPOCHS = 20
 
 
-class InnovationTest:
-    """The test of the module, epoch by epoch.
-
-    Attributes
-    ----------
-    variance_factor : float
-        Sum of the normalised innovations squared over the degrees of freedom, of the last `EPOCHS` epochs that brought
-        measurements; NaN before the first.
-    inconsistent : bool
-        Whether that has been improbable for `PATIENCE` epochs.
-    """
+class InnovationTest(ConsistencyTest):
+    """The test of the module; its sum is that of the last `EPOCHS` epochs that brought measurements."""
 
     def __init__(self) -> None:
-        self.variance_factor = float("nan")
-        self._improbable = 0
+        super().__init__()
         self._sum, self._freedom = 0.0, 0
         self._epochs: deque[tuple[float, int]] = deque(maxlen=EPOCHS)
-
-    @property
-    def inconsistent(self) -> bool:
-        """Whether the filter does not explain its measurements."""
-        return self._improbable >= PATIENCE
 
     def add(self, nis: float, freedom: int) -> None:
         """Take a normalised innovation squared, and its degrees of freedom."""
@@ -59,6 +44,4 @@ class InnovationTest:
             return
         self._epochs.append((self._sum, self._freedom))
         self._sum, self._freedom = 0.0, 0
-        value, freedom = map(sum, zip(*self._epochs))
-        self.variance_factor = value / freedom
-        self._improbable = self._improbable + 1 if chi_square_deviate(value, freedom) > IMPROBABLE else 0
+        self.judge(*map(sum, zip(*self._epochs)))

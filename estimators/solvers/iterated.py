@@ -24,7 +24,6 @@ import numpy as np
 
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Observation
-from simnav.geometry.rotation import left_jacobian
 from simnav.types import Array, Measurement
 
 __all__ = ["Iteration", "absorb_iterated", "poor_heading"]
@@ -115,8 +114,7 @@ def absorb_iterated(
     residual, cross, predicted, noise = observation
     before, first_nis = model.snapshot(), -1.0
     sigma = np.sqrt(np.diag(covariance)) + 1e-300
-    previous, at = np.zeros(model.size), model.attitude_at
-    attitude = slice(0) if at is None else slice(at, at + 3)
+    previous = np.zeros(model.size)
     for count in range(1, iteration.limit + 1):
         posterior = covariance.copy()
         nis = joseph_update(posterior, cross, predicted + noise, residual, correction)
@@ -134,15 +132,10 @@ def absorb_iterated(
         if again is None:
             break
         previous = correction.copy()
-        G = again.jacobian.copy()
-        if at is not None:
-            G[:, attitude] = G[:, attitude] @ left_jacobian(correction[attitude])
+        G = model.by_correction(again.jacobian, correction)
         cross = covariance @ G.T
         predicted = G @ cross
         residual = again.innovation + G @ correction
     covariance[:] = posterior
-    if at is not None:
-        J = left_jacobian(correction[attitude])
-        covariance[attitude] = J @ covariance[attitude]
-        covariance[:, attitude] = covariance[:, attitude] @ J.T
+    model.to_corrected(covariance, correction)
     return first_nis, count

@@ -11,9 +11,8 @@ probation (see below), else an instrument rather than the IMU, a fix first, sinc
 sooner, else that of the largest separation. Its sub-filter becomes the main one, so that what the fault has done so far
 is undone, too.
 
-With an IMU, an instrument is excluded only where the position without it is known well enough: `_TELLING` sigmas of it
-are less than the separation, or it is at most `_WORSE` times less certain. With a poor IMU and a receiver alone, fixes
-that are wrong by ten metres are better than none. No other instrument is blamed in its place.
+What may be excluded depends on whether there is an IMU (`simnav.estimators.solvers.exclusion_rules`). Where an
+instrument is not excluded because too little is known without it, no other one is blamed in its place.
 
 The IMU may be wrong, too: it is disturbed, or its errors are larger than its datasheet says. Where there are a fix and
 a log to witness it, one more filter uses all measurements and takes the IMU for much noisier (`disturbed_imu`). The IMU
@@ -22,7 +21,7 @@ instruments, and
 
 - no filter without an instrument agrees as well; or
 - an instrument was excluded before: one fault explains what would be two; or
-- it was begun anew, with all instruments and a motion that is not believed, between `_RECENT` and `_COASTING` seconds
+- it was begun anew, with all instruments and a motion that is not believed, between `_RECENT` and `COASTING` seconds
   ago. This is done where all fixes and logs are excluded, or the filter that was chosen agrees with nothing
   (`_NOTHING_AGREES`).
 
@@ -32,9 +31,7 @@ all instruments for ``recovery`` seconds (longer after every further exclusion),
 
 Where a fix is excluded, the sub-filter without the log is kept beside, and the other way round: the hypothesis that was
 not chosen. If the instrument that was believed fails a test in its turn, and the one excluded agrees with all others in
-that filter, the two change places. On a vessel without an IMU the compass is among them, and nothing is excluded that
-cannot be spared: a fix, or a log and a compass, must be left. Its fixes are out for `_DEAD_RECKONING` seconds at most,
-and the separation of the filter without a compass counts less, because its turns are known by the compass alone.
+that filter, the two change places. On a vessel without an IMU the compass is among them.
 
 A datasheet may be wrong. Whatever is said here of a NIS is said of its ratio to the mean of the last ``horizon``
 seconds, where this is above 1.
@@ -54,9 +51,10 @@ all filters, unless its instrument goes on so for `_PATIENCE` seconds.
 
 An excluded instrument is tried on: when it has agreed with the main filter for ``recovery`` seconds it is used again;
 twice as long after every further exclusion, up to `_LONGEST` times. For the next ``horizon`` seconds it is on
-probation: if any test fails, it is suspected, too. Fixes and logs are out together for `_COASTING` seconds at most,
-since an IMU alone is soon worse than either: then the logs are used again or, where they are silent, the fixes. For
-`_RECENT` seconds after that nothing is tested, since the filters differ by the way back alone.
+probation: if any test fails, it is suspected, too. Fixes and logs are out together for `COASTING` seconds at most,
+since an IMU alone is soon worse than either: then the logs are used again or, where they are silent, the fixes. Without
+an IMU the fixes are out for `DEAD_RECKONING` seconds at most. For `_RECENT` seconds after that nothing is tested, since
+the filters differ by the way back alone.
 
 **Protection level.** For the north and the east component, with the sigmas of main and sub-filters, ::
 
@@ -83,7 +81,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Iterable, Mapping
-from math import exp, hypot, radians, sqrt
+from math import exp, hypot, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -91,6 +89,7 @@ import numpy as np
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.models.suitable import ModelChoice
+from simnav.estimators.solvers.exclusion_rules import COASTING, ExclusionRules, RulesWithoutImu
 from simnav.estimators.solvers.hypotheses import (
     Exclusion,
     Hypothesis,
@@ -101,7 +100,6 @@ from simnav.estimators.solvers.hypotheses import (
 )
 from simnav.estimators.solvers.iterated import Iteration
 from simnav.estimators.solvers.separation import KNOWN_HEADING, SeparationTest
-from simnav.estimators.solvers.state_difference import difference
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
 
 __all__ = ["SolutionSeparation"]
@@ -121,24 +119,11 @@ _PRIOR = 20.0
 _SUSPECT = 0.3
 #: Most that ``recovery`` is multiplied by.
 _LONGEST = 16
-#: Without an IMU the turns of a vessel are known by its compass only, and they are not the random process of the model.
-#: So the separation of the filter without a compass counts this much less.
-_TURNING = 3.0
-#: Longest time without fixes and logs by exclusion [s].
-_COASTING = 60.0
-#: Longest time for which log and compass alone are followed by exclusion of the fixes, without an IMU [s].
-_DEAD_RECKONING = 180.0
 #: An instrument that has said nothing for so long, or for three periods, is silent [s].
 _SILENCE = 5.0
 #: The filter that does not believe the start iterates its measurements while its heading is known worse than this
 #: [deg], and runs for this time [s].
 _ITERATED_DEG, _ALIGNMENT = 1.0, 60.0
-#: With an IMU, an instrument is excluded only if the separation of the position is this multiple of the sigma of the
-#: filter without it, or if that sigma is at most the other multiple of the main filter's.
-_TELLING, _WORSE = 3.0, 10.0
-#: The last fix or log is excluded only if the filter without it knows its heading to this standard deviation [rad].
-#: Otherwise a poor IMU, which is left alone, is soon lost.
-_ALONE = radians(1.5)
 #: Where the filter that is chosen has a mean NIS above this, more is wrong than one instrument: perhaps the IMU.
 _NOTHING_AGREES = 2.5
 #: Names of the start and of the IMU among the suspects.
@@ -225,6 +210,7 @@ class SolutionSeparation(Solver):
         share = self.risk / (2.0 * hypotheses * self.fault_probability)
         self._missed = float(norm.isf(min(share, 0.5)))
         self._group = fixes_and_logs(instruments)
+        self._rules = (ExclusionRules if self._inertial else RulesWithoutImu)(self._group)
         blind = {n for n in self._names if instruments[n].role in ("velocity", "depth") and not self._group.get(n)}
         self._heading_sources = set(self._names) - blind
         self._gyroscope_noise = instruments.imu.gyroscope.random_walk**2 if instruments.imu is not None else 0.0
@@ -357,7 +343,7 @@ class SolutionSeparation(Solver):
             return {}
         out, without = self._exclusion.excluded, imu.exclusion.excluded
         agrees = self._disagreement(imu.filter, without) <= _AGREEMENT
-        more_is_wrong = without != out and not (agrees and without <= out) and self._time - self._trial >= _COASTING
+        more_is_wrong = without != out and not (agrees and without <= out) and self._time - self._trial >= COASTING
         if more_is_wrong or not self._test.applies(imu.estimate):
             self._begin_imu(imu, without=out)
         return {_IMU: self._test.largest([imu], estimate)} if agrees else {}
@@ -370,11 +356,11 @@ class SolutionSeparation(Solver):
     def _imu_is_the_fault(self, ratios: Mapping[str, float]) -> bool:
         """Whether the filter that does not believe the IMU has brought all instruments together since it was tried."""
         since = self._time - self._trial
-        return not self._disturbed and _RECENT <= since < _COASTING and ratios.get(_IMU, 0.0) > 1.0
+        return not self._disturbed and _RECENT <= since < COASTING and ratios.get(_IMU, 0.0) > 1.0
 
     def _try_without_the_imu(self) -> None:
         """Begin the filter that does not believe the IMU anew, with all instruments; it does not believe the motion."""
-        if self._imu is None or self._disturbed or self._time - self._trial < _COASTING:
+        if self._imu is None or self._disturbed or self._time - self._trial < COASTING:
             return
         self._trial = self._time
         self._begin_imu(self._imu, without=())
@@ -423,27 +409,15 @@ class SolutionSeparation(Solver):
 
     def _pays(self, name: str, estimate: Estimate) -> bool:
         """Whether the filter without an instrument knows the position well enough to be believed."""
-        if not self._inertial:
-            return True
-        sub = self._elder(name).estimate
-        assert sub is not None
-        assert sub.covariance is not None
-        assert estimate.covariance is not None
-        carried = [n for n in self._speaking(self._group) if n not in {name, *self._exclusion.excluded}]
-        if float(sub.covariance[8, 8]) > (KNOWN_HEADING if carried else _ALONE) ** 2:
-            return False
-        without, with_it = (sqrt(float(p[0, 0] + p[1, 1])) for p in (sub.covariance, estimate.covariance))
-        apart = difference(sub, estimate)
-        return without <= max(hypot(float(apart[0]), float(apart[1])) / _TELLING, _WORSE * with_it)
+        without = self._elder(name).estimate
+        assert without is not None
+        carried = set(self._speaking(self._group)) - {name, *self._exclusion.excluded}
+        return self._rules.pays(without, estimate, bool(carried))
 
     def _can_spare(self, name: str) -> bool:
-        """Whether what is left without an instrument gives a position: always with an IMU, for a while."""
-        if self._inertial:
-            return True
+        """Whether what is left without an instrument gives a position."""
         out = {name} if self._mistaken(name) else {name, *self._exclusion.excluded}
-        left = [n for n in self._speaking(self._names) if n not in out]
-        roles = {self._group.get(n) for n in left}  # None: a compass
-        return True in roles or {False, None} <= roles
+        return self._rules.can_spare([n for n in self._speaking(self._names) if n not in out])
 
     def _speaking(self, names: Iterable[str]) -> list[str]:
         """Those of the instruments that are not silent."""
@@ -459,8 +433,7 @@ class SolutionSeparation(Solver):
 
     def _separation(self, name: str, estimate: Estimate) -> float:
         """The largest separation over its threshold, of both sub-filters without an instrument."""
-        largest = self._test.largest(self._pairs[name], estimate)
-        return largest if self._inertial or name in self._group else largest / _TURNING
+        return self._rules.counted(name, self._test.largest(self._pairs[name], estimate))
 
     def _exclude(self, name: str) -> Estimate:
         """Take the sub-filter without an instrument for the main filter; all others begin anew from it."""
@@ -474,8 +447,8 @@ class SolutionSeparation(Solver):
             chosen = before
             excluded.clear()
         elif not excluded:
-            others = self._group if self._inertial else self._names
-            self._alternatives = {n: self._elder(n) for n in others if n != name and name in others}
+            rivals = self._rules.rivals(self._names)
+            self._alternatives = {n: self._elder(n) for n in rivals if n != name and name in rivals}
             for n, sub in self._alternatives.items():
                 self._pairs[n] = [other for other in self._pairs[n] if other is not sub]
                 self._pairs[n].append(Hypothesis(n, self._filter(), self._time))
@@ -536,9 +509,7 @@ class SolutionSeparation(Solver):
         ]
         heard = self._speaking(self._group)
         fixes, logs = ([n for n in heard if self._group[n] is kind] for kind in (True, False))
-        needed, first, longest = (
-            (heard, logs or fixes, _COASTING) if self._inertial else (fixes, fixes, _DEAD_RECKONING)
-        )
+        needed, first, longest = self._rules.lost_without(fixes, logs)
         coasting = bool(needed) and set(needed) <= excluded
         self._coasting = (time if self._coasting is None else self._coasting) if coasting else None
         if self._coasting is not None and time - self._coasting >= longest:

@@ -26,7 +26,6 @@ from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.weightings.base import Factors, Weighting
-from simnav.geometry.rotation import left_jacobian
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["WeightedKalmanEstimator"]
@@ -96,7 +95,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
     def _iterate(self, m: Measurement, factors: Factors, innovation: Array, H: Array, noise: Array) -> float:
         """Correct the state; the normalised innovation squared at full weight, -1 where nothing was changed."""
         model, P, dx = self.model, self.covariance, self._correction
-        before, first, at = model.snapshot(), -1.0, model.attitude_at
+        before, first = model.snapshot(), -1.0
         sigma, whitener = np.sqrt(np.diag(P)) + 1e-300, np.empty_like(P)
         whitening(P, whitener)
         dx[:] = 0.0
@@ -115,14 +114,9 @@ class WeightedKalmanEstimator(KalmanEstimator):
             again = model.measure(m)
             if again is None or (settled and bool(np.all(np.abs(dx - previous) < self.threshold * sigma))):
                 break
-            innovation, jacobian = again.innovation, again.jacobian.copy()
-            if at is not None:
-                jacobian[:, at : at + 3] = jacobian[:, at : at + 3] @ left_jacobian(dx[at : at + 3])
+            innovation, jacobian = again.innovation, model.by_correction(again.jacobian, dx)
         P[:] = posterior
-        if at is not None:
-            J = left_jacobian(dx[at : at + 3])
-            P[at : at + 3] = J @ P[at : at + 3]
-            P[:, at : at + 3] = P[:, at : at + 3] @ J.T
+        model.to_corrected(P, dx)
         return first
 
     def _factors(self, m: Measurement, noise: Array) -> Factors:

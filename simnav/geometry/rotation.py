@@ -20,6 +20,9 @@ __all__ = [
     "dcm_from_rpy",
     "left_jacobian",
     "quaternion_from_dcm",
+    "rotate_left",
+    "rotate_right",
+    "rotated",
     "rotation_coefficients",
     "rotation_vector_from_dcm",
     "rpy_from_dcm",
@@ -228,3 +231,33 @@ def rotation_coefficients(angle2: float) -> tuple[float, float]:
         return a, b
     angle = sqrt(angle2)
     return sin(angle) / angle, (1.0 - cos(angle)) / angle2
+
+
+@kernel()
+def rotated(
+    r0: float, r1: float, r2: float, a: float, b: float, v0: float, v1: float, v2: float
+) -> tuple[float, float, float]:
+    """``exp(r x) v = v + a r x v + b r x (r x v)``, with the coefficients a, b of `rotation_coefficients`."""
+    x0, x1, x2 = cross(r0, r1, r2, v0, v1, v2)
+    y0, y1, y2 = cross(r0, r1, r2, x0, x1, x2)
+    return v0 + a * x0 + b * y0, v1 + a * x1 + b * y1, v2 + a * x2 + b * y2
+
+
+@kernel()
+def rotate_left(dcm: Array, r0: float, r1: float, r2: float, a: float, b: float, turned: Array) -> None:
+    """``turned = exp(r x) dcm``, with the coefficients a, b of `rotation_coefficients`; it may be the dcm itself."""
+    for j in range(3):
+        turned[0, j], turned[1, j], turned[2, j] = rotated(r0, r1, r2, a, b, dcm[0, j], dcm[1, j], dcm[2, j])
+
+
+@kernel()
+def rotate_right(dcm: Array, r0: float, r1: float, r2: float, a: float, b: float) -> None:
+    """``dcm = dcm exp(r x)`` in place, with the coefficients a, b of `rotation_coefficients`."""
+    for i in range(3):
+        c0, c1, c2 = dcm[i, 0], dcm[i, 1], dcm[i, 2]
+        # A row times [r x] is row x r.
+        x0, x1, x2 = cross(c0, c1, c2, r0, r1, r2)
+        y0, y1, y2 = cross(x0, x1, x2, r0, r1, r2)
+        dcm[i, 0] = c0 + a * x0 + b * y0
+        dcm[i, 1] = c1 + a * x1 + b * y1
+        dcm[i, 2] = c2 + a * x2 + b * y2
