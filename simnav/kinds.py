@@ -8,6 +8,7 @@ reading.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -66,6 +67,8 @@ _COMPONENTS_OF = {
 
 #: Bounds of what a measurement is believed to mean: speed [m/s], height and depth [m].
 LARGEST_SPEED, LARGEST_HEIGHT = 200.0, 20000.0
+#: What the name of a component looks like: it is a column of files, and the end of a field of a specification.
+_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 #: Filters and graphs keep a measurement in arrays of this many components.
 MOST_COMPONENTS = 3
 
@@ -204,7 +207,8 @@ class Kind:
     Raises
     ------
     PluginError
-        If the role or the equation is unknown, or the components do not fit the equation.
+        If the role or the equation is unknown, a component has no proper name or that of another one, or the components
+        do not fit the equation.
     """
 
     quantity: str
@@ -219,17 +223,27 @@ class Kind:
     def __post_init__(self) -> None:
         if self.role not in get_args(Role):
             raise PluginError(f"role = {self.role!r} of a kind should be one of: {', '.join(get_args(Role))}")
+        for name, wanted in (("components", Component), ("datasheet", str), ("log_columns", str)):
+            given = getattr(self, name)
+            if not isinstance(given, tuple) or not all(isinstance(item, wanted) for item in given):
+                raise PluginError(f"{name} = {given!r} of a kind should be a tuple of {wanted.__name__}")
         if not 1 <= len(self.components) <= MOST_COMPONENTS:
             raise PluginError(f"a kind has one to {MOST_COMPONENTS} components, not {len(self.components)}")
-        if isinstance(self.equation, str):
+        for names in (self.values, self.errors):
+            for name in names:
+                if not isinstance(name, str) or not _NAME.fullmatch(name):
+                    raise PluginError(f"the name of a component, {name!r}, should be in snake_case, like 'slant_range'")
+                if names.count(name) > 1:
+                    raise PluginError(f"two components of a kind have the name {name!r}")
+        if self.equation is not None and not callable(self.equation):
             if self.equation not in EQUATIONS:
                 raise PluginError(
                     f"equation = {self.equation!r} of a kind should be a function, or one of: {', '.join(EQUATIONS)}"
                 )
-            wanted = _COMPONENTS_OF[self.equation]
-            if len(self.components) != wanted:
+            d = _COMPONENTS_OF[self.equation]
+            if len(self.components) != d:
                 raise PluginError(
-                    f"the equation {self.equation!r} gives {EQUATIONS[self.equation]}: {wanted} components, "
+                    f"the equation {self.equation!r} gives {EQUATIONS[self.equation]}: {d} components, "
                     f"not {len(self.components)}"
                 )
         if self.geodetic and self.values[:2] != ("latitude", "longitude"):

@@ -22,7 +22,16 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-__all__ = ["PluginError", "Registry", "import_file", "is_file_module", "load_plugin", "place_of", "source_digest"]
+__all__ = [
+    "PluginError",
+    "Registry",
+    "exception_of",
+    "import_file",
+    "is_file_module",
+    "load_plugin",
+    "place_of",
+    "source_digest",
+]
 
 C = TypeVar("C")
 
@@ -139,6 +148,14 @@ def place_of(cls: Any) -> tuple[str, int]:
         return file, inspect.getsourcelines(cls)[1]
     except (OSError, TypeError):
         return file, 0
+
+
+def exception_of(cls: Any, error: BaseException) -> str:
+    """What was raised in the code of a class, in a few words; the place is the innermost in the file of the class."""
+    file = place_of(cls)[0]
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    where = f" in {frames[-1].name}(), line {frames[-1].lineno}" if frames else ""
+    return f"{type(error).__name__}{where}: {error}"
 
 
 class Registry(Generic[C]):

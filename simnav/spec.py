@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
@@ -36,7 +37,9 @@ __all__ = [
     "Vector",
     "closest",
     "entries",
+    "hidden_attribute",
     "quantity",
+    "register_unit",
     "spec_types",
     "toml_number",
     "unit_of",
@@ -46,8 +49,8 @@ _DEG = math.pi / 180.0
 _G = 9.80665  # standard gravity, for "micro-g"
 _BEYOND = 1e12  # no unit needs larger numbers, and their squares would overflow sooner or later
 
-#: Factor to SI of every unit that may end a key.
-UNITS: Mapping[str, float] = {
+#: Factor to SI of every unit that may end a key; `register_unit` adds one.
+UNITS: dict[str, float] = {
     "s": 1.0,
     "min": 60.0,
     "h": 3600.0,
@@ -85,6 +88,8 @@ UNITS: Mapping[str, float] = {
     "per_s": 1.0,
 }
 
+_UNIT_NAME = re.compile(r"[a-z0-9]+(_[a-z0-9]+)*")
+
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Vector = tuple[float, float, float]
@@ -92,6 +97,36 @@ Vector = tuple[float, float, float]
 
 class SpecError(ValueError):
     """A specification that is not valid; the message names file, key, value and what is right."""
+
+
+def register_unit(name: str, factor: float) -> None:
+    """Make a unit known, for the keys of scenario files, the components of instruments and the columns of logs.
+
+    Parameters
+    ----------
+    name : str
+        As it ends a key, in lower case: "kpa", "m_s".
+    factor : float
+        Of one such unit in SI: 1000 for a kilopascal.
+
+    Raises
+    ------
+    SpecError
+        If the name cannot end a key, the factor is no positive number, or the unit is known with another factor.
+
+    Examples
+    --------
+    >>> register_unit("fathom", 1.8288)
+    >>> register_unit("m", 0.3048)
+    Traceback (most recent call last):
+    simnav.spec.SpecError: the unit 'm' is known: it is 1 in SI, not 0.3048
+    """
+    if not isinstance(name, str) or not _UNIT_NAME.fullmatch(name):
+        raise SpecError(f"the name of a unit, {name!r}, should be in lower case, like 'kpa' or 'm_s'")
+    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0.0 < factor < math.inf:
+        raise SpecError(f"the factor of the unit {name!r}, {factor!r}, should be a number greater than 0")
+    if UNITS.setdefault(name, float(factor)) != factor:
+        raise SpecError(f"the unit {name!r} is known: it is {UNITS[name]:g} in SI, not {factor:g}")
 
 
 def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
@@ -107,7 +142,7 @@ def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
         Passed on to `pydantic.Field` (``description``, ``gt``, ...; bounds are in SI).
     """
     if unit not in UNITS:
-        raise KeyError(f"unknown unit {unit!r}; there are: {', '.join(UNITS)}")
+        raise SpecError(f"unknown unit {unit!r}; register_unit adds one; there are: {', '.join(UNITS)}")
     return Field(default, json_schema_extra={"unit": unit}, **kwargs)
 
 
@@ -128,6 +163,12 @@ def unit_of(info: FieldInfo) -> str | None:
     """The TOML unit of a field, or None."""
     extra = info.json_schema_extra
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
+
+
+def hidden_attribute(cls: type[BaseModel], base: type[BaseModel]) -> str | None:
+    """A field of a class that has the name of something else in one of its bases, such as a method; None for none."""
+    taken = (n for n in cls.model_fields if n not in base.model_fields)
+    return next((n for n in taken if hasattr(base, n) or n in base.__class_vars__), None)
 
 
 def _key(name: str, info: FieldInfo) -> str:

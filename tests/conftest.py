@@ -12,6 +12,7 @@ from simnav.estimator import names, registry
 from simnav.kinds import INSTRUMENTS
 from simnav.plugins import is_file_module
 from simnav.sensors.faults import FAULTS
+from simnav.spec import UNITS
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
@@ -40,10 +41,13 @@ def clean_registry():
 def plugins(monkeypatch):
     """The folder of a third party's plug-in files; what a test loads from it is forgotten afterwards."""
     classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS)]
+    units = dict(UNITS)
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield Path(__file__).parent / "simnav" / "plugins"
     for registry_, before in classes:
         registry_._classes = before
+    UNITS.clear()
+    UNITS.update(units)
     for name in [name for name in sys.modules if is_file_module(name)]:
         del sys.modules[name]
 

@@ -8,11 +8,15 @@ are used here, for every model over the inertial state, in filters and graphs; f
 
 from __future__ import annotations
 
+from math import isfinite
+from pathlib import Path
+
 import numpy as np
 
 from simnav.geometry.earth import earth_rate, principal_radii
 from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import NavigationPoint
+from simnav.plugins import place_of
 from simnav.types import KINDS, Array, Datasheet
 
 __all__ = ["OwnObservation"]
@@ -32,7 +36,7 @@ class OwnObservation:
     Raises
     ------
     ValueError
-        While running: if the kind's function returns anything but arrays of the shapes that it should.
+        While running: if the kind's function raises, or returns anything but finite arrays of the right shapes.
     """
 
     def __init__(self, sheet: Datasheet):
@@ -50,7 +54,10 @@ class OwnObservation:
 
     def predict(self, point: NavigationPoint) -> tuple[Array, Array] | None:
         """The (d,) reading at a state and its (d, 9) Jacobian; None where the state has none."""
-        result = self._observation(point, self.sheet)
+        try:
+            result = self._observation(point, self.sheet)
+        except Exception as error:
+            raise ValueError(f"{self._label()} raised {type(error).__name__}: {error}") from error
         if result is None:
             return None
         d = len(self.kind.components)
@@ -62,10 +69,24 @@ class OwnObservation:
             fits, given = False, repr(result)
         if not fits:
             raise ValueError(
-                f"the observation of kind {self.sheet.kind!r} should return a reading of shape {(d,)} and its Jacobian "
+                f"{self._label()} should return a reading of shape {(d,)} and its Jacobian "
                 f"of shape {(d, _COMPONENTS)}, or None, not {given}"
             )
+        # A sum is finite where each of its terms is. That of an estimator whose state is not finite is its own fault.
+        state = (point.position, point.velocity, point.dcm)
+        if not isfinite(reading.sum() + jacobian.sum()) and all(np.isfinite(part).all() for part in state):
+            raise ValueError(
+                f"{self._label()} should return finite numbers, or None where the state has no reading, not "
+                f"{reading.tolist()} with the Jacobian {jacobian.tolist()}"
+            )
         return reading, jacobian
+
+    def _label(self) -> str:
+        """The function, for messages: of which kind it is, for which instrument, and where it stands."""
+        file, line = place_of(self._observation)
+        function = getattr(self._observation, "__name__", repr(self._observation))
+        place = f"{function}() in {Path(file).name}, line {line}"
+        return f"the observation of kind {self.sheet.kind!r} ({place}), for the instrument {self.sheet.name!r},"
 
     def linearise(
         self, point: NavigationPoint, value: Array, calibration: Array, size: int, bias_at: int

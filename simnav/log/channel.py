@@ -293,12 +293,11 @@ def _check_units(
 ) -> None:
     """LogError where the unit of a column is of another dimension than what it holds; "1" is SI and always fits."""
     for component, column, unit in zip(kind.components, columns, units, strict=True):
-        wanted = dimension("m" if local and kind.geodetic else component.unit)
-        if unit != "1" and wanted and dimension(unit) != wanted:
-            raise LogError(
-                f"{source}, column {column!r}: {component.name} of {what} in {unit!r}; a unit of {wanted} is wanted "
-                f"({', '.join(DIMENSIONS[wanted])})"
-            )
+        own = "m" if local and kind.geodetic else component.unit
+        wanted = dimension(own)
+        if unit != "1" and dimension(unit) != wanted:
+            right = f"a unit of {wanted} is wanted ({', '.join(DIMENSIONS[wanted])})" if wanted else f"it is in {own!r}"
+            raise LogError(f"{source}, column {column!r}: {component.name} of {what} in {unit!r}; {right}")
 
 
 def _check_range(

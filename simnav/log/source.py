@@ -104,7 +104,7 @@ class LogSource:
             self._imu_labels = ImuLabels(np.zeros(n, np.uint32), np.zeros((n, 6)))
         self.faults = labels(scenario.faults, self.duration, {n: s.kind for n, s in scenario.aids.items()})
         for layer in build_layers(scenario.faults, root):
-            self._aids = {n: layer.apply(s) for n, s in self._aids.items()}
+            self._aids = {n: layer.laid_over(s) for n, s in self._aids.items()}
             if self._imu is not None:
                 self._imu, self._imu_labels = layer.apply_imu(self._imu, self._imu_labels)
 

@@ -6,6 +6,7 @@ unit; the IMU, the aiding instruments and the reference are channels. Nothing he
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
@@ -27,20 +28,19 @@ __all__ = [
 ]
 
 #: Factor to SI of every unit that a column of a log may have: those of TOML keys, and some that only logs have.
-LOG_UNITS = {
-    **UNITS,
-    "1": 1.0,
-    "rad": 1.0,
-    "rad_s": 1.0,
-    "mm": 1e-3,
-    "km": 1e3,
-    "ft": 0.3048,
-    "mm_s": 1e-3,
-    "km_h": 1.0 / 3.6,
-    "ms": 1e-3,
-    "us": 1e-6,
-    "ns": 1e-9,
-}
+LOG_UNITS: Mapping[str, float] = ChainMap(
+    {
+        "1": 1.0,
+        "rad": 1.0,
+        "rad_s": 1.0,
+        "ft": 0.3048,
+        "km_h": 1.0 / 3.6,
+        "ms": 1e-3,
+        "us": 1e-6,
+        "ns": 1e-9,
+    },
+    UNITS,
+)
 
 #: Units by what they measure, for those that a column may well have.
 DIMENSIONS: Mapping[str, tuple[str, ...]] = {

@@ -14,7 +14,6 @@ estimator is told. Every process has its own random stream and draws at every sa
 
 from __future__ import annotations
 
-import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, wraps
@@ -27,10 +26,21 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from simnav.kinds import INSTRUMENTS, Kind
-from simnav.plugins import PluginError, place_of
+from simnav.plugins import PluginError, exception_of, place_of
 from simnav.recording import AidStream
 from simnav.sensors.processes import GaussMarkov
-from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, Vector, closest, quantity
+from simnav.spec import (
+    UNITS,
+    NonNegative,
+    Positive,
+    Spec,
+    SpecError,
+    Vector,
+    closest,
+    hidden_attribute,
+    quantity,
+    unit_of,
+)
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
 
@@ -70,11 +80,8 @@ def _label(name: str, kind: str, cls: type) -> str:
 
 
 def _raised(label: str, cls: type, error: Exception) -> InstrumentError:
-    """The error that an exception in the code of an instrument becomes; the place is the innermost in its own file."""
-    file = place_of(cls)[0]
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
-    where = f" in {frames[-1].name}(), line {frames[-1].lineno}" if frames else ""
-    return InstrumentError(f"{label}: {type(error).__name__}{where}: {error}")
+    """The error that an exception in the code of an instrument becomes."""
+    return InstrumentError(f"{label}: {exception_of(cls, error)}")
 
 
 def _spread(n: int) -> BeforeValidator:
@@ -285,10 +292,23 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
             raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_kind'] = 'my_kind'")
         if name in _RESERVED:
             raise PluginError(f"kind {name!r} of instrument {cls.__qualname__}: the name means something else")
+        hidden = hidden_attribute(cls, AidSpec)
+        if hidden is not None:
+            raise PluginError(f"kind {name!r}: the field {hidden!r} of {cls.__qualname__} hides AidSpec.{hidden}")
+        for field, info in AidSpec.model_fields.items():
+            unit = unit_of(info)
+            if unit_of(cls.model_fields[field]) != unit:
+                raise PluginError(
+                    f"kind {name!r}: every instrument has the field {field!r}"
+                    f"{'' if unit is None else f', in {unit}'}; {cls.__qualname__} should call its own something else"
+                )
         for component in kind.components:
             for unit in (component.unit, component.error_unit):
                 if unit not in UNITS:
-                    raise PluginError(f"kind {name!r}: the unit {unit!r} is unknown; there are: {', '.join(UNITS)}")
+                    raise PluginError(
+                        f"kind {name!r}: the unit {unit!r} is unknown; simnav.spec.register_unit adds one; "
+                        f"there are: {', '.join(UNITS)}"
+                    )
         for detail in kind.datasheet:
             if detail not in cls.model_fields:
                 raise PluginError(
@@ -444,7 +464,8 @@ class Instrument(ABC):
         Raises
         ------
         InstrumentError
-            If `observe`, `noise_sigma` or `available` raises, or returns an array of another shape than it should.
+            If `observe`, `noise_sigma` or `available` raises, or returns an array of another shape than it should, or a
+            number that is not finite or a negative sigma for a sample that is delivered.
         """
         value, sigma, there = _checked_reading(self, tap)
         error, variates = self.ahead(tap.time)
@@ -478,6 +499,18 @@ def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Arr
             f"{label()}: available() returned an array of {there.dtype} of shape {there.shape}, where one of bool of "
             f"shape {(n,)} is wanted: an entry for each of {n} times"
         )
+    for method, array, wanted, right in (
+        ("observe()", value, np.isfinite(value), "finite; where nothing is delivered, available() says so"),
+        ("noise_sigma()", sigma, np.isfinite(sigma) & (sigma >= 0.0), "finite and not negative"),
+    ):
+        wrong = ~wanted.all(axis=1) if there is None else there & ~wanted.all(axis=1)
+        if wrong.any():  # the reference of a log may have holes
+            wrong &= np.isfinite(np.hstack([tap.position, tap.velocity, tap.attitude])).all(axis=1)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InstrumentError(
+                f"{label()}: {method} returned {array[row].tolist()} at {tap.time[row]:g} s; it should be {right}"
+            )
     return value, sigma, there
 
 

@@ -177,7 +177,7 @@ class Simulator:
         for name, instrument in self.aids.items():
             stream = instrument.sense(block.taps[name])
             for layer in self.layers:
-                stream = layer.apply(stream)
+                stream = layer.laid_over(stream)
             aids[name] = stream
         return Block(start, until, imu, imu_labels, aids, block.taps[_STEPS])
 

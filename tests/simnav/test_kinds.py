@@ -89,6 +89,13 @@ def test_without_a_limit_a_value_is_plausible_as_long_as_it_is_finite():
     [
         (("x", "compass", RANGE_AND_BEARING), "role = 'compass' .* should be one of: fix, velocity"),
         (("x", "other", ()), "one to 3 components, not 0"),
+        (("x", "other", Component("x", "m")), r"components = Component.* should be a tuple of Component"),
+        (("x", "other", ("x",)), r"components = \('x',\) of a kind should be a tuple of Component"),
+        (("x", "other", (Component("range, slant", "m"),)), "name of a component, 'range, slant', should be in snake"),
+        (("x", "other", (Component("x", "m"), Component("x", "deg"))), "two components of a kind have the name 'x'"),
+        (("x", "other", (Component("x", "m", "e"), Component("y", "m", "e"))), "two components .* have the name 'e'"),
+        (("x", "other", RANGE_AND_BEARING, None, False, "place"), "datasheet = 'place' .* should be a tuple of str"),
+        (("x", "range", RANGE_AND_BEARING, 3), "equation = 3 of a kind should be a function, or one of: position"),
         (("x", "range", RANGE_AND_BEARING, "bearing"), "equation = 'bearing' .* a function, or one of: position"),
         (("x", "heading", RANGE_AND_BEARING, "heading"), "'heading' gives true heading: 1 components, not 2"),
         (("x", "fix", RANGE_AND_BEARING, None, True), "first components of a geodetic kind are latitude and longitude"),

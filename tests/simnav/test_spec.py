@@ -10,7 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field, ValidationError
 
-from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, Vector, closest, entries, quantity, toml_number
+from simnav.spec import (
+    UNITS,
+    NonNegative,
+    Positive,
+    Spec,
+    SpecError,
+    Vector,
+    closest,
+    entries,
+    quantity,
+    register_unit,
+    toml_number,
+)
 
 
 class Gyroscope(Spec):
@@ -161,8 +173,34 @@ def test_a_missing_key_is_named():
 
 
 def test_an_unknown_unit_is_refused_when_the_class_is_written():
-    with pytest.raises(KeyError, match="unknown unit 'furlong'"):
+    with pytest.raises(SpecError, match="unknown unit 'furlong'"):
         quantity("furlong")
+
+
+def test_a_unit_of_others(plugins):
+    register_unit("fathom", 1.8288)
+    register_unit("fathom", 1.8288)  # a file may be loaded twice
+    sounding = type("Sounding", (Spec,), {"__annotations__": {"depth": float}, "depth": quantity("fathom")})
+    assert sounding.from_toml({"depth_fathom": 10}).depth == 18.288
+    with pytest.raises(SpecError, match=r"unknown key 'depth_m' .* it is given in fathom: 'depth_fathom'"):
+        sounding.from_toml({"depth_m": 10})
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "message"),
+    [
+        ("m", 0.3048, "the unit 'm' is known: it is 1 in SI, not 0.3048"),
+        ("kPa", 1000.0, "'kPa', should be in lower case"),
+        ("k_", 1.0, "'k_', should be in lower case"),
+        ("kpa", 0.0, "the factor of the unit 'kpa', 0.0, should be a number greater than 0"),
+        ("kpa", float("nan"), "the factor of the unit 'kpa', nan, should be"),
+        ("kpa", "1000", "the factor of the unit 'kpa', '1000', should be"),
+    ],
+)
+def test_a_unit_that_cannot_be_registered(plugins, name, factor, message):
+    with pytest.raises(SpecError, match=message):
+        register_unit(name, factor)
+    assert "kpa" not in UNITS
 
 
 def test_closest_lists_what_is_valid_where_nothing_is_near():

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from simnav.recording import FaultLabel
 from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, Multipath, NoiseStep, Ramp
-from simnav.sensors.faults.fault import FAULTS, Effect, FaultSpec, Names, effect_of, register_fault
+from simnav.sensors.faults.fault import FAULTS, Effect, FaultError, FaultSpec, Names, effect_of, register_fault
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
 from simnav.sensors.faults.layer import Activity, FaultLayer
 from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
@@ -26,6 +26,7 @@ __all__ = [
     "BiasStep",
     "Effect",
     "FalseZero",
+    "FaultError",
     "FaultLayer",
     "FaultSpec",
     "Frozen",
@@ -77,7 +78,12 @@ def build_layers(faults: Sequence[FaultSpec], seed: int) -> tuple[FaultLayer, ..
     seen: Counter[str] = Counter()
     for fault in faults:
         key = fault.stream_name
-        layers.append(fault.build(bit, seed, seen[key]))
+        layer = fault.build(bit, seed, seen[key])
+        if not isinstance(layer, FaultLayer):
+            raise FaultError(
+                f"fault {fault.kind!r}: build() returned {type(layer).__name__}, where a FaultLayer is wanted"
+            )
+        layers.append(layer)
         seen[key] += 1
         bit += fault.bits
     return tuple(layers)

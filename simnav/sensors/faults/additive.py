@@ -56,6 +56,17 @@ class AdditiveLayer(FaultLayer):
             Components as in ``KINDS[stream.kind].errors``, SI units; a row of zeros does not touch its measurement.
         """
 
+    @staticmethod
+    def readings(stream: AidStream, time: Array) -> Array:
+        """The (m, d) values of a stream at (m,) times, for errors that depend on them; zeros where it has none."""
+        place = np.searchsorted(stream.time, time)
+        place[place == len(stream.time)] = 0
+        values = np.zeros((len(time), stream.value.shape[1]))
+        if len(stream.time):
+            there = stream.time[place] == time
+            values[there] = stream.value[place[there]]
+        return values
+
     def ahead(self, name: str, kind: str, time: Array) -> tuple[NDArray[np.int64], Array]:
         """See `FaultLayer.ahead`; for those whose `error` asks for no more of a stream than what it is called."""
         interval, error = super().ahead(name, kind, time)
@@ -75,7 +86,13 @@ class AdditiveLayer(FaultLayer):
         if found is None:
             return stream
         active, interval = found
-        error = self.error(stream, times[active], times[active] - self.activity.starts[interval])
+        error = np.asarray(self.error(stream, times[active], times[active] - self.activity.starts[interval]))
+        components = KINDS[stream.kind].errors
+        if error.shape != (len(active), len(components)):
+            raise ValueError(
+                f"error() returned an array of shape {error.shape}, where {(len(active), len(components))} is wanted: "
+                f"a row for each of {len(active)} times, a column for each component ({', '.join(components)})"
+            )
         rows = active
         if delivered is not None:
             # Back from all sample times to those that are in the stream.

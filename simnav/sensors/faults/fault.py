@@ -8,23 +8,25 @@ with a start and an end, or with random intervals, takes one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import wraps
 from math import inf
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 
 from pydantic import BeforeValidator, model_validator
 from pydantic.fields import FieldInfo
 
-from simnav.plugins import PluginError, Registry
+from simnav.plugins import PluginError, Registry, exception_of, place_of
 from simnav.recording import FaultLabel
 from simnav.sensors.faults.sizes import QUANTITIES, QUANTITY_OF, axes_of, size_by_component
-from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, quantity, unit_of
+from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, hidden_attribute, quantity, unit_of
 from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
     from simnav.sensors.faults.layer import FaultLayer
 
-__all__ = ["FAULTS", "Effect", "FaultSpec", "Names", "effect_of", "register_fault"]
+__all__ = ["FAULTS", "Effect", "FaultError", "FaultSpec", "Names", "effect_of", "register_fault"]
 
 #: Least mean length of random intervals: shorter ones touch no measurement, and cost memory [s].
 _LEAST_MEAN = 1e-3
@@ -51,6 +53,10 @@ _Intervals = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_interva
 #: from the start of each interval; adds gross errors to single measurements; puts another value in its place; disturbs
 #: the IMU; or something else.
 Effect = Literal["missing", "noise", "lasting", "growing", "gross", "replaced", "imu", "other"]
+
+
+class FaultError(SpecError):
+    """A fault that cannot be built or laid over measurements; the message names it, its file, and what is wrong."""
 
 
 class FaultSpec(Spec):
@@ -236,7 +242,7 @@ class FaultSpec(Spec):
         occurrence : int, optional
             Tells faults of the same name apart (`build_layers` counts them); by default the index.
         """
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__qualname__} has no build()")
 
     @property
     def stream_name(self) -> str:
@@ -259,19 +265,45 @@ def register_fault(cls: type[F]) -> type[F]:
     Raises
     ------
     PluginError
-        If the class is no `FaultSpec`, or its name is taken.
+        If the class is no `FaultSpec`, its name is taken, or its effect or one of its fields is not valid.
     """
     if not (isinstance(cls, type) and issubclass(cls, FaultSpec)):
         raise PluginError(f"@register_fault: {cls!r} is not a subclass of simnav.sensors.faults.FaultSpec")
     name = cls.model_fields["kind"].default
     if not isinstance(name, str):
         raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_fault'] = 'my_fault'")
+    if cls.effect not in get_args(Effect):
+        raise PluginError(f"fault {name!r}: effect = {cls.effect!r} should be one of: {', '.join(get_args(Effect))}")
+    hidden = hidden_attribute(cls, FaultSpec)
+    if hidden is not None:
+        raise PluginError(f"fault {name!r}: the field {hidden!r} of {cls.__qualname__} hides FaultSpec.{hidden}")
     for stem in cls.stems:
         for q in QUANTITIES:
             if f"{stem}_{q}" not in cls.model_fields:
                 raise PluginError(f"fault {name!r}: a stem needs a field for every quantity; there is no {stem}_{q}")
     FAULTS.add(name, cls)
+    for method in ("build", "check"):
+        setattr(cls, method, _named(getattr(cls, method)))
     return cls
+
+
+def _named(method: Callable[..., Any]) -> Callable[..., Any]:
+    """A method of a specification, whose errors name the fault."""
+
+    @wraps(method)
+    def named(self: FaultSpec, *args: Any, **rest: Any) -> Any:
+        try:
+            return method(self, *args, **rest)
+        except (SpecError, MemoryError):
+            raise
+        except Exception as error:
+            cls = type(self)
+            file = Path(place_of(cls)[0]).name
+            raise FaultError(
+                f"fault {self.kind!r} ({cls.__qualname__} in {file}): {exception_of(cls, error)}"
+            ) from error
+
+    return named
 
 
 def effect_of(kind: str) -> Effect:

@@ -7,12 +7,16 @@ faults never change one another.
 
 from __future__ import annotations
 
+from abc import ABC
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.plugins import exception_of, place_of
 from simnav.recording import AidStream, ImuLabels
+from simnav.sensors.faults.fault import FaultError
 from simnav.streams import stream as random_stream
 from simnav.types import KINDS, Array, ImuSamples
 
@@ -96,7 +100,7 @@ class Activity:
         return (rows, number[rows]) if len(rows) else None
 
 
-class FaultLayer:
+class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have some are abstract)
     """A fault in one run, laid over the streams of its instruments block by block.
 
     Parameters
@@ -178,6 +182,31 @@ class FaultLayer:
         """Likewise of the IMU: the n samples that are disturbed, and the (n, 6) errors of rate and force."""
         raise NotImplementedError(f"{type(self).__name__} does not disturb an IMU")
 
+    def laid_over(self, stream: AidStream) -> AidStream:
+        """`apply`, for the fault's instruments only, with errors that name the fault, its file and the instrument.
+
+        Raises
+        ------
+        FaultError
+            If `apply` raises, or returns something else than the stream of the instrument.
+        """
+        if not self.touches(stream):
+            return stream
+        try:
+            result = self.apply(stream)
+            if result is not stream:
+                _check(result, stream)
+        except (FaultError, MemoryError):
+            raise
+        except Exception as error:
+            cls = type(self)
+            file = Path(place_of(cls)[0]).name
+            raise FaultError(
+                f"fault {self.spec.kind!r} on {stream.name!r} ({cls.__qualname__} in {file}): "
+                f"{exception_of(cls, error)}"
+            ) from error
+        return result
+
     def apply(self, stream: AidStream) -> AidStream:
         """Lay the fault over the next block of a stream.
 
@@ -209,3 +238,21 @@ class FaultLayer:
             As given where the fault is none of the IMU's.
         """
         return samples, labels
+
+
+def _check(result: object, before: AidStream) -> None:
+    """ValueError where a layer made something of a stream that is none of the instrument."""
+    if not isinstance(result, AidStream):
+        raise ValueError(f"apply() returned {type(result).__name__}, where an AidStream is wanted")
+    n, components = len(result.time), KINDS[before.kind].values
+    wide = (n, len(components))
+    for name, wanted in (("value", wide), ("fault_error", wide), ("sigma", wide), ("faults", wide[:1])):
+        shape = np.shape(getattr(result, name))
+        if shape != wanted:
+            raise ValueError(
+                f"apply() returned a stream whose {name} is of shape {shape}, where {wanted} is wanted: a row for each "
+                f"of {n} times, a column for each component ({', '.join(components)})"
+            )
+    wrong = ~np.isfinite(result.value).all(axis=1)
+    if wrong.any() and np.isfinite(before.value).all():
+        raise ValueError(f"at {result.time[np.argmax(wrong)]:g} s the value is not finite")

@@ -161,8 +161,28 @@ def test_an_observation_of_the_wrong_shape_is_named(plugins, tmp_path):
     recording = record(load(tmp_path / "lagoon.toml").model_copy(update={"duration": 2.0, "faults": ()}), 1)
     trial = run_trial(make("ekf"), recording)
     assert trial.status == "error"
-    assert "kind 'beacon' should return a reading of shape (2,) and its Jacobian of shape (2, 9)" in trial.reason
+    assert "kind 'beacon' (observe() in beacon.py, line 20), for the instrument 'transponder', should" in trial.reason
+    assert "return a reading of shape (2,) and its Jacobian of shape (2, 9)" in trial.reason
     assert "not shapes (2,) and (2, 10)" in trial.reason
+
+
+@pytest.mark.parametrize(
+    ("new", "message"),
+    [
+        ("raise RuntimeError('boom')", "raised RuntimeError: boom"),
+        ("return reading * np.nan, jacobian", "should return finite numbers, or None where the state has no reading"),
+        ("return reading, jacobian + np.inf", "should return finite numbers, or None where the state has no reading"),
+    ],
+)
+def test_an_observation_that_fails_is_named(plugins, tmp_path, new, message):
+    for name in ("beacon.py", "echo.py", "lagoon.toml"):
+        (tmp_path / name).write_text((plugins / name).read_text().replace("return reading, jacobian", new))
+    recording = record(load(tmp_path / "lagoon.toml").model_copy(update={"duration": 2.0, "faults": ()}), 1)
+    for estimator in ("ekf", "ukf"):
+        trial = run_trial(make(estimator), recording)
+        assert trial.status == "error"
+        assert "(observe() in beacon.py, line 20), for the instrument 'transponder'" in trial.reason
+        assert message in trial.reason
 
 
 def test_a_kind_that_names_a_compiled_equation_is_as_good_as_ours(plugins):

@@ -8,7 +8,8 @@ import pytest
 from simnav.log.channel import geodetic_from_local, list_recordings, read_channel, read_imu
 from simnav.log.spec import ChannelSpec, OriginSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning
-from simnav.spec import SpecError
+from simnav.plugins import load_plugin
+from simnav.spec import SpecError, register_unit
 
 transform = pytest.importorskip("pyins.transform")
 
@@ -274,3 +275,15 @@ def test_a_log_faster_than_its_datasheet_says_so(tiny):
     tiny.replace("rate_hz = 1.0", "rate_hz = 0.2")
     with pytest.warns(LogWarning, match=r"'dvl' is measured every \S+ s, but rate_hz = 0\.2, and the environment"):
         record(tiny.scenario(), 0)
+
+
+def test_a_unit_of_others_is_read_and_another_one_refused(tiny, plugins):
+    load_plugin(plugins / "pressure.py")
+    register_unit("hpa", 100.0)
+    spec = log(tiny)
+    for unit, factor in (("kpa", 1000.0), ("hpa", 100.0), ("1", 1.0)):
+        pressures = read_channel(spec, ChannelSpec(file="dvl", columns=(2,), units=(unit,)), "pressure", "1").value
+        expected = read_channel(spec, ChannelSpec(file="dvl", columns=(2,)), "pressure", "1").value
+        np.testing.assert_array_equal(pressures, factor * expected)
+    with pytest.raises(LogError, match=r"column 2: pressure of pressure in 'm'; it is in 'kpa'"):
+        read_channel(spec, ChannelSpec(file="dvl", columns=(2,), units=("m",)), "pressure", "1")

@@ -58,6 +58,17 @@ AVAILABLE = "return np.linalg.norm(self.to_beacon(tap), axis=1) <= self.reach"
             r"available\(\) returned an array of bool of shape \(3,\), where one of bool of shape \(120,\) is wanted",
         ),
         (AVAILABLE, "return np.ones(120, int)", r"available\(\) returned an array of int64 of shape \(120,\), where"),
+        (
+            READING,
+            READING.replace("bearing]", "bearing * np.where(tap.time > 7.0, np.nan, 1.0)]"),
+            r"observe\(\) returned \[.*, nan\] at 8 s; it should be finite; where nothing is delivered, available\(\) "
+            r"says so",
+        ),
+        (
+            AVAILABLE,
+            AVAILABLE + "\n\n    def noise_sigma(self, observed):\n        return observed - 1e3",
+            r"noise_sigma\(\) returned \[-.*\] at 1 s; it should be finite and not negative",
+        ),
         (READING, "raise RuntimeError('boom')", r"RuntimeError in observe\(\), line \d+: boom"),
         ("north, east, down = self", "north, east, up = self", r"NameError in observe\(\), line \d+: name 'down'"),
     ],
@@ -68,6 +79,15 @@ def test_a_reading_that_is_none(broken, old, new, message):
         record(scenario, 1)
     assert "\n" not in str(raised.value)
     assert isinstance(raised.value, SpecError)
+
+
+def test_what_is_not_delivered_may_be_anything(broken):
+    """Where there is nothing to deliver, a formula may have no value."""
+    more = "\n\n    def noise_sigma(self, observed):\n        late = np.arange(len(observed))[:, None] >= 100\n"
+    more += "        return np.where(late, np.nan, self.sigma)"
+    with pytest.raises(InstrumentError, match="at 101 s"):
+        record(broken(AVAILABLE, AVAILABLE + more), 1)
+    assert len(record(broken(AVAILABLE, "return tap.time <= 100.0" + more), 1).data.aids["transponder"]) == 100
 
 
 @pytest.mark.parametrize(

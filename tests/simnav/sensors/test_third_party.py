@@ -235,7 +235,7 @@ THING = Kind("a thing", "other", (Component("thing", "m"),))
         (
             lambda: instrument(),
             Kind("x", "other", (Component("x", "metre"),)),
-            "the unit 'metre' is unknown; there are: s",
+            "the unit 'metre' is unknown; simnav.spec.register_unit adds one; there are: s",
         ),
         (
             lambda: instrument(),
