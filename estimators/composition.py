@@ -47,6 +47,21 @@ class Solver(Estimator):
     refuses: ClassVar[Mapping[str, str]] = {}
     row: str = ""
 
+    @classmethod
+    def misfit(cls, keyword: str, made: type) -> str:
+        """Why it cannot work with a piece of a class; empty where it can.
+
+        Parameters
+        ----------
+        keyword : str
+            One of `pieces`.
+        made : type
+            Class of the piece.
+        """
+        if getattr(made, "reads_truth", False) and not cls.reference:
+            return "it reads the truth of a run, which only an oracle is given"
+        return ""
+
     @property
     def label(self) -> str:
         """What messages call it."""
@@ -170,7 +185,8 @@ class Row(Estimator):
     Raises
     ------
     TypeError
-        When the class is defined: if the solver does not take a piece, or two pieces have a parameter of one name.
+        When the class is defined: if the solver does not take a piece, or cannot work with it, or two pieces have a
+        parameter of one name. When it is made: if the solver needs a piece that the row does not name.
     """
 
     recipe: ClassVar[Mapping[str, Piece]] = {}
@@ -189,6 +205,9 @@ class Row(Estimator):
                 reasons: Mapping[str, str] = getattr(solver.make, "refuses", {})
                 why = reasons.get(name, f"it takes {', '.join(taken) or 'none'}")
                 raise TypeError(f"{cls.__name__}: {solver.label} takes no {name}: {why}")
+        for name, each in cls.recipe.items():
+            if name != "solver" and isinstance(each.make, type):
+                _require_fit(cls, name, each.make)
         for flag in ("slow", "reference"):
             if flag not in vars(cls):
                 setattr(cls, flag, getattr(solver.make, flag, False))
@@ -225,6 +244,15 @@ class Row(Estimator):
         return getattr(self.solver, name)
 
 
+def _require_fit(cls: type[Row], keyword: str, made: Any) -> None:
+    """Refuse a piece of a class that the solver of a row cannot work with: TypeError."""
+    solver = cls.recipe["solver"]
+    misfit: Callable[[str, Any], str] | None = getattr(solver.make, "misfit", None)
+    why = misfit(keyword, made) if misfit is not None else ""
+    if why:
+        raise TypeError(f"{cls.__name__}: {solver.label} does not work with {made.__name__}: {why}")
+
+
 def _equip(cls: type[Row]) -> None:
     """Give a row its constructor, and the documentation of its parameters."""
     recipe = cls.recipe
@@ -252,11 +280,18 @@ def _equip(cls: type[Row]) -> None:
             else:
                 documentation.append((name, sort, meaning))
 
+    lacking = [name for name in _required(recipe["solver"]) if name not in recipe]
+
     def __init__(self: Row, **values: Any) -> None:  # noqa: N807 (it becomes the class's)
         for name in values:
             if name not in parameters:
                 raise TypeError(f"{cls.__name__} has no parameter {name!r}; it has {', '.join(parameters) or 'none'}")
         parts = {name: p.build(values) for name, p in recipe.items() if name != "solver"}
+        for name, part in parts.items():
+            if part is not None and not isinstance(recipe[name].make, type):  # a function has made it
+                _require_fit(type(self), name, type(part))
+        for name in lacking:
+            raise TypeError(f"{cls.__name__} names no {name}, and {recipe['solver'].label} needs one")
         self.solver = recipe["solver"].build(values, **parts)
         if isinstance(self.solver, Solver):
             self.solver.row = type(self).name
@@ -273,6 +308,13 @@ def _equip(cls: type[Row]) -> None:
         text += f"\n{names} : {sort}" if sort else f"\n{names}"
         text += "".join(f"\n    {line}" for line in meaning.splitlines())
     cls.__doc__ = text
+
+
+def _required(solver: Piece) -> list[str]:
+    """The pieces that a solver cannot do without."""
+    known = inspect.signature(solver.make).parameters
+    inner: tuple[str, ...] = getattr(solver.make, "pieces", ())
+    return [name for name in inner if name in known and known[name].default is inspect.Parameter.empty]
 
 
 def _hints(make: Callable[..., Any]) -> dict[str, Any]:

@@ -322,19 +322,13 @@ def kernels() -> list[Kernel[..., Any]]:
     return [k for k in _kernels if k.signature is not None]
 
 
-def prune(older_than: float = KEEP) -> int:
-    """Delete the cached kernels that no process has used for a while; return how many.
-
-    Parameters
-    ----------
-    older_than : float
-        Time since the last use from which on a kernel is deleted [s].
-    """
+def prune() -> int:
+    """Delete the cached kernels that no process has used for `KEEP`; return how many."""
     root = cache_directory()
     count = 0
     for directory in [] if root is None else root.iterdir():
         with contextlib.suppress(OSError):  # another process may prune, too
-            if directory.is_dir() and time.time() - directory.stat().st_mtime > older_than:
+            if directory.is_dir() and time.time() - directory.stat().st_mtime > KEEP:
                 shutil.rmtree(directory, ignore_errors=True)
                 count += 1
     return count

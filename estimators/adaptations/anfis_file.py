@@ -64,13 +64,8 @@ class Parameters:
         scaled: Array = (np.clip(known, self.low, self.high) - self.low) / (self.high - self.low)
         return scaled
 
-    def log_factor(self, x: Array) -> Array:
-        """(k,) logarithms of the variance over the datasheet's, of (k, n) inputs."""
-        bounded: Array = np.clip(self.network(self.scale(x)), 0.0, self.largest)
-        return bounded
-
     def log_factor_of(self, row: list[float]) -> float:
-        """`log_factor` of one row of inputs, quicker."""
+        """Logarithm of the variance over the datasheet's, of one row of inputs."""
         scaled = [
             (min(max(typical if x != x else x, low), high) - low) / (high - low)
             for x, (low, high, typical) in zip(row, self._ranges)

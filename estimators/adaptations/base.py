@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from simnav.types import Array, Instruments, Measurement
 
@@ -58,11 +58,14 @@ class Adaptation:
     inflates_motion : bool
         Whether the covariance of the motion is inflated, and no other (`ErrorModel.loosen`). A window weighs motion by
         its own residuals, and leaves this out.
+    reads_truth : bool
+        Whether it needs the truth of a run, by a method ``reveal``; only an oracle passes it on.
     """
 
     inflation: float = 1.0
     inflates: bool = False
     inflates_motion: bool = False
+    reads_truth: ClassVar[bool] = False
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

@@ -42,6 +42,8 @@ LASTING = ("lasting", "growing")
 class TrueNoise(Adaptation):
     """The true sigma of each measurement, and the faults that touch it: the oracle O1."""
 
+    reads_truth = True
+
     def __init__(self) -> None:
         self.faults: tuple[FaultLabel, ...] = ()
         self._streams: dict[str, tuple[AidStream, Array]] = {}

@@ -17,7 +17,6 @@ import numpy as np
 
 from simnav.environment.seeds import FIRST_TRAINING_SEED, require_disjoint, training_seed
 from simnav.estimators.learning.features import GUIDANCE, Numbers, observation_size
-from simnav.estimators.learning.filters import Layout
 from simnav.estimators.learning.tasks import CORRECTIONS, TASKS
 from simnav.scenario import Scenario, load
 from simnav.types import Array
@@ -153,14 +152,6 @@ class Policy:
         if self.task == "Detection":
             return np.asarray(x > 0.0, dtype=np.int8)
         return np.clip(x, -1.0, 1.0)
-
-    def require(self, layout: Layout) -> None:
-        """Refuse an environment with other instruments than it was trained for: PolicyError."""
-        if layout.kinds != self.kinds or layout.most != self.most:
-            raise PolicyError(
-                f"{self.source}: it was trained for {', '.join(self.kinds)} with at most {self.most} measurements a "
-                f"step of each, not for {', '.join(layout.kinds)} with {layout.most}"
-            )
 
     def require_unseen(self, seeds: Sequence[int]) -> None:
         """Refuse to be scored on the seeds of the voyages that it learned from: ValueError."""

@@ -242,7 +242,9 @@ class ErrorModel(ABC):
             covariance[:, attitude] = covariance[:, attitude] @ J.T
 
     def snapshot(self) -> list[Array]:
-        """Copies of what `correct` changes, for `restore`."""
+        """Copies of what `correct` changes, for `restore`; TypeError where the model does not name it."""
+        if not self.state:
+            raise TypeError(f"{type(self).__name__}.state is to name the arrays that `correct` changes; it names none")
         return [getattr(self, name).copy() for name in self.state]
 
     def restore(self, snapshot: list[Array]) -> None:

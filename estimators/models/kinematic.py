@@ -39,6 +39,8 @@ class KinematicModel(ErrorModel):
     """
 
     size = 6
+    state = ("position", "velocity")
+    memory = ("_yaw",)
 
     def __init__(self, acceleration: float = 0.2):
         self.acceleration = acceleration
@@ -63,7 +65,7 @@ class KinematicModel(ErrorModel):
         self.time = start.time
         self.position = np.array(start.position, dtype=np.float64)
         self.velocity = np.array(start.velocity, dtype=np.float64)
-        self._yaw = float(start.attitude[2])
+        self._yaw = np.array(start.attitude[2], dtype=np.float64)
         slow = [r.bias**2 + r.bias_instability**2 for r in receivers]
         self._slow = np.diag(np.max(slow, axis=0))
         return np.array(start.covariance[:6, :6])
@@ -87,6 +89,10 @@ class KinematicModel(ErrorModel):
         covariance[range(3, 6), range(3, 6)] += q * dt
         self.time = until
 
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an error through the last propagation, in place."""
+        error[:3] += elapsed * error[3:]
+
     def measure(self, measurement: Measurement) -> Linearised:
         """Linearise a fix or a velocity; a lever arm is turned by the course, or the last one, or the initial yaw."""
         sheet = self.instruments[measurement.instrument]
@@ -98,7 +104,7 @@ class KinematicModel(ErrorModel):
             return Linearised(measurement.value - self.velocity, H, np.diag(noise))
         vn, ve = float(self.velocity[0]), float(self.velocity[1])
         if hypot(vn, ve) > SLOWEST:
-            self._yaw = atan2(ve, vn)
+            self._yaw[...] = atan2(ve, vn)
         x, y, z = sheet.lever_arm.tolist()
         c, s = cos(self._yaw), sin(self._yaw)
         arm = np.array([c * x - s * y, s * x + c * y, z])

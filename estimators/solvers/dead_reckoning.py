@@ -19,7 +19,9 @@ Groves 2013, section 6.1.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import hypot
+from typing import ClassVar
 
 import numpy as np
 
@@ -57,6 +59,13 @@ class DeadReckoningEstimator(Solver):
     current : float
         Sigma of the current that a speed log cannot see, each component [m/s]; for the covariance only.
     """
+
+    refuses: ClassVar[Mapping[str, str]] = {
+        "model": "it is a model of its own",
+        **dict.fromkeys(
+            ("adaptation", "weighting", "isolation", "iteration", "smoother"), "it weighs no instrument against another"
+        ),
+    }
 
     def __init__(self, current: float = 0.3):
         self.current = current

@@ -51,7 +51,9 @@ from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.models.propagation import propagate_covariance
+from simnav.estimators.models.unaided import UnaidedModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
@@ -97,6 +99,17 @@ class FederatedEstimator(KalmanEstimator):
     }
     assimilates = False
     model: InertialModel
+
+    @classmethod
+    def misfit(cls, keyword: str, made: type) -> str:
+        """Why it cannot work with a piece of a class: its filters share the motion of an inertial model."""
+        if keyword == "model" and not issubclass(made, InertialModel):
+            return "its local filters share the motion of an InertialModel"
+        if keyword == "model" and issubclass(made, NineStateModel):
+            return "its local filters have the biases of the IMU among their states"
+        if keyword == "model" and issubclass(made, UnaidedModel):
+            return "it has a local filter for each instrument, and this model observes none"
+        return super().misfit(keyword, made)
 
     def __init__(
         self,

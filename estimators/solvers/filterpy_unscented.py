@@ -15,8 +15,9 @@ Of filterpy 2.0 as it is, and worked around here or in the adapter:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import cos
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -45,7 +46,18 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
     """
 
     pieces = ("model",)
+    refuses: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("adaptation", "weighting", "isolation", "iteration", "smoother"),
+        "filterpy's filter works alone, to be compared with SigmaPointEstimator",
+    )
     uses = OBSERVED
+
+    @classmethod
+    def misfit(cls, keyword: str, made: type) -> str:
+        """Why it cannot work with a piece of a class: its functions are those of one model."""
+        if keyword == "model" and not issubclass(made, ShipPoints):
+            return "filterpy's filter is given the functions of ShipPoints"
+        return super().misfit(keyword, made)
 
     def __init__(self, model: ShipPoints, *, alpha: float = 0.5, beta: float = 2.0, kappa: float = 0.0):
         if not 0.0 < alpha < np.inf:

@@ -68,8 +68,8 @@ class GtsamEstimator(Solver):
 
     slow = True
     refuses: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("model", "adaptation", "weighting", "isolation"),
-        "GTSAM's graph is made from our inertial model, to be compared with it",
+        ("model", "adaptation", "weighting", "isolation", "iteration", "smoother"),
+        "GTSAM's graph is made from our inertial model and solved by GTSAM alone, to be compared with ours",
     )
     #: Whether every end of a step is a node.
     every_step = False

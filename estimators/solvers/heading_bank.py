@@ -129,6 +129,8 @@ class HeadingBank(Solver):
 
     pieces: ClassVar[tuple[str, ...]] = ("model",)
     refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "iteration": "its filters begin at headings that are near enough to be linearised at",
         "adaptation": "an adapted noise would decide the likelihood of a heading",
         "smoother": "a filter that is dropped leaves no trajectory",
     }

@@ -60,7 +60,7 @@ class InvariantKalmanEstimator(KalmanEstimator):
     Parameters
     ----------
     model : InertialModel
-        Or another with position, velocity and attitude as the first nine components of its error.
+        Position, velocity and attitude are the first nine components of its error.
     adaptation : Adaptation, optional
         Chooses the noise of each measurement; default: the datasheet's.
     error : "left" or "right"
@@ -74,6 +74,15 @@ class InvariantKalmanEstimator(KalmanEstimator):
         "smoother": "it turns the covariance after a correction, which a smoother does not undo",
     }
     assimilates = False
+
+    @classmethod
+    def misfit(cls, keyword: str, made: type) -> str:
+        """Why it cannot work with a piece of a class: its group is that of an inertial model."""
+        if keyword == "model" and not issubclass(made, InertialModel):
+            return (
+                "its group has position, velocity and attitude: the first nine components of an InertialModel's error"
+            )
+        return super().misfit(keyword, made)
 
     def __init__(
         self, model: InertialModel, adaptation: Adaptation | None = None, error: Literal["left", "right"] = "left"

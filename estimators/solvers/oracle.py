@@ -62,6 +62,13 @@ class OracleEstimator(KalmanEstimator):
     }
     reference = True
 
+    @classmethod
+    def misfit(cls, keyword: str, made: type) -> str:
+        """Why it cannot work with a piece of a class: an adaptation is to know the truth."""
+        if keyword == "adaptation" and not issubclass(made, TrueNoise):
+            return "an oracle is told the noise, and estimates none; TrueNoise, NominalNoise and MixtureNoise say it"
+        return super().misfit(keyword, made)
+
     def __init__(self, adaptation: TrueNoise, smoother: Smoother | None = None, *, restore: bool = False):
         super().__init__(InertialModel(), adaptation, smoother=smoother)
         if restore and not isinstance(adaptation, NominalNoise):

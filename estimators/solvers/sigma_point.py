@@ -96,6 +96,13 @@ class SigmaPointEstimator(KalmanEstimator):
     assimilates = False
     model: PointModel
 
+    @classmethod
+    def misfit(cls, keyword: str, made: type) -> str:
+        """Why it cannot work with a piece of a class: a model is to move points."""
+        if keyword == "model" and not issubclass(made, PointModel):
+            return "it moves no sigma points; InertialPoints and ShipPoints do"
+        return super().misfit(keyword, made)
+
     def __init__(
         self,
         model: PointModel,

@@ -99,6 +99,7 @@ from simnav.estimators.solvers.hypotheses import (
     uncertain_start,
 )
 from simnav.estimators.solvers.iterated import Iteration
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.separation import KNOWN_HEADING, SeparationTest
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
 
@@ -156,6 +157,8 @@ class SolutionSeparation(Solver):
 
     pieces: ClassVar[tuple[str, ...]] = ("model",)
     refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "iteration": "the covariance of the separation holds for filters that linearise a measurement once",
         "adaptation": "the covariance of the separation holds for filters that believe the same noise",
         "smoother": "an exclusion changes the filter",
     }
@@ -209,7 +212,7 @@ class SolutionSeparation(Solver):
         self._quiet = float(norm.isf(0.25 * self.risk / hypotheses))
         share = self.risk / (2.0 * hypotheses * self.fault_probability)
         self._missed = float(norm.isf(min(share, 0.5)))
-        self._group = fixes_and_logs(instruments)
+        self._group = {n: fix for n, fix in fixes_and_logs(instruments).items() if n in self._names}
         self._rules = (ExclusionRules if self._inertial else RulesWithoutImu)(self._group)
         blind = {n for n in self._names if instruments[n].role in ("velocity", "depth") and not self._group.get(n)}
         self._heading_sources = set(self._names) - blind

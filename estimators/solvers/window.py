@@ -110,6 +110,13 @@ class WindowEstimator(Solver):
     #: Whether a step takes the older nodes as they were eliminated before.
     incremental: ClassVar[bool] = True
 
+    @classmethod
+    def misfit(cls, keyword: str, made: type) -> str:
+        """Why it cannot work with a piece of a class: it keeps no covariance of a prediction."""
+        if keyword == "adaptation" and getattr(made, "inflates", False):
+            return "it inflates the covariance of the prediction, and a window keeps none"
+        return super().misfit(keyword, made)
+
     def __init__(
         self,
         model: ModelChoice | Chain,

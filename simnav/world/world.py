@@ -168,10 +168,6 @@ class World:
             raise ValueError("a world with manoeuvres steers for itself")
         motion.command(_ON, self._x[None], np.array([np.nan]), np.array([heading]), np.array([speed]))
 
-    def believe(self, heading: float) -> None:
-        """The heading that commands are steered by is off by this much [rad] from now on."""
-        self._x[motion.ERROR_HEADING] = heading
-
     def _one(self) -> tuple[Any, ...]:
         """The first arguments of `simnav.world.motion.advance` for this world alone."""
         rows, points, phase, waves, eddies = (

@@ -167,7 +167,8 @@ def test_a_learning_agent(tmp_path, monkeypatch, capsys):
 @pytest.mark.usefixtures("clean_registry")
 @pytest.mark.parametrize(
     ("page", "number"), [("how-to/combine-pieces.md", 0), ("how-to/combine-pieces.md", 1),
-                         ("how-to/combine-pieces.md", 2), ("how-to/filterpy.md", 0)],
+                         ("how-to/combine-pieces.md", 2), ("how-to/combine-pieces.md", 3),
+                         ("how-to/filterpy.md", 0)],
 )  # fmt: skip
 def test_estimators_of_the_guides_keep_the_contract(tmp_path, page, number):
     path = tmp_path / f"example_{number}.py"

@@ -17,22 +17,33 @@ from simnav.estimators.adaptations.fading import FadingMemory
 from simnav.estimators.adaptations.gating import ChiSquareGate
 from simnav.estimators.adaptations.innovation_based import InnovationBased
 from simnav.estimators.adaptations.sage_husa import SageHusa
+from simnav.estimators.adaptations.truth import TrueNoise
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row, documented, piece
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
 from simnav.estimators.models.kinematic import KinematicModel
+from simnav.estimators.models.nine_state import NineStateModel
+from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.models.unaided import UnaidedModel
 from simnav.estimators.rows.kalman import Ekf
+from simnav.estimators.solvers.dead_reckoning import DeadReckoningEstimator
 from simnav.estimators.solvers.federated import FederatedEstimator
+from simnav.estimators.solvers.filterpy_unscented import FilterpyUnscentedEstimator
 from simnav.estimators.solvers.full_graph import FullGraph
 from simnav.estimators.solvers.gtsam_solvers import FixedLagEstimator
+from simnav.estimators.solvers.heading_bank import HeadingBank
 from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.invariant import InvariantKalmanEstimator
+from simnav.estimators.solvers.iterated import Iteration
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.linear import LinearKalmanEstimator
+from simnav.estimators.solvers.oracle import OracleEstimator
 from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 from simnav.estimators.solvers.smoother import Smoother
+from simnav.estimators.solvers.solution_separation import SolutionSeparation
+from simnav.estimators.solvers.weighted import WeightedKalmanEstimator
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.gradient_adaptive import GradientAdaptive
@@ -165,6 +176,74 @@ def test_a_solver_that_cannot_smooth_says_why(solver: type):
         return
     with pytest.raises(TypeError, match=r"takes no smoother: (?!it takes)"):
         type(Row)("Smoothed", (Row,), {}, solver=solver, model=InertialModel, smoother=Smoother)
+
+
+@pytest.mark.parametrize(
+    ("pieces", "says"),
+    [
+        ({"solver": SigmaPointEstimator, "model": InertialModel}, "it moves no sigma points; InertialPoints and"),
+        ({"solver": InvariantKalmanEstimator, "model": Suitable}, "its group has position, velocity and attitude"),
+        ({"solver": FederatedEstimator, "model": ShipModel}, "its local filters share the motion of an InertialModel"),
+        ({"solver": FederatedEstimator, "model": NineStateModel}, "have the biases of the IMU among their states"),
+        ({"solver": FederatedEstimator, "model": UnaidedModel}, "this model observes none"),
+        ({"solver": FilterpyUnscentedEstimator, "model": InertialPoints}, "is given the functions of ShipPoints"),
+        ({"solver": OracleEstimator, "adaptation": SageHusa}, "an oracle is told the noise, and estimates none"),
+        ({"solver": KalmanEstimator, "model": Suitable, "adaptation": TrueNoise}, "it reads the truth of a run"),
+        ({"solver": WindowEstimator, "model": Suitable, "adaptation": TrueNoise}, "it reads the truth of a run"),
+        ({"solver": FullGraph, "model": Suitable, "adaptation": FadingMemory}, "inflates the covariance of the pred"),
+    ],
+)
+def test_pieces_that_do_not_fit_say_so_where_the_row_is_declared(pieces: dict, says: str):
+    *_, last = (p.__name__ for p in pieces.values())
+    with pytest.raises(TypeError, match=rf"Unfit: {pieces['solver'].__name__} does not work with {last}: .*{says}"):
+        type(Row)("Unfit", (Row,), {}, **pieces)
+    keyword = list(pieces)[-1]
+    row = type(Row)("Unfit", (Row,), {}, **{**pieces, keyword: lambda: pieces[keyword]()})
+    with pytest.raises(TypeError, match=says):  # what a function makes is known when the row is made
+        row()
+
+
+def test_a_row_without_a_piece_that_its_solver_needs_says_so():
+    base = type(Row)("Base", (Row,), {}, solver=WeightedKalmanEstimator, model=Suitable)
+    with pytest.raises(TypeError, match="Base names no weighting, and WeightedKalmanEstimator needs one"):
+        base()
+    assert type(Row)("Whole", (base,), {}, weighting=GradientAdaptive)().solver.weighting is not None
+
+
+@pytest.mark.parametrize(
+    "solver", [DeadReckoningEstimator, FixedLagEstimator, FilterpyUnscentedEstimator, HeadingBank, SolutionSeparation]
+)
+@pytest.mark.parametrize("keyword", ["adaptation", "weighting", "isolation", "iteration", "smoother"])
+def test_a_solver_without_a_piece_says_why(solver: type, keyword: str):
+    with pytest.raises(TypeError, match=rf"takes no {keyword}: (?!it takes)"):
+        type(Row)("Refused", (Row,), {}, solver=solver, **{keyword: SageHusa})
+
+
+@pytest.mark.parametrize(
+    "pieces",
+    [
+        {"solver": LinearKalmanEstimator},
+        {"solver": SolutionSeparation},
+        {"solver": KalmanEstimator, "iteration": piece(Iteration, above_deg=0.0)},
+        {"solver": KalmanEstimator, "smoother": Smoother},
+    ],
+    ids=["linear", "separation", "iterated", "smoothed"],
+)
+def test_a_linear_model_that_observes_fixes_only_gives_the_same_in_every_filter(pieces: dict):
+    recording = record(load("ship-straight").model_copy(update={"duration": 20.0}), 3)
+    trial = run_trial(type(Row)("Fixes", (Row,), {}, model=KinematicModel, **pieces)(), recording)
+    assert trial.status == "ok", trial.reason
+    plain = run_trial(type(Row)("Plain", (Row,), {}, solver=KalmanEstimator, model=KinematicModel)(), recording)
+    np.testing.assert_allclose(trial.velocity, plain.velocity, atol=1e-4)
+    np.testing.assert_allclose(trial.position, plain.position, atol=1e-9)
+
+
+def test_a_model_that_does_not_name_its_state_says_so():
+    class Nameless(KinematicModel):
+        state = ()
+
+    with pytest.raises(TypeError, match=r"Nameless\.state is to name the arrays that `correct` changes"):
+        Nameless().snapshot()
 
 
 @pytest.mark.parametrize("adaptation", [FadingMemory(), AdaptiveFactor(target="P")])

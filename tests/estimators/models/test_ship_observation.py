@@ -14,7 +14,7 @@ from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Measurement
 
-#: A ship that loses its GNSS receiver after 60 s and turns twice; a radar measures range and bearing to a beacon ashore.
+#: A ship that loses its GNSS receiver after 60 s and turns; a radar measures range and bearing to a beacon ashore.
 COAST = """
 name = "coast"
 version = 1
@@ -151,7 +151,8 @@ def test_a_chain_linearises_it_beside_its_own(recording):
 
 def test_filters_points_and_graphs_navigate_by_it_when_there_are_no_fixes(plugins):
     aided = [record(parse(COAST, folder=plugins), seed) for seed in range(4)]
-    blind = [record(parse(COAST.replace("rate_hz = 0.5", "rate_hz = 0.001"), folder=plugins), seed) for seed in range(4)]
+    rare = COAST.replace("rate_hz = 0.5", "rate_hz = 0.001")
+    blind = [record(parse(rare, folder=plugins), seed) for seed in range(4)]
 
     def mean(name: str, figure: str, recordings) -> float:
         return float(np.mean([score(run_trial(make(name), r), r)[figure] for r in recordings]))
