@@ -19,6 +19,7 @@ import re
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, ClassVar
 
 from simnav.estimator import Estimator, Needs
@@ -317,6 +318,7 @@ def _required(solver: Piece) -> list[str]:
     return [name for name in inner if name in known and known[name].default is inspect.Parameter.empty]
 
 
+@cache
 def _hints(make: Callable[..., Any]) -> dict[str, Any]:
     """The types of a constructor's parameters; none where an annotation cannot be resolved."""
     plain = isinstance(make, type) and make.__init__ is not object.__init__  # type: ignore[misc]
@@ -325,6 +327,7 @@ def _hints(make: Callable[..., Any]) -> dict[str, Any]:
     return {}
 
 
+@cache
 def documented(make: Callable[..., Any]) -> dict[str, tuple[str, str]]:
     """What numpydoc docstrings say of parameters: type and meaning by name, a class's own before its bases'.
 

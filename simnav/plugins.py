@@ -7,6 +7,7 @@ first, so that a plug-in cannot take their names.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import hashlib
 import importlib.util
@@ -25,12 +26,15 @@ from typing import Any, Generic, TypeVar
 __all__ = [
     "PluginError",
     "Registry",
+    "code_digest",
+    "code_tree",
     "exception_of",
     "import_file",
     "is_file_module",
     "load_plugin",
     "place_of",
     "source_digest",
+    "tree_digest",
 ]
 
 C = TypeVar("C")
@@ -76,7 +80,7 @@ def import_file(
         raise error(f"{path.name} cannot be imported as Python")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    _sources[name] = _digest(source)
+    _sources[name] = code_digest(source)
     if before is not None:
         before(path)
     try:
@@ -123,18 +127,46 @@ def load_plugin(path: str | Path) -> None:
 
 
 def source_digest(module: str) -> str:
-    """Hexadecimal digest of the source of a module, as it was when it was imported from a single file."""
+    """`code_digest` of the source of a module, as it was when it was imported from a single file."""
     if module in _sources:
         return _sources[module]
     file = getattr(sys.modules.get(module), "__file__", None)
-    return _digest(Path(file).read_bytes()) if file is not None and Path(file).is_file() else ""
+    return code_digest(Path(file).read_bytes()) if file is not None and Path(file).is_file() else ""
 
 
 _sources: dict[str, str] = {}  # by the name of the module
 
 
-def _digest(source: bytes) -> str:
-    return hashlib.blake2b(source, digest_size=16).hexdigest()
+def code_tree(source: bytes) -> ast.Module | None:
+    """The syntax tree of a Python file without its docstrings; None where the text is not Python."""
+    try:
+        tree = ast.parse(source)
+    except (SyntaxError, ValueError):
+        return None
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [s for s in body if not _is_text(s)]  # type: ignore[attr-defined]
+    return tree
+
+
+def _is_text(statement: ast.stmt) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
+
+
+def tree_digest(tree: ast.Module) -> str:
+    """Hexadecimal digest of a syntax tree; line numbers do not count."""
+    return hashlib.blake2b(ast.dump(tree).encode(errors="surrogatepass"), digest_size=16).hexdigest()
+
+
+def code_digest(source: bytes) -> str:
+    """Hexadecimal digest of a Python file; comments, docstrings and line numbers do not count."""
+    tree = code_tree(source)
+    return hashlib.blake2b(source, digest_size=16).hexdigest() if tree is None else tree_digest(tree)
 
 
 def place_of(cls: Any) -> tuple[str, int]:

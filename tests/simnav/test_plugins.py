@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from simnav import plugins as module
-from simnav.plugins import PluginError, Registry, load_plugin
+from simnav.plugins import PluginError, Registry, code_digest, load_plugin
+from simnav.scenario import load
 
 
 class One:
@@ -124,3 +125,21 @@ def test_an_installed_package_is_found_by_its_entry_points(plugins, tmp_path):
     )
     assert done.stdout.split() == ["beacon", "range", "Echo"]
     assert "fault plug-in 'broken' (nowhere) of package 'lagoon' is left out: ModuleNotFoundError" in done.stderr
+
+
+def test_the_digest_of_a_file_tells_its_code_and_no_comment_docstring_or_line():
+    code = '"""An instrument."""\n\ndef observe(x):\n    """What it reads."""\n    return 2.0 * x  # metres\n'
+    tidied = "def observe(x):\n\n    return 2.0 * x\n"
+    assert code_digest(code.encode()) == code_digest(tidied.encode())
+    assert code_digest(code.encode()) != code_digest(code.replace("2.0", "2.5").encode())
+    assert code_digest(b"no Python at all") != code_digest(b"no Python at  all")
+
+
+def test_a_comment_in_a_plug_in_changes_no_scenario(plugins, tmp_path):
+    for name in ("beacon.py", "echo.py", "lagoon.toml"):
+        (tmp_path / name).write_text((plugins / name).read_text())
+    beacon, hashes = tmp_path / "beacon.py", []
+    for old, new in (("import numpy", "import numpy"), ("import numpy", "# arrays\nimport numpy"), ("1.0", "1.5")):
+        beacon.write_text(beacon.read_text().replace(old, new, 1))
+        hashes.append(load(tmp_path / "lagoon.toml").content_hash())
+    assert hashes[0] == hashes[1] != hashes[2]
