@@ -347,7 +347,8 @@ def run_chart(
         _chart(fig.add_subplot(grid[:top, 0]), truth, tracks, style, fixes or {}, title)
         chart = fig.axes[0]
         chart.set_anchor("N")
-        chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, borderaxespad=0.0)
+        # Below the label of the axis, however high the chart is.
+        chart.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, borderaxespad=3.6)
         longest = max((float(c.time[-1]) for cs in errors.values() for c in cs if len(c.time)), default=1.0)
         unit, factor = time_unit(longest)
         first: Axes | None = None
@@ -361,7 +362,7 @@ def run_chart(
                 colour = style.colour(c.label)
                 ax.plot(c.time * factor, c.values, color=colour, ls=style.line(c.label), lw=1.1, label=c.label)
                 single = _alone(c.values)
-                ax.plot(c.time[single] * factor, c.values[single], ".", ms=3.0, mew=0.0, color=colour)
+                ax.plot(c.time[single] * factor, c.values[single], ".", ms=4.5, mew=0.0, color=colour)
                 if c.bound is not None:
                     for sign in (1.0, -1.0):
                         ax.plot(c.time * factor, sign * c.bound, color=colour, lw=0.8, ls=(0, (3, 2)), alpha=0.75)

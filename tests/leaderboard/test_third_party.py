@@ -82,5 +82,5 @@ def test_who_leaves_an_instrument_out_is_named(plugins, tmp_path):
         (tmp_path / name).write_text((plugins / name).read_text())
     (tmp_path / "short.toml").write_text(text)
     words = " ".join(call("run", tmp_path / "short.toml", "-e", "ekf,gtsam-fixed-lag").stderr.split())
-    assert "gtsam-fixed-lag shows no innovation of transponder (beacon); most likely it leaves them out" in words
+    assert "gtsam-fixed-lag shows no innovation of transponder (beacon): most likely it leaves it out" in words
     assert "ekf shows" not in words
