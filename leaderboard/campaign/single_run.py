@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["EstimatorRun", "RunReport", "record", "run_once"]
 
 
+#: Diagnostics that an estimator gives for each instrument that it uses.
+_OF_INSTRUMENTS = ("innovation.", "residual.")
+
+
 @dataclass(frozen=True, eq=False)
 class EstimatorRun:
     """What one estimator did.
@@ -71,6 +75,18 @@ class RunReport:
     recording: Recording
     simulation_seconds: float
     estimators: tuple[EstimatorRun, ...]
+
+    def unseen(self, run: EstimatorRun) -> dict[str, str]:
+        """Name and kind of the instruments of which an estimator shows no innovation and no residual.
+
+        Those only whose kind has an equation of its own, or none: whether an estimator can use the others, its
+        documentation says. Empty where the estimator did not run.
+        """
+        from simnav.kinds import EQUATIONS, KINDS
+
+        shown = {name.partition(".")[2] for name in run.trial.diagnostics if name.startswith(_OF_INSTRUMENTS)}
+        own = {s.name: s.kind for s in self.recording.data.aids.values() if KINDS[s.kind].equation not in EQUATIONS}
+        return {name: kind for name, kind in own.items() if len(run.trial) and name not in shown}
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav run --json`` prints, but for the figure."""

@@ -79,7 +79,8 @@ def root(
             try:
                 load_plugin(path)
             except PluginError as error:
-                raise typer.BadParameter(str(error), param_hint="--plugin") from None
+                text = str(error) if path.name in str(error) else f"{path.name}: {error}"
+                raise typer.BadParameter(text, param_hint="--plugin") from None
 
 
 for _module in (

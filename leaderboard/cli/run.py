@@ -72,6 +72,12 @@ def command(
         for e in report.estimators:
             if e.status != "ok":
                 out.note(f"simnav: {e.estimator}: {e.status}: {e.reason}")
+            unseen = [f"{name} ({kind})" for name, kind in report.unseen(e).items()]
+            if unseen:
+                left = "it out" if len(unseen) == 1 else "them out"
+                out.note(
+                    f"simnav: {e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}"
+                )
         if drawn is not None:
             out.print(f"figure: {drawn}")
         if shown is not None:

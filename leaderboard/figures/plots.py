@@ -347,7 +347,8 @@ def run_chart(
         _chart(fig.add_subplot(grid[:top, 0]), truth, tracks, style, fixes or {}, title)
         chart = fig.axes[0]
         chart.set_anchor("N")
-        chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=4, borderaxespad=0.0)
+        # Below the label of the axis, however high the chart is.
+        chart.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, borderaxespad=3.6)
         longest = max((float(c.time[-1]) for cs in errors.values() for c in cs if len(c.time)), default=1.0)
         unit, factor = time_unit(longest)
         first: Axes | None = None
@@ -360,6 +361,8 @@ def run_chart(
             for c in curves:
                 colour = style.colour(c.label)
                 ax.plot(c.time * factor, c.values, color=colour, ls=style.line(c.label), lw=1.1, label=c.label)
+                single = _alone(c.values)
+                ax.plot(c.time[single] * factor, c.values[single], ".", ms=4.5, mew=0.0, color=colour)
                 if c.bound is not None:
                     for sign in (1.0, -1.0):
                         ax.plot(c.time * factor, sign * c.bound, color=colour, lw=0.8, ls=(0, (3, 2)), alpha=0.75)
@@ -374,6 +377,15 @@ def run_chart(
             claimed = any(c.bound is not None for curves in errors.values() for c in curves)
             first.set_title("Error; dashed: claimed ±3σ" if claimed else "Error")
     return fig
+
+
+def _alone(values: Array) -> NDArray[np.bool_]:
+    """Which values have none beside them, so that no line shows them: of an instrument slower than the estimates."""
+    there = np.isfinite(values)
+    beside = np.zeros(len(there), np.bool_)
+    beside[1:] |= there[:-1]
+    beside[:-1] |= there[1:]
+    return there & ~beside
 
 
 def _frame_errors(ax: Axes, curves: Sequence[Curve]) -> None:

@@ -63,7 +63,7 @@ def fixes(recording: Recording, most: int = 1500) -> dict[str, Track]:
     """Position fixes as delivered, by instrument, thinned to ``most``."""
     found = {}
     for stream in recording.data.aids.values():
-        if KINDS[stream.kind].role == "fix" and len(stream):
+        if KINDS[stream.kind].role == "fix" and KINDS[stream.kind].geodetic and len(stream):
             value = stream.value[:: max(1, len(stream) // most)]
             if value.shape[1] == 2:  # a horizontal fix
                 value = np.column_stack([value, np.zeros(len(value))])
@@ -76,10 +76,27 @@ def outage_spans(recording: Recording, most: int = 12) -> list[tuple[float, floa
     spans: dict[tuple[float, float], list[str]] = {}
     for fault in recording.faults:
         if effect_of(fault.kind) == "missing":
-            spans.setdefault((fault.start, min(fault.end, recording.duration)), []).extend(fault.instruments)
+            start, end = fault.start, min(fault.end, recording.duration)
+            for name in fault.instruments:
+                for span in _without(recording, name, start, end):
+                    spans.setdefault(span, []).append(name)
     if len(spans) > most:
         return []
     return [(a, b, f"no {', '.join(dict.fromkeys(names))}") for (a, b), names in sorted(spans.items()) if a < b]
+
+
+def _without(recording: Recording, name: str, start: float, end: float) -> list[tuple[float, float]]:
+    """When within an outage an instrument gives nothing: all through it, unless it takes single measurements away."""
+    stream = recording.data.aids.get(name)
+    if stream is None or not np.any((stream.time >= start) & (stream.time < end)):
+        return [(start, end)]
+    time = np.concatenate([stream.time, stream.dropped])
+    order = np.argsort(time, kind="stable")
+    time, lost = time[order], (np.arange(len(time)) >= len(stream))[order]
+    lost &= (time >= start) & (time < end)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
+    ends = np.append(time, end)
+    return [(float(time[i]), float(min(ends[j], end))) for i, j in edges.reshape(-1, 2)]
 
 
 def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], references: Sequence[str] = ()) -> Figure:

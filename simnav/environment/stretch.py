@@ -54,9 +54,14 @@ class Stretch:
     def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
         """The positions that were delivered in a step, and which of them a fault has touched."""
         for name, stream in self.aids.items():
-            if KINDS[stream.kind].role == "fix":
+            if _draws(stream.kind):
                 cut = slice(*self.cuts[name][i : i + 2])
                 yield stream.value[cut, :2], stream.faults[cut] != 0
+
+
+def _draws(kind: str) -> bool:
+    """Whether a chart shows what a kind of instrument measures: a fix by latitude and longitude."""
+    return KINDS[kind].role == "fix" and KINDS[kind].geodetic
 
 
 @kernel(
@@ -154,7 +159,7 @@ class LiveStretch(Stretch):
         """See `Stretch.fixes`; of the last step that was made."""
         runs = self._runs
         for j, who in enumerate(runs.who[0, : runs.count[0]].tolist()):
-            if KINDS[runs.kinds[0][who]].role == "fix":
+            if _draws(runs.kinds[0][who]):
                 yield runs.value[0, j : j + 1, :2].copy(), runs.faults[0, j : j + 1] != 0
 
 

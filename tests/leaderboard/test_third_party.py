@@ -65,3 +65,22 @@ def test_a_plug_in_file_on_the_command_line(plugins):
 
 def test_a_plug_in_file_that_is_not_there_is_a_mistake():
     assert "no plug-in file 'nowhere.py'" in call("--plugin", "nowhere.py", "list", code=2).stderr
+
+
+def test_a_plug_in_that_is_refused_is_named(plugins, tmp_path):
+    broken = tmp_path / "broken.py"
+    broken.write_text((plugins / "beacon.py").read_text().replace('"sigma_range_m": 0.5', '"sigma_range_m": -0.5'))
+    stderr = call("--plugin", plugins / "echo.py", "--plugin", broken, "list", code=2).stderr
+    words = " ".join(stderr.replace("│", " ").split())
+    assert "broken.py: the example of kind 'beacon': sigma_range_m = -0.5: should be at least 0" in words
+
+
+def test_who_leaves_an_instrument_out_is_named(plugins, tmp_path):
+    """GTSAM's factors are made from compiled equations: `simnav run` says that the beacon has none."""
+    text = (plugins / "lagoon.toml").read_text().partition("[[fault]]")[0].replace("120.0", "4.0")
+    for name in ("beacon.py", "echo.py"):
+        (tmp_path / name).write_text((plugins / name).read_text())
+    (tmp_path / "short.toml").write_text(text)
+    words = " ".join(call("run", tmp_path / "short.toml", "-e", "ekf,gtsam-fixed-lag").stderr.split())
+    assert "gtsam-fixed-lag shows no innovation of transponder (beacon): most likely it leaves it out" in words
+    assert "ekf shows" not in words

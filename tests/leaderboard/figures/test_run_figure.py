@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 
 from simnav.estimator import make
 from simnav.leaderboard.cli.application import app
-from simnav.leaderboard.figures.run_figure import innovation_unit, run_figure
+from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, outage_spans, run_figure
 from simnav.scenario import load
+from simnav.sensors.faults import Outage
 from simnav.source import record
 from simnav.trial import run_trial
 
@@ -50,3 +51,41 @@ def test_an_innovation_of_several_quantities_has_no_unit(plugins):
 def test_the_help_names_the_unit_of_the_alert_limit():
     shown = CliRunner().invoke(app, ["run", "--help"], env={"COLUMNS": "200"}).stdout
     assert "diagrams in metres;" in " ".join(shown.split())
+
+
+def test_innovations_of_an_instrument_slower_than_the_estimates_are_drawn_as_points(plugins):
+    """A line through single values with gaps between them would be invisible."""
+    scenario = load(plugins / "lagoon.toml")
+    slow = scenario.instruments["transponder"].model_copy(update={"rate": 0.5})
+    instruments = {**scenario.instruments, "transponder": slow}
+    scenario = scenario.model_copy(update={"duration": 20.0, "faults": (), "instruments": instruments})
+    recording = record(scenario, 1)
+    figure = run_figure(recording, [("ekf", run_trial(make("ekf"), recording))])
+    (axes,) = (a for a in figure.axes if "nis\ntransponder" in a.get_ylabel())
+    points = [line for line in axes.lines if line.get_marker() == "." and len(line.get_xdata())]
+    assert [len(line.get_xdata()) for line in points] == [len(recording.data.aids["transponder"])]
+    (axes,) = (a for a in figure.axes if "nis\ndepth" in a.get_ylabel())
+    assert not any(line.get_marker() == "." and len(line.get_xdata()) for line in axes.lines)
+
+
+def test_a_fix_that_is_no_latitude_and_longitude_is_not_drawn_as_one(plugins, tmp_path):
+    for name in ("beacon.py", "echo.py", "lagoon.toml"):
+        (tmp_path / name).write_text((plugins / name).read_text().replace('role="range"', 'role="fix"'))
+    recording = record(load(tmp_path / "lagoon.toml").model_copy(update={"duration": 5.0, "faults": ()}), 1)
+    assert fixes(recording) == {}
+
+
+def test_an_outage_is_where_nothing_came(plugins):
+    """A fault that takes single measurements away is no outage as long as it lasts."""
+    scenario = load(plugins / "lagoon.toml")
+    whole = Outage(instruments=("transponder",), start=30.0, end=60.0)
+    spans = outage_spans(record(scenario.model_copy(update={"faults": (whole,)}), 1))
+    assert spans == [(30.0, 60.0, "no transponder")]
+    random = Outage(instruments=("transponder",), start=20.0, mean_active=5.0, mean_gap=40.0)
+    recording = record(scenario.model_copy(update={"faults": (random,)}), 1)
+    time, spans = recording.data.aids["transponder"].time, outage_spans(recording)
+    assert 0 < sum(b - a for a, b, _ in spans) < 60.0
+    for start, end, _ in spans:
+        assert not np.any((time >= start) & (time < end))
+    missing = set(np.arange(1.0, 121.0)) - set(time)
+    assert missing == {t for t in np.arange(1.0, 121.0) for a, b, _ in spans if a <= t < b}

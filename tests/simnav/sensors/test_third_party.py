@@ -11,6 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from simnav.environment import NavigationEnv
+from simnav.environment.stretch import pack
 from simnav.geometry.earth import displace, relative_position
 from simnav.kinds import Component, Kind
 from simnav.plugins import PluginError, load_plugin
@@ -19,7 +20,7 @@ from simnav.scenario import load, parse
 from simnav.sensors import AidSpec, register_fault, register_instrument
 from simnav.sensors.faults import BiasStep, NoiseStep, effect_of
 from simnav.simulation.simulator import ideal
-from simnav.source import record
+from simnav.source import open_source, record
 from simnav.spec import SpecError, quantity
 from simnav.testing.contract_check import check, contract_recording
 from simnav.types import KINDS, Datasheet
@@ -210,6 +211,18 @@ def test_the_environment_has_its_space(lagoon):
     assert isinstance(info["instruments"]["transponder"], Datasheet)
     assert np.array_equal(observation["transponder"]["value"], record(lagoon, 4).data.aids["transponder"].value[:1])
     check_env(env, skip_render_check=True)
+
+
+def test_a_chart_shows_fixes_by_latitude_and_longitude_only(plugins, tmp_path):
+    for name in ("beacon.py", "echo.py", "lagoon.toml"):
+        (tmp_path / name).write_text((plugins / name).read_text().replace('role="range"', 'role="fix"'))
+    env = NavigationEnv(load(tmp_path / "lagoon.toml"), render_mode="rgb_array")
+    env.reset(seed=1)
+    env.step(env.action_space.sample())
+    block = open_source(load(tmp_path / "lagoon.toml"), 1).advance(5.0)
+    stretch = pack(block, 0.0, {"imu": 50, "depth": 1, "transponder": 1})
+    assert not any(list(stretch.fixes(i)) for i in range(5))
+    assert env.render().ndim == 3
 
 
 # --- registration
