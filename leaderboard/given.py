@@ -71,6 +71,8 @@ def scenarios_of(
     for header in headers():
         tracks.setdefault(header.track, []).append(header.name)
     for item in items:
+        if isinstance(item, str) and not item.strip(" ,"):
+            raise RequestError(f"{item!r} names no scenario; leave it out for all of them")
         for part in [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]:
             asked += tracks.get(part, [part]) if isinstance(part, str) else [part]
     found = []
@@ -163,7 +165,7 @@ def positive(name: str, value: Any, least: float = 0.0) -> float:
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and number >= least):
-        raise RequestError(f"{name} = {value!r}: a number from {least:g} up is wanted")
+        raise RequestError(f"{name} = {value!r}: a finite number from {least:g} up is wanted")
     return number
 
 

@@ -2,8 +2,9 @@
 
 An **estimator** is a class, a registered name, a file (``my.py``, ``my.py:MyFilter``), any of these with parameters
 (``"sw-fgo:window=10"``, ``(MyFilter, {"gain": 0.5})``); several are a list, or a text with commas. A **scenario** is a
-`simnav.scenario.Scenario`, a name or a TOML file. What comes back is typed, and has ``to_dict()`` (what the command
-prints with ``--json``), ``to_frame()`` (a ``pandas.DataFrame`` where pandas is installed, otherwise a
+`simnav.scenario.Scenario`, a name or a TOML file. An empty list is refused; without one, all are meant. What comes
+back is typed. Reports have ``to_dict()`` (what the command prints with ``--json``); those with figures, such as runs,
+rankings and bounds, also have ``to_frame()`` (a ``pandas.DataFrame`` where pandas is installed, otherwise a
 ``pyarrow.Table``) and ``plot()`` (a matplotlib ``Figure``).
 
 What cannot be done raises `RequestError`, a `ValueError` whose message is one sentence.

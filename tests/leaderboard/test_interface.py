@@ -92,11 +92,6 @@ def call_leaderboard() -> Any:
     return made.to_dict()
 
 
-def call_check() -> Any:
-    report = simnav.check("gnss-only:acceleration=0.5")
-    return {"estimator": report.estimator, "passed": report.passed, "findings": plain(list(report.findings))}
-
-
 RATE = "instruments.gnss_position.rate_hz"
 
 CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
@@ -106,7 +101,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         lambda: simnav.run("pond.toml", ["gnss-only:acceleration=0.5", "ship-ekf"], seed=3).to_dict(),
     ),
     "simulate": (["simulate", "pond.toml", "-o", "theirs.npz", "--seed", "4"], call_simulate),
-    "check": (["check", "gnss-only:acceleration=0.5"], call_check),
+    "check": (["check", "gnss-only:acceleration=0.5"], lambda: simnav.check("gnss-only:acceleration=0.5").to_dict()),
     "bench": (
         ["bench", "gnss-only:acceleration=0.5", "--against", "ship-ekf", "-s", "pond.toml", "--epochs", "20",
          "--rounds", "1", "--seed", "3"],
@@ -348,6 +343,7 @@ class Unfinished(Estimator):
         (lambda: simnav.check("efk"), "did you mean 'ekf'"),
         (lambda: simnav.evaluate("gnss-only", "pond.toml", runs=0, against="ship-ekf"), "runs = 0"),
         (lambda: simnav.evaluate("gnss-only", [], against="ship-ekf"), "the list of scenarios is empty"),
+        (lambda: simnav.evaluate("gnss-only", " ", against="ship-ekf"), "' ' names no scenario"),
         (lambda: simnav.evaluate("gnss-only", "pond.toml", workers=1.5), "workers = 1.5"),
         (lambda: simnav.evaluate("gnss-only", "pond.toml", time_limit="3"), "time_limit = '3'"),
         (lambda: simnav.evaluate("gnss-only", "pond.toml", memory_limit=None), "memory_limit = None"),
