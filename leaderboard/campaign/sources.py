@@ -23,7 +23,7 @@ from types import MappingProxyType
 
 import simnav
 
-__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "followed", "is_installed"]
+__all__ = ["LIBRARY", "code_of", "digest", "dump", "files_digest", "followed", "is_installed"]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
 LIBRARY = Path(simnav.__file__).parent
@@ -110,11 +110,7 @@ def _code_of(path: Path, package: str, modified: int, size: int) -> Code:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
         return Code(hashlib.blake2b(source, digest_size=16).hexdigest())
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [s for s in body if not _is_text(s)]  # type: ignore[attr-defined]
-    text = ast.dump(tree)
+    text = dump(tree)
     imports, texts = tuple(dict.fromkeys(_imports(tree, package))), _texts(tree)
     by_text = any(module.partition(".")[0] == "importlib" for module, _ in imports) or any(
         isinstance(node, ast.Name) and node.id == "__import__" for node in ast.walk(tree)
@@ -134,6 +130,15 @@ def _code_of(path: Path, package: str, modified: int, size: int) -> Code:
 _FILE = r"[\w*-]+\.[A-Za-z]\w{0,7}|(?:[\w*-]+/)+[\w*-]+\.[A-Za-z]\w{0,7}"
 _MODULE = r"\.*[A-Za-z_][\w*]*(?:\.[\w*]+)*"
 _FOLDER = r"[\w-]+(?:/[\w-]+)*"
+
+
+def dump(tree: ast.AST) -> str:
+    """A syntax tree as a text without comments and positions, after its docstrings were taken out of it."""
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [s for s in body if not _is_text(s)]  # type: ignore[attr-defined]
+    return ast.dump(tree)
 
 
 def _is_text(statement: ast.stmt) -> bool:
