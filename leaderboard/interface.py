@@ -560,6 +560,8 @@ def _run(
 
     count, memory = whole("workers", workers, 1), positive("memory_limit", memory_limit, 16.0)
     limit = None if time_limit is None else positive("time_limit", time_limit)
+    if limit == 0.0:
+        raise RequestError("time_limit = 0 s should be greater than 0")
     with mistakes(StoreError):
         create(folder)
     return run_campaign(

@@ -223,7 +223,7 @@ def run_campaign(
     if workers < 1:
         raise RequestError(f"workers = {workers}: at least one is wanted")
     if timeout is not None and not timeout > 0.0:
-        raise RequestError(f"time_limit = {timeout:g} s should be greater than 0")
+        raise RequestError(f"timeout = {timeout:g} s should be greater than 0")
     if memory < 16 << 20:
         raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
     if minutes is not None and not minutes >= 0.0:

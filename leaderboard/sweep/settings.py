@@ -76,8 +76,8 @@ def checked_score(score: str, limit: float | None = None) -> None:
         raise RequestError(f"score = {score!r} is unknown{closest(score, list(SCORES))}")
     if SCORES[score].better != "lower":
         raise RequestError(f"score = {score!r} is not better when lower; an error is wanted, like horizontal_rmse")
-    if limit is not None and not (isinstance(limit, (int, float)) and limit > 0.0):
-        raise RequestError(f"limit = {limit!r} should be a number greater than 0")
+    if limit is not None and not limit > 0.0:
+        raise RequestError(f"limit = {limit:g} should be greater than 0")
 
 
 def chosen_dials(scenario: Scenario, asked: Mapping[str, Sequence[float]]) -> list[tuple[Dial, list[float]]]:
