@@ -38,6 +38,8 @@ def scenario_of(given: ScenarioLike) -> Scenario:
 
     if isinstance(given, Scenario):
         return given
+    if not isinstance(given, (str, os.PathLike)):
+        raise RequestError(f"{given!r} is no scenario; a name or the path of a TOML file is wanted")
     with mistakes():
         return load(given)
 

@@ -237,13 +237,6 @@ def test_names_load_with_their_first_use() -> None:
 
 
 @pytest.mark.usefixtures("here")
-def test_a_mistake_in_the_name_of_a_scenario_is_a_sentence() -> None:
-    for wrong in (None, 3, ["pond.toml"]):
-        with pytest.raises(ValueError, match=r"is no scenario; a name or the path of a TOML file is wanted"):
-            simnav.load(wrong)
-
-
-@pytest.mark.usefixtures("here")
 def test_numbers_of_numpy_and_generators_are_taken() -> None:
     report = simnav.run("pond.toml", (name for name in ("gnss-only", LastFix)), seed=np.int64(3))
     assert [e.estimator for e in report.estimators] == ["gnss-only", "last-fix"]
