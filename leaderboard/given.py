@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import operator
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
 from simnav.scenario import Scenario
@@ -14,7 +16,17 @@ from simnav.scenario import Scenario
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["ScenarioLike", "Scenarios", "absolute", "results_of", "scenario_of", "scenarios_of"]
+__all__ = [
+    "ScenarioLike",
+    "Scenarios",
+    "absolute",
+    "positive",
+    "results_of",
+    "scenario_of",
+    "scenarios_of",
+    "seeds_of",
+    "whole",
+]
 
 ScenarioLike: TypeAlias = "str | Path | Scenario"
 Scenarios: TypeAlias = "ScenarioLike | Iterable[ScenarioLike] | None"
@@ -26,6 +38,8 @@ def scenario_of(given: ScenarioLike) -> Scenario:
 
     if isinstance(given, Scenario):
         return given
+    if not isinstance(given, (str, os.PathLike)):
+        raise RequestError(f"{given!r} is no scenario; a name or the path of a TOML file is wanted")
     with mistakes():
         return load(given)
 
@@ -48,12 +62,19 @@ def scenarios_of(
     """
     from simnav.scenario import headers, names
 
-    items = [] if given is None else [given] if isinstance(given, (str, Path, Scenario)) else list(given)
+    single = isinstance(given, (str, os.PathLike, Scenario))
+    if not single and given is not None and not isinstance(given, Iterable):
+        raise RequestError(f"{given!r} is no scenario; a name or the path of a TOML file is wanted")
+    items: list[Any] = [] if given is None else [given] if single else list(given)  # type: ignore[arg-type]
+    if not items and given is not None:
+        raise RequestError("the list of scenarios is empty; leave it out for all of them")
     asked: list[ScenarioLike] = []
     tracks: dict[str, list[ScenarioLike]] = {}
     for header in headers():
         tracks.setdefault(header.track, []).append(header.name)
     for item in items:
+        if isinstance(item, str) and not item.strip(" ,"):
+            raise RequestError(f"{item!r} names no scenario; leave it out for all of them")
         for part in [p.strip() for p in item.split(",") if p.strip()] if isinstance(item, str) else [item]:
             asked += tracks.get(part, [part]) if isinstance(part, str) else [part]
     found = []
@@ -112,4 +133,45 @@ def _note(note: Callable[[str], None] | None, text: str) -> None:
 
 def absolute(path: str | os.PathLike[str]) -> Path:
     """A path from the root, whatever folder it was given in."""
-    return Path(path).expanduser().resolve()
+    if not isinstance(path, (str, os.PathLike)):
+        raise RequestError(f"{path!r} is no path of a file or folder")
+    if not os.fspath(path):
+        raise RequestError("the path of a file or folder is empty; '.' is the folder in which you are")
+    with mistakes(RuntimeError, ValueError, OSError):  # ~nobody, a zero byte, a loop of links
+        return Path(path).expanduser().resolve()
+
+
+def whole(name: str, value: Any, least: int = 0) -> int:
+    """An argument that should be a whole number, also of NumPy.
+
+    >>> whole("runs", 3, 1)
+    3
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise RequestError(f"{name} = {value!r}: a whole number is wanted") from None
+    if isinstance(value, bool) or number < least:
+        raise RequestError(f"{name} = {value!r}: a whole number from {least} up is wanted")
+    return number
+
+
+def positive(name: str, value: Any, least: float = 0.0) -> float:
+    """An argument that should be a number, finite and not less than another.
+
+    >>> positive("minutes", 1)
+    1.0
+    """
+    try:
+        number = float(value) if not isinstance(value, (str, bytes, bool)) else math.nan
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (math.isfinite(number) and number >= least):
+        raise RequestError(f"{name} = {value!r}: a finite number from {least:g} up is wanted")
+    return number
+
+
+def seeds_of(seed: Any, runs: Any) -> range:
+    """The seeds of some runs: the first, and those that count up from it."""
+    first = whole("seed", seed)
+    return range(first, first + whole("runs", runs, 1))

@@ -1,4 +1,4 @@
-"""What is asked of scenarios and of results that are there: bounds, scores, seals, citations, the papers' comparisons.
+"""What is asked of scenarios and of results that are there: rankings, bounds, scores, seals, citations, papers.
 
 These are calls of `simnav.leaderboard.interface`, which has them under its own name, too.
 """
@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from simnav.leaderboard.campaign.request import EstimatorLike, requests
-from simnav.leaderboard.given import ScenarioLike, Scenarios, absolute, results_of, scenario_of, scenarios_of
+from simnav.leaderboard.given import ScenarioLike, Scenarios, absolute, results_of, scenario_of, scenarios_of, whole
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
@@ -20,13 +20,51 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.verification import Verification
     from simnav.leaderboard.papers.reproduction import Reproduction
+    from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.bounds import BoundReport
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["bound", "cite", "merge", "reproduce", "rescore", "verify"]
+__all__ = ["bound", "cite", "merge", "rank", "reproduce", "rescore", "verify"]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
+
+
+def rank(
+    results: str | os.PathLike[str] | Iterable[Result],
+    *,
+    score: str | None = None,
+    tracks: Mapping[str, str] | None = None,
+) -> Ranking:
+    """Rank estimators by their results.
+
+    Parameters
+    ----------
+    results : path or iterable of Result
+        Folder that a campaign wrote, or results themselves.
+    score : str, optional
+        Key of `simnav.scoring.SCORES`, one that is better when lower. Default: the horizontal error, and for
+        post-processing the smoothed one.
+    tracks : mapping of str to str, optional
+        Track of scenarios that are not in the catalogue, by versioned id.
+
+    Returns
+    -------
+    simnav.leaderboard.ranking.board.Ranking
+    """
+    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
+    from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.sweep.settings import checked_score
+
+    if score is not None:
+        checked_score(score)
+    wanted = RANKED_SCORES | ({score} if score else set())
+    if results is None or isinstance(results, (str, os.PathLike)):
+        return rank(results_of(results, scores=wanted), score=score, tracks=tracks)
+    given = list(results)
+    if not all(isinstance(r, Result) for r in given):
+        raise RequestError("a folder of results is wanted, or results; 'simnav.merge' puts several folders together")
+    return rank(given, score=score, tracks=tracks)
 
 
 def rescore(
@@ -64,7 +102,7 @@ def rescore(
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.results.store import StoreError
 
-    names = scores.split(",") if isinstance(scores, str) else scores
+    names = scores.split(",") if isinstance(scores, str) else [str(s) for s in scores]
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return rescore_results(
@@ -79,7 +117,7 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     Parameters
     ----------
     folders : iterable of path
-        They stay as they are. A bundle of `simnav.submit` stands for its results; verify it first.
+        One or several. They stay as they are. A bundle of `simnav.submit` stands for its results; verify it first.
     output : path
         New, or a folder of results, which are kept.
 
@@ -99,7 +137,9 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     from simnav.leaderboard.submission.bundle import open_bundle
 
     with tempfile.TemporaryDirectory(prefix="simnav-merge-") as scratch, mistakes(StoreError):
-        paths = [absolute(folder) for folder in folders]
+        paths = [absolute(folder) for folder in ([folders] if isinstance(folders, (str, os.PathLike)) else folders)]
+        if not paths:
+            raise RequestError("no folder was named whose results should be merged")
         places = [
             open_bundle(path, Path(scratch) / str(k)).results if path.is_file() else path
             for k, path in enumerate(paths)
@@ -156,7 +196,7 @@ def bound(
     """
     from simnav.leaderboard.ranking.bounds import bounds_of
 
-    return bounds_of(scenario_of(scenario), runs, smoothed, progress)
+    return bounds_of(scenario_of(scenario), whole("runs", runs, 1), smoothed, progress)
 
 
 def verify(
@@ -194,8 +234,8 @@ def verify(
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return verify_results(
-            absolute(results), None if key is None else read_seal(key), sample=sample, scenarios=given,
-            estimators=requests(estimators) if estimators else [], progress=progress,
+            absolute(results), None if key is None else read_seal(key), sample=whole("sample", sample, 1),
+            scenarios=given, estimators=requests(estimators) if estimators else [], progress=progress,
         )  # fmt: skip
 
 
@@ -258,13 +298,15 @@ def reproduce(
     if until_decided and runs is not None:
         raise RequestError("'until_decided' chooses the number of runs itself: give 'limit' in place of 'runs'")
     with mistakes(ValueError):
-        chosen = papers.load(paper)
+        chosen = papers.load(str(paper))
         if methods:
-            chosen = chosen.only(methods)
+            chosen = chosen.only([m.strip() for m in methods.split(",")] if isinstance(methods, str) else methods)
         if stored:
             return shipped.load(chosen)
+    workers, limit = whole("workers", workers, 1), whole("limit", limit, 1)
     folder = absolute(output or Path("reproduced") / chosen.key) / "results"
     with mistakes(StoreError):
         if until_decided:
             return sequential.decide(chosen, folder, limit=limit, minutes=minutes, workers=workers, progress=progress)
-        return reproduce(chosen, runs or chosen.runs, folder, workers=workers, progress=progress)
+        count = chosen.runs if runs is None else whole("runs", runs, 1)
+        return reproduce(chosen, count, folder, workers=workers, progress=progress)

@@ -1,9 +1,10 @@
 """Everything that the `simnav` command does, as Python calls: `import simnav` gives them under their own names.
 
 An **estimator** is a class, a registered name, a file (``my.py``, ``my.py:MyFilter``), any of these with parameters
-(``"ekf:gate=3"``, ``(MyFilter, {"gain": 0.5})``); several are a list, or a text with commas. A **scenario** is a
-`simnav.scenario.Scenario`, a name or a TOML file. What comes back is typed, and has ``to_dict()`` (what the command
-prints with ``--json``), ``to_frame()`` (a ``pandas.DataFrame`` where pandas is installed, otherwise a
+(``"sw-fgo:window=10"``, ``(MyFilter, {"gain": 0.5})``); several are a list, or a text with commas. A **scenario** is a
+`simnav.scenario.Scenario`, a name or a TOML file. An empty list is refused; without one, all are meant. What comes
+back is typed. Reports have ``to_dict()`` (what the command prints with ``--json``); those with figures, such as runs,
+rankings and bounds, also have ``to_frame()`` (a ``pandas.DataFrame`` where pandas is installed, otherwise a
 ``pyarrow.Table``) and ``plot()`` (a matplotlib ``Figure``).
 
 What cannot be done raises `RequestError`, a `ValueError` whose message is one sentence.
@@ -25,21 +26,22 @@ from simnav.leaderboard.given import (
     ScenarioLike,
     Scenarios,
     absolute,
+    positive,
     results_of,
     scenario_of,
     scenarios_of,
+    seeds_of,
+    whole,
 )
-from simnav.leaderboard.inspection import bound, cite, merge, reproduce, rescore, verify
+from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, verify
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Progress, Summary
     from simnav.leaderboard.campaign.single_run import RunReport
-    from simnav.leaderboard.ranking.board import Ranking
     from simnav.leaderboard.ranking.costs import CostReport
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
-    from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.sweep.report import Sweep
     from simnav.leaderboard.tuning.space import Range
     from simnav.leaderboard.tuning.tuning import Method, Tuning
@@ -72,6 +74,7 @@ __all__ = [
     "sweep",
     "tune",
     "verify",
+    "whole",
 ]
 
 Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
@@ -98,7 +101,8 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     >>> make("gnss-only").name
     'gnss-only'
     """
-    return one_request(estimator, parameters).make()
+    with mistakes():
+        return one_request(estimator, parameters).make()
 
 
 def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
@@ -123,7 +127,8 @@ def record(scenario: ScenarioLike, seed: int = 0) -> Recording:
     """
     from simnav.source import record
 
-    return record(scenario_of(scenario), seed)
+    with mistakes(ValueError, FileNotFoundError):
+        return record(scenario_of(scenario), whole("seed", seed))
 
 
 def check(estimator: EstimatorLike, **parameters: Any) -> Report:
@@ -145,7 +150,8 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     """
     from simnav.testing.contract_check import check
 
-    return check(one_request(estimator, parameters).make)
+    with mistakes(ValueError):
+        return check(one_request(estimator, parameters).make)
 
 
 def bench(
@@ -202,9 +208,8 @@ def bench(
             r.make()  # a mistake in a file's name or in a parameter is no result
     beside = together([*mine, *requests(list(BESIDE) if against is None else against)])[len(mine) :]
     chosen = scenario_of(scenario)
-    with mistakes(ValueError, FileNotFoundError):
-        recording = record(chosen, seed)
-    return costs_of(mine, beside, chosen.id, recording, epochs, rounds, progress)
+    recording = record(chosen, seed)
+    return costs_of(mine, beside, chosen.id, recording, whole("epochs", epochs), whole("rounds", rounds, 1), progress)
 
 
 def run(
@@ -237,7 +242,8 @@ def run(
     """
     from simnav.leaderboard.campaign.single_run import run_once
 
-    return run_once(scenario_of(scenario), requests(estimators, parameters), seed, progress)
+    chosen, count = scenario_of(scenario), whole("seed", seed)
+    return run_once(chosen, requests(estimators, parameters), count, progress)
 
 
 def evaluate(
@@ -294,7 +300,7 @@ def evaluate(
         raise RequestError("no estimator was asked for; name those that should be evaluated")
     mine = requests(estimators, parameters)
     everyone = together([*mine, *requests(against)])
-    chosen, seeds = scenarios_of(scenarios), range(seed, seed + runs)
+    chosen, seeds = scenarios_of(scenarios), seeds_of(seed, runs)
     with _folder(results) as folder:
         _run(chosen, everyone, seeds, folder, workers, time_limit, memory_limit, progress)
         found = results_of(folder)
@@ -384,21 +390,27 @@ def campaign(
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
 
-    parts: list[tuple[Scenarios, Estimators, int]] = [(scenarios, estimators, runs or RUNS)]
+    parts: list[tuple[Scenarios, Estimators, int]] = [(scenarios, estimators, RUNS if runs is None else runs)]
     if profile is not None:
-        parts = [(scenarios or p.scenarios, estimators or p.estimators, runs or p.runs) for p in load(profile).parts]
+        parts = [
+            (p.scenarios if scenarios is None else scenarios, p.estimators if estimators is None else estimators,
+             p.runs if runs is None else runs)
+            for p in load(profile).parts
+        ]  # fmt: skip
     folder, summaries, seal = absolute(output), [], None if sealed is None else read_seal(sealed)
     tracks: dict[str, str] = {}
-    began = time.monotonic()
+    end = None if minutes is None else time.monotonic() + 60.0 * positive("minutes", minutes)
     for wanted, those, count in parts:
         chosen, everyone = scenarios_of(wanted, optional=profile is not None), requests(those, parameters)
         tracks |= {s.id: s.track for s in chosen}
         for some, beside in beside_oracles(chosen, everyone) if oracle else [(chosen, everyone)]:
-            summaries.append(_run(some, beside, range(seed, seed + count), folder, workers, time_limit, memory_limit,
+            # fmt: off
+            summaries.append(_run(some, beside, seeds_of(seed, count), folder, workers, time_limit, memory_limit,
                                   progress, retry=retry, keep_trials=keep_trials,
                                   covariance_interval=covariance_interval, confinement=confinement, seal=seal,
                                   backend=backend, scheduler=scheduler, shard=shard,
-                                  minutes=_left(minutes, began)))  # fmt: skip
+                                  minutes=None if end is None else max(0.0, (end - time.monotonic()) / 60.0)))
+    # fmt: on
     results = results_of(folder)
     return CampaignReport(results, rank(results, tracks=tracks), combined(summaries))
 
@@ -452,7 +464,7 @@ def sweep(
     chosen, mine = scenario_of(scenario), requests(estimators, parameters)
     checked_score(score, limit)
     turned = chosen_dials(chosen, parse_dials(dials))
-    found, seeds = settings(chosen, turned), range(seed, seed + runs)
+    found, seeds = settings(chosen, turned), seeds_of(seed, runs)
     folder = absolute(output or Path("results") / f"sweep-{chosen.name}")
     limits = {"workers": 2, "time_limit": None, "memory_limit": 2048.0} | options
     summary = _run([s.scenario for s in found], mine, seeds, folder, progress=progress, **limits)
@@ -462,35 +474,6 @@ def sweep(
                  results, tuple(found), summary)  # fmt: skip
     write(made)
     return made
-
-
-def rank(
-    results: str | os.PathLike[str] | Iterable[Result],
-    *,
-    score: str | None = None,
-    tracks: Mapping[str, str] | None = None,
-) -> Ranking:
-    """Rank estimators by their results.
-
-    Parameters
-    ----------
-    results : path or iterable of Result
-        Folder that a campaign wrote, or results themselves.
-    score : str, optional
-        Key of `simnav.scoring.SCORES`, one that is better when lower. Default: the horizontal error, and for
-        post-processing the smoothed one.
-    tracks : mapping of str to str, optional
-        Track of scenarios that are not in the catalogue, by versioned id.
-
-    Returns
-    -------
-    simnav.leaderboard.ranking.board.Ranking
-    """
-    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
-
-    wanted = RANKED_SCORES | ({score} if score else set())
-    given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else results
-    return rank(given, score=score, tracks=tracks)
 
 
 def tune(
@@ -552,11 +535,10 @@ def tune(
             raise RequestError(what_to_vary(request))
         vary = ranges_of(read(path))
     ranges = [text for text in vary.split(",") if text.strip()] if isinstance(vary, str) else list(vary)
-    if min(runs, unseen) < 2:
-        raise RequestError(f"runs = {runs}, unseen = {unseen}: both should be 2 or more")
     return tune_row(
-        request, chosen, ranges, runs=runs, unseen=unseen, seed=seed, evaluations=evaluations, method=method,
-        search_seed=search_seed, progress=progress,
+        request, chosen, ranges, runs=whole("runs", runs, 2), unseen=whole("unseen", unseen, 2),
+        seed=whole("seed", seed), evaluations=whole("evaluations", evaluations, 2), method=method,
+        search_seed=whole("search_seed", search_seed), progress=progress,
     )  # fmt: skip
 
 
@@ -569,11 +551,6 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
         yield Path(name) / "results"
 
 
-def _left(minutes: float | None, began: float) -> float | None:
-    """What is left of some minutes."""
-    return None if minutes is None else max(0.0, minutes - (time.monotonic() - began) / 60.0)
-
-
 def _run(
     scenarios: Sequence[Scenario], everyone: Sequence[EstimatorRequest], seeds: range, folder: Path, workers: int,
     time_limit: float | None, memory_limit: float, progress: CampaignProgress, **options: Any,
@@ -581,9 +558,13 @@ def _run(
     from simnav.leaderboard.campaign.campaign import run_campaign
     from simnav.leaderboard.results.store import StoreError, create
 
+    count, memory = whole("workers", workers, 1), positive("memory_limit", memory_limit, 16.0)
+    limit = None if time_limit is None else positive("time_limit", time_limit)
+    if limit == 0.0:
+        raise RequestError("time_limit = 0 s should be greater than 0")
     with mistakes(StoreError):
         create(folder)
     return run_campaign(
-        scenarios, everyone, seeds, folder, workers=workers, timeout=time_limit,
-        memory=int(memory_limit * 2**20), progress=progress, **options,
+        scenarios, everyone, seeds, folder, workers=count, timeout=limit, memory=int(memory * 2**20),
+        progress=progress, **options,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Calls about results that others are to rely on: submissions, and the standard result that comes with simnav.
+"""Calls about results that others are to see: sites, submissions, and the standard result that comes with simnav.
 
 `simnav.leaderboard.interface` has the calls that compute and compare; these build on them.
 """
@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.given import absolute
+from simnav.leaderboard.given import absolute, results_of, whole
+from simnav.leaderboard.inspection import rank
 from simnav.leaderboard.interface import CampaignProgress, campaign
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.standard.carrying import Carried
     from simnav.leaderboard.standard.currency import Outdated
     from simnav.leaderboard.standard.publication import Published
@@ -29,9 +31,71 @@ __all__ = [
     "check_standard",
     "publish_standard",
     "run_standard",
+    "site",
     "submit",
     "verify_bundle",
 ]
+
+
+def site(
+    results: str | os.PathLike[str],
+    *,
+    output: str | os.PathLike[str] = "site",
+    papers: str | os.PathLike[str] = "reproduced",
+    sweeps: str | os.PathLike[str] = "results",
+    runs_shown: int = 2,
+    figures: bool = False,
+    against: str | os.PathLike[str] | None = None,
+    workers: int = 2,
+    progress: Callable[..., None] | None = None,
+) -> SiteReport:
+    """Rank the results of a campaign, and write the site.
+
+    Parameters
+    ----------
+    results : path
+        Folder that a campaign wrote.
+    output : path
+        Folder of the site; an older site there is replaced.
+    papers : path
+        Folder that `simnav.leaderboard.interface.reproduce` wrote; its papers get pages.
+    sweeps : path
+        Folder with the folders of sweeps, which the pages of scenarios show.
+    runs_shown : int
+        Runs of each scenario of which the site has track and errors.
+    figures : bool
+        Write the charts as SVG and PNG, too.
+    against : path, optional
+        Results of another campaign: how well its order agrees.
+    workers : int
+        Processes.
+    progress : callable, optional
+        Called with how many of how many pages are done.
+
+    Returns
+    -------
+    SiteReport
+
+    Raises
+    ------
+    RequestError
+        If there are no results, or the site cannot be written.
+    """
+    from simnav.leaderboard.papers.page import find
+    from simnav.leaderboard.ranking.agreement import rank_correlations
+    from simnav.leaderboard.site import sweeps as swept
+    from simnav.leaderboard.site.report import SiteReport
+    from simnav.leaderboard.site.site import build
+
+    shown, processes = whole("runs_shown", runs_shown, 1), whole("workers", workers, 1)
+    found = results_of(results, series=True)
+    ranking = rank(found)
+    correlations = () if against is None else tuple(rank_correlations(ranking, rank(against)))
+    index = build(
+        found, ranking, absolute(output), progress=progress, workers=processes, papers=find(Path(papers)),
+        runs_shown=shown, figures=figures, sweeps=swept.find(Path(sweeps)),
+    )  # fmt: skip
+    return SiteReport(index, found, ranking, correlations)
 
 
 @dataclass(frozen=True)
@@ -371,7 +435,6 @@ def publish_standard(
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.interface import results_of
     from simnav.leaderboard.papers.page import find
     from simnav.leaderboard.profiles import load
     from simnav.leaderboard.results.store import StoreError

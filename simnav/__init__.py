@@ -38,6 +38,15 @@ if TYPE_CHECKING:
         tune,
         verify,
     )
+    from simnav.leaderboard.publishing import (
+        carry_standard,
+        check_standard,
+        publish_standard,
+        run_standard,
+        site,
+        submit,
+        verify_bundle,
+    )
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
@@ -87,6 +96,7 @@ __all__ = [
     "bench",
     "bound",
     "campaign",
+    "carry_standard",
     "check",
     "check_standard",
     "cite",
@@ -110,6 +120,7 @@ __all__ = [
     "run_standard",
     "run_trial",
     "score",
+    "site",
     "submit",
     "sweep",
     "tune",
@@ -163,7 +174,15 @@ _HOMES = {
         "tune",
         "verify",
     ),
-    "leaderboard.publishing": ("check_standard", "publish_standard", "run_standard", "submit", "verify_bundle"),
+    "leaderboard.publishing": (
+        "carry_standard",
+        "check_standard",
+        "publish_standard",
+        "run_standard",
+        "site",
+        "submit",
+        "verify_bundle",
+    ),
 }
 _home_of = {name: module for module, names in _HOMES.items() for name in names}
 

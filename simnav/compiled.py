@@ -73,7 +73,8 @@ def _cache_directory(chosen: str, xdg: str) -> Path | None:
         else:
             candidates.append((Path(xdg) if xdg else Path.home() / ".cache") / "simnav")
     user = str(os.getuid()) if hasattr(os, "getuid") else "user"
-    candidates.append(Path(tempfile.gettempdir()) / f"simnav-{user}")
+    with contextlib.suppress(OSError):  # no directory for temporary files
+        candidates.append(Path(tempfile.gettempdir()) / f"simnav-{user}")
     for candidate in candidates:
         path = candidate / "kernels"
         with contextlib.suppress(OSError):

@@ -27,14 +27,13 @@ __all__ = [
     "PluginError",
     "Registry",
     "code_digest",
-    "code_tree",
+    "code_text",
     "exception_of",
     "import_file",
     "is_file_module",
     "load_plugin",
     "place_of",
     "source_digest",
-    "tree_digest",
 ]
 
 C = TypeVar("C")
@@ -137,17 +136,13 @@ def source_digest(module: str) -> str:
 _sources: dict[str, str] = {}  # by the name of the module
 
 
-def code_tree(source: bytes) -> ast.Module | None:
-    """The syntax tree of a Python file without its docstrings; None where the text is not Python."""
-    try:
-        tree = ast.parse(source)
-    except (SyntaxError, ValueError):
-        return None
+def code_text(tree: ast.AST) -> str:
+    """A syntax tree as a text without comments, docstrings and line numbers; its docstrings are taken out of it."""
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
             node.body = [s for s in body if not _is_text(s)]  # type: ignore[attr-defined]
-    return tree
+    return ast.dump(tree)
 
 
 def _is_text(statement: ast.stmt) -> bool:
@@ -158,15 +153,11 @@ def _is_text(statement: ast.stmt) -> bool:
     )
 
 
-def tree_digest(tree: ast.Module) -> str:
-    """Hexadecimal digest of a syntax tree; line numbers do not count."""
-    return hashlib.blake2b(ast.dump(tree).encode(errors="surrogatepass"), digest_size=16).hexdigest()
-
-
 def code_digest(source: bytes) -> str:
-    """Hexadecimal digest of a Python file; comments, docstrings and line numbers do not count."""
-    tree = code_tree(source)
-    return hashlib.blake2b(source, digest_size=16).hexdigest() if tree is None else tree_digest(tree)
+    """Hexadecimal digest of the `code_text` of a Python file; of a text that is not Python, of its bytes."""
+    with contextlib.suppress(SyntaxError, ValueError):
+        source = code_text(ast.parse(source)).encode(errors="surrogatepass")
+    return hashlib.blake2b(source, digest_size=16).hexdigest()
 
 
 def place_of(cls: Any) -> tuple[str, int]:

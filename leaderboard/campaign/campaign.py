@@ -239,6 +239,8 @@ def run_campaign(
             raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
     _unique("scenario", [s.id for s in scenarios])
     _unique("estimator", [e.label for e in estimators])
+    if not (isinstance(shard, Sequence) and len(shard) == 2 and all(isinstance(k, int) for k in shard)):
+        raise RequestError(f"shard = {shard!r} should be a pair (k, n): part k of n")
     part, parts = shard
     if not 1 <= part <= parts:
         raise RequestError(f"shard = {part}/{parts} should be k/n, with k from 1 to n")

@@ -12,7 +12,6 @@ import importlib.util
 import json
 import os
 import sys
-import sysconfig
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
@@ -21,7 +20,7 @@ from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.session_class import is_session, source_of
-from simnav.leaderboard.campaign.sources import digest, files_digest, followed
+from simnav.leaderboard.campaign.sources import digest, files_digest, followed, is_installed
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -85,7 +84,8 @@ def simulator_version() -> str:
 def recording_digest(scenario: Scenario, simulator: str) -> str:
     """Digest of all that decides the recordings of a scenario, but the seed.
 
-    Of a recorded scenario the log files and the code that reads them count, too.
+    Of a recorded scenario the log files and the code that reads them count, too; of instruments and faults of others,
+    what their code imports.
 
     Parameters
     ----------
@@ -95,7 +95,22 @@ def recording_digest(scenario: Scenario, simulator: str) -> str:
         As from `simulator_version`; of it only the digest of the code counts, not the number of the version.
     """
     code = simulator.rpartition("+")[2]
-    return digest(scenario.id, scenario.content_hash(), code, _log_digest(scenario))
+    return digest(scenario.id, scenario.content_hash(), code, _log_digest(scenario), *_plugin_digests(scenario))
+
+
+def _plugin_digests(scenario: Scenario) -> list[str]:
+    """Digests of the code of instruments and faults that do not come with simnav; none where all do."""
+    found = []
+    for module in sorted({type(spec).__module__ for spec in (*scenario.instruments.values(), *scenario.faults)}):
+        file = getattr(sys.modules.get(module), "__file__", None)
+        if _in_simnav(module) or file is None:  # of a session there is no file
+            continue
+        path = Path(file).resolve()
+        if is_installed(path):
+            found.append(_installed_code(module.partition(".")[0]))
+        else:
+            found.append(_code_digest(followed(files=[path], without=[_LOGS, "simnav.estimators"])))
+    return found
 
 
 def _log_digest(scenario: Scenario) -> str:
@@ -188,10 +203,8 @@ def _used_digest(module: str) -> str:
     file = getattr(sys.modules.get(module), "__file__", None)
     if file is None or _in_simnav(module):
         return ""
-    path, installed = Path(file).resolve(), map(Path, sysconfig.get_paths().values())
-    if any(path.is_relative_to(folder.resolve()) for folder in installed):
-        return ""
-    return _code_digest(followed(files=[path]))
+    path = Path(file).resolve()
+    return "" if is_installed(path) else _code_digest(followed(files=[path]))
 
 
 def _in_simnav(module: str) -> bool:

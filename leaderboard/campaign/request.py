@@ -71,8 +71,8 @@ class EstimatorRequest:
         return make(self.name, **self.parameters)
 
 
-#: A name, a name with parameters (``ekf:gate=3``), a file (``my.py``, ``my.py:MyFilter``), a class, or one of these
-#: with a mapping of parameters.
+#: A name, a name with parameters (``sw-fgo:window=10``), a file (``my.py``, ``my.py:MyFilter``), a class, or one of
+#: these with a mapping of parameters.
 EstimatorLike: TypeAlias = (
     "str | Path | type[Estimator] | EstimatorRequest | tuple[str | Path | type[Estimator], Mapping[str, Any]]"
 )
@@ -95,14 +95,16 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
 
     Examples
     --------
-    >>> request("ekf:gate=3,tau=10").label
-    'ekf(gate=3,tau=10)'
-    >>> request(("ekf", {"gate": 3.0})).parameters
-    {'gate': 3.0}
+    >>> request("sw-fgo:window=10,spacing=1").label
+    'sw-fgo(window=10,spacing=1)'
+    >>> request(("sw-fgo", {"window": 10})).parameters
+    {'window': 10}
     """
     if isinstance(given, tuple):
+        if len(given) != 2 or not isinstance(given[1], Mapping):
+            raise RequestError(f"{given!r} is no estimator; with parameters it is a pair, ('sw-fgo', {{'window': 10}})")
         given, own = given
-        return request(given, {**(parameters or {}), **own})
+        return request(given, {**_mapping(parameters), **own})
     if isinstance(given, EstimatorRequest):
         if not parameters:
             return given
@@ -115,7 +117,7 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
             return EstimatorRequest(f"{inspect.getfile(given)}:{given.__name__}", dict(parameters or {}))
         return EstimatorRequest(name, dict(parameters or {}), cls=given)
     if not isinstance(given, (str, Path)):
-        raise RequestError(f"{given!r} is no estimator; a class, a name or a file is wanted")
+        raise _no_estimator(given)
     found = split_estimators([str(given)])
     if len(found) != 1:
         raise RequestError(f"{str(given)!r} names {len(found)} estimators where one is wanted")
@@ -141,10 +143,10 @@ def requests(
         On an unknown estimator or parameter, or a value that does not fit. Files are not imported here: whoever runs
         them does so, in a process of its own.
     """
-    items = _items(given)
+    items = [EstimatorRequest(name) for name in names()] if given is None else _items(given)
     if not items:
-        items = [EstimatorRequest(name) for name in names()]
-    common, unused = dict(parameters or {}), set(parameters or ())
+        raise RequestError("the list of estimators is empty; leave it out for all of them")
+    common, unused = _mapping(parameters), set(_mapping(parameters))
     made: list[EstimatorRequest] = []
     for item in items:
         with mistakes():
@@ -191,13 +193,29 @@ def _has_a_name_of_its_own(found: EstimatorRequest) -> None:
         raise RequestError(f"{found.name}: {stem[1]!r} is a row that comes with simnav; give the file another name")
 
 
-def _items(given: EstimatorLike | Iterable[EstimatorLike] | None) -> list[EstimatorLike]:
+def _no_estimator(given: object) -> RequestError:
+    if isinstance(given, Estimator):
+        name = type(given).__name__
+        return RequestError(f"an object of {name} was given; its class is wanted, with parameters as ({name}, {{...}})")
+    return RequestError(f"{given!r} is no estimator; a class, a name or a file is wanted")
+
+
+def _mapping(parameters: Any) -> dict[str, Any]:
+    """Parameters by their names; RequestError where they are no such thing."""
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise RequestError(f"parameters = {parameters!r}: a mapping is wanted, like {{'window': 10}}")
+    return dict(parameters or {})
+
+
+def _items(given: EstimatorLike | Iterable[EstimatorLike]) -> list[EstimatorLike]:
     """One by one; what is separated by commas is taken apart."""
-    if given is None:
-        return []
+    if isinstance(given, Mapping):
+        raise RequestError("a mapping names no estimators; give a list of pairs, like [('sw-fgo', {'window': 10})]")
     single = isinstance(given, (str, Path, type, EstimatorRequest)) or (
         isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], Mapping)
     )
+    if not single and not isinstance(given, Iterable):
+        raise _no_estimator(given)
     items: Sequence[Any] = [given] if single else list(given)  # type: ignore[arg-type]
     found: list[EstimatorLike] = []
     texts: list[str] = []
@@ -257,8 +275,8 @@ def kebab(name: str) -> str:
 def split_estimators(given: Iterable[str] | None) -> list[tuple[str, dict[str, str]]]:
     """Names or files with their parameters: ``name:key=value,key=value``, separated by commas.
 
-    >>> split_estimators(["ekf:gate=3,tau=10,dead-reckoning", "my.py:Mine:gain=0.5"])
-    [('ekf', {'gate': '3', 'tau': '10'}), ('dead-reckoning', {}), ('my.py:Mine', {'gain': '0.5'})]
+    >>> split_estimators(["sw-fgo:window=10,spacing=1,dead-reckoning", "my.py:Mine:gain=0.5"])
+    [('sw-fgo', {'window': '10', 'spacing': '1'}), ('dead-reckoning', {}), ('my.py:Mine', {'gain': '0.5'})]
 
     Raises
     ------

@@ -19,6 +19,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.plugins import code_text
 
 __all__ = ["carry", "is_session", "receive", "source_of"]
 
@@ -83,8 +84,9 @@ def source_of(cls: type) -> tuple[str, list[str]]:
     Returns
     -------
     text : str
-        Its source text and that of all functions and classes of its session that it uses, with the values. Where there
-        is no text (a prompt that keeps none), the compiled code stands for it.
+        Its source text, without comments and docstrings, and that of all functions and classes of its session that it
+        uses, with the values: of its attributes, of defaults, and of what its functions use. Where there is no text (a
+        prompt that keeps none), the compiled code stands for it.
     modules : list of str
         Names of the modules outside the session that it uses.
     """
@@ -95,31 +97,58 @@ def source_of(cls: type) -> tuple[str, list[str]]:
             continue
         seen.add(id(item))
         parts.append(_text(item))
-        for function in _functions(item):
-            for name, value in _uses(function):
-                if isinstance(value, ModuleType):
-                    modules.add(value.__name__)
-                    continue
-                definition = value if isinstance(value, (type, FunctionType)) else type(value)
-                if definition is value or is_session(definition.__module__):
+        for name, value in [*_held(item), *(use for function in _functions(item) for use in _uses(function))]:
+            if isinstance(value, ModuleType):
+                modules.add(value.__name__)
+                continue
+            for definition in dict.fromkeys(_definitions(value)):
+                if definition.__module__ != "builtins":
                     modules.add(definition.__module__)
                     todo += [definition] if is_session(definition.__module__) else []
-                if definition is not value:
-                    parts.append(f"{name}: {_digest(value)}")
+            if not isinstance(value, (type, FunctionType)):
+                parts.append(f"{name}: {_digest(value)}")
     return "\n".join(parts), sorted(name for name in modules if not is_session(name))
+
+
+def _definitions(value: Any, depth: int = 3) -> Iterator[Any]:
+    """A class or a function itself; of another value its class, and those of what it holds."""
+    if isinstance(value, (type, FunctionType)):
+        yield value
+        return
+    yield type(value)
+    if depth and isinstance(value, (tuple, list, set, frozenset)):
+        for item in value:
+            yield from _definitions(item, depth - 1)
+    elif depth and isinstance(value, dict):
+        yield from _definitions(list(value.values()), depth - 1)
+
+
+def _held(item: Any) -> Iterator[tuple[str, Any]]:
+    """What a definition computed when it was run: attributes of a class, defaults of functions."""
+    if isinstance(item, type):
+        for name, value in vars(item).items():
+            if not name.startswith("__") and name != "_abc_impl" and not any(_functions_in(value)):
+                yield name, value
+    for function in _functions(item):
+        for value in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
+            yield function.__name__, value
 
 
 def _functions(item: Any) -> Iterator[FunctionType]:
     """A function, or the methods of a class, whatever they are wrapped in."""
     for value in vars(item).values() if isinstance(item, type) else (item,):
-        if isinstance(value, property):
-            candidates: tuple[Any, ...] = (value.fget, value.fset)
-        else:
-            candidates = (getattr(value, "__func__", getattr(value, "func", value)),)
-        for candidate in candidates:
-            function = inspect.unwrap(candidate) if callable(candidate) else candidate
-            if isinstance(function, FunctionType):
-                yield function
+        yield from _functions_in(value)
+
+
+def _functions_in(value: Any) -> Iterator[FunctionType]:
+    if isinstance(value, property):
+        candidates: tuple[Any, ...] = (value.fget, value.fset)
+    else:
+        candidates = (getattr(value, "__func__", getattr(value, "func", value)),)
+    for candidate in candidates:
+        function = inspect.unwrap(candidate) if callable(candidate) and not isinstance(candidate, type) else candidate
+        if isinstance(function, FunctionType):
+            yield function
 
 
 def _uses(function: FunctionType) -> Iterator[tuple[str, Any]]:
@@ -155,13 +184,10 @@ def _text(item: Any) -> str:
             if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and node.name == item.__name__:
                 first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
                 if first <= code.co_firstlineno <= (node.end_lineno or first):
-                    return "\n".join(text.splitlines()[first - 1 : node.end_lineno])
+                    return code_text(node)
     compiled = [(c.co_code, c.co_names, [k for k in c.co_consts if not isinstance(k, CodeType)])
                 for f in functions for c in _codes(f.__code__)]  # fmt: skip
-    values = {k: v for k, v in vars(item).items() if isinstance(v, (bool, int, float, str, tuple))} if isinstance(
-        item, type) else {}  # fmt: skip
-    values = {k: v for k, v in values.items() if not k.startswith("__")}
-    return f"{item.__qualname__} {compiled!r} {values!r}"
+    return f"{item.__qualname__} {compiled!r}"
 
 
 def _digest(value: Any) -> str:

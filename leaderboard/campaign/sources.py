@@ -2,8 +2,9 @@
 
 A module of simnav brings those modules of simnav that it imports, directly or not. Where it imports a name from a
 package, only the module that the package has this name from counts, so that a package which imports everything (the
-registered estimators) does not make everything count. A module of somebody else brings the files beside it that it
-imports, too. What is installed from other packages is not followed.
+registered estimators) does not make everything count. A module of somebody else brings the files of the user that it
+imports, too: those beside it, and those that this process has imported from elsewhere. What is installed is not
+followed.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import ast
 import hashlib
 import os
 import re
+import sys
+import sysconfig
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -19,8 +22,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 import simnav
+from simnav.plugins import code_text
 
-__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "followed"]
+__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "followed", "is_installed"]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
 LIBRARY = Path(simnav.__file__).parent
@@ -66,12 +70,19 @@ class Code:
         Name -> the module, and the name in it, that it is imported from at the top of the file, for type checking too.
     data : tuple of str
         Patterns of the names of files that texts in it name, like ``weights_*.json`` for ``f"weights_{kind}.json"``.
+    named : tuple of str
+        Patterns of names of modules in its texts, like ``methods.*`` for ``f"methods.{kind}"``, where it uses
+        `importlib` or ``__import__``.
+    folders : tuple of str
+        Texts in it that could name a folder.
     """
 
     digest: str
     imports: tuple[tuple[str, str], ...] = ()
     origins: Mapping[str, tuple[str, str]] = field(default_factory=lambda: MappingProxyType({}))
     data: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
 
 
 def code_of(path: Path, package: str) -> Code:
@@ -100,27 +111,26 @@ def _code_of(path: Path, package: str, modified: int, size: int) -> Code:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
         return Code(hashlib.blake2b(source, digest_size=16).hexdigest())
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [s for s in body if not _is_text(s)]  # type: ignore[attr-defined]
-    text = ast.dump(tree)
+    text = code_text(tree)
+    imports, texts = tuple(dict.fromkeys(_imports(tree, package))), _texts(tree)
+    by_text = any(module.partition(".")[0] == "importlib" for module, _ in imports) or any(
+        isinstance(node, ast.Name) and node.id == "__import__" for node in ast.walk(tree)
+    )
     return Code(
         hashlib.blake2b(text.encode(errors="surrogatepass"), digest_size=16).hexdigest(),
-        tuple(dict.fromkeys(_imports(tree, package))),
+        imports,
         MappingProxyType({
             name: origin for statement in _top(tree) for name, origin in _taken(statement, package)
         }),
-        tuple(sorted(_named_files(tree))),
+        tuple(sorted(t for t in texts if re.fullmatch(_FILE, t) and not t.startswith("*."))),
+        tuple(sorted(t.lstrip(".") for t in texts if by_text and re.fullmatch(_MODULE, t))),
+        tuple(sorted(t for t in texts if re.fullmatch(_FOLDER, t))),
     )  # fmt: skip
 
 
-def _is_text(statement: ast.stmt) -> bool:
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
+_FILE = r"[\w*-]+\.[A-Za-z]\w{0,7}|(?:[\w*-]+/)+[\w*-]+\.[A-Za-z]\w{0,7}"
+_MODULE = r"\.*[A-Za-z_][\w*]*(?:\.[\w*]+)*"
+_FOLDER = r"[\w-]+(?:/[\w-]+)*"
 
 
 def _for_type_checking(node: ast.AST) -> bool:
@@ -192,20 +202,28 @@ def _imports(tree: ast.Module, package: str) -> Iterator[tuple[str, str]]:
                 module = f"{module}.{name}"
 
 
-def _named_files(tree: ast.Module) -> set[str]:
-    """Patterns of files of data that texts name: ``weights.json``, ``f"weights_{kind}.json"``."""
+def _texts(tree: ast.Module) -> set[str]:
+    """All texts, with a star for each value: ``weights.json``, ``weights_*.json`` for ``f"weights_{kind}.json"``."""
     found = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
-            parts = [str(v.value) if isinstance(v, ast.Constant) else "*" for v in node.values]
-            text = "".join(parts)
+            found.add("".join(str(v.value) if isinstance(v, ast.Constant) else "*" for v in node.values))
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            text = node.value
-        else:
-            continue
-        if re.fullmatch(r"[\w*-]+\.[A-Za-z]\w{0,7}", text) and not text.startswith("*."):
-            found.add(text)
+            found.add(node.value)
     return found
+
+
+def is_installed(path: Path) -> bool:
+    """Whether a file belongs to Python or to an installed package, and not to the user's own work."""
+    if {"site-packages", "dist-packages"} & set(path.parts):
+        return True
+    return any(path.is_relative_to(folder) for folder in _installation())
+
+
+@lru_cache(maxsize=1)
+def _installation() -> tuple[Path, ...]:
+    wanted = ("stdlib", "platstdlib", "purelib", "platlib")
+    return tuple({Path(sysconfig.get_path(name)).resolve() for name in wanted})
 
 
 # --- following imports --------------------------------------------------------------------------------
@@ -221,7 +239,7 @@ def followed(
     modules : iterable of str
         Absolute names of modules of simnav.
     files : iterable of Path
-        Python files of others; of the files beside them those that they import count, too.
+        Python files of others; what they import of the user's own files counts, too.
     without : collection of str
         Packages of simnav that are not followed.
 
@@ -270,7 +288,10 @@ class _Walk:
 
     def _add(self, name: str, path: Path, package: str, start: Path | None) -> None:
         code = code_of(path, package)
-        beside = sorted({p for pattern in code.data for p in path.parent.glob(pattern) if p.is_file()})
+        folders = [path.parent]
+        if start is not None:  # of others, who keep their data where they like
+            folders += [place for text in code.folders if (place := path.parent / text).is_dir()]
+        beside = sorted({p for place in folders for pattern in code.data for p in place.glob(pattern) if p.is_file()})
         self.found[name] = digest(code.digest, files_digest((p.name, p) for p in beside)) if beside else code.digest
         self.todo.append((code, start, path.parent))
 
@@ -281,8 +302,10 @@ class _Walk:
                 if module == "simnav" or module.startswith("simnav."):
                     self.take(module, name)
                 elif start is not None:
-                    for part in filter(None, [module, "" if module else name]):
-                        self.beside(part.partition(".")[0], start, folder)
+                    self.others(module or name, start, folder)
+            if start is not None:
+                for text in code.named:
+                    self.others(text, start, folder)
 
     def take(self, module: str, name: str) -> None:
         """Take what ``from module import name`` needs, or ``import module`` where the name is empty."""
@@ -300,15 +323,24 @@ class _Walk:
         if module != "simnav":  # whose own code only says where its names are
             self.module(module)
 
-    def beside(self, name: str, start: Path, folder: Path) -> None:
-        """Take a module or a package that is beside a file of others."""
-        for place in {start, folder}:
-            path = place / f"{name}.py"
-            if path.is_file():
+    def others(self, name: str, start: Path, folder: Path) -> None:
+        """Take a module that a file of others imports, if it is one of the user's own."""
+        if not self.beside(name.partition(".")[0], start, folder) and "*" not in name:
+            file = getattr(sys.modules.get(name), "__file__", None)
+            path = None if file is None else Path(file).resolve()
+            if path is not None and path.suffix == ".py" and path.is_file() and not is_installed(path):
                 self.file(path, start)
-            elif (place / name / "__init__.py").is_file():
-                for inside in sorted((place / name).rglob("*.py")):
-                    self.file(inside, start)
+
+    def beside(self, name: str, start: Path, folder: Path) -> bool:
+        """Take a module or a package that is beside a file of others; returns whether there is one."""
+        found: list[Path] = []
+        for place in {start, folder}:
+            modules = [p for p in place.glob(f"{name}.py") if p.is_file()]
+            packages = place.glob(name) if name and not modules else []  # with or without an __init__.py
+            found += modules + [p for package in packages if package.is_dir() for p in package.rglob("*.py")]
+        for path in sorted(set(found)):
+            self.file(path, start)
+        return bool(found)
 
 
 def _place(module: str) -> Path | None:

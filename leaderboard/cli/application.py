@@ -145,8 +145,11 @@ def main() -> None:
     except Exception as error:  # of the parser: an unknown command or option, a value of the wrong type
         if not hasattr(error, "format_message"):
             raise
-        text = shortened(" ".join(error.format_message().split()))
-        Output().note(f"simnav: {text}" if text else "simnav: see simnav --help")
+        text = shortened(" ".join(error.format_message().split())) or "see simnav --help"
+        out = Output(json="--json" in sys.argv[1:])
+        out.remark(text)
+        out.document({"error": text, "code": USER})
+        out.flush()
         sys.exit(USER)
     except KeyboardInterrupt:
         sys.exit(130)

@@ -8,7 +8,6 @@ import typer
 
 from simnav.leaderboard.cli.console import FAILED, session
 from simnav.leaderboard.cli.options import Debug, Json, Set, parameters
-from simnav.leaderboard.results.errors import mistakes
 
 __all__ = ["command"]
 
@@ -24,10 +23,8 @@ def command(
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking import tables
 
-        with mistakes(ValueError):
-            report = interface.check(file, **parameters(set_))
-        findings = [{"name": f.name, "ok": f.ok, "sentence": f.sentence} for f in report.findings]
-        out.document({"estimator": report.estimator, "passed": report.passed, "findings": findings})
+        report = interface.check(file, **parameters(set_))
+        out.document(report.to_dict())
         out.print(tables.table(f"{report.estimator} and the contract", ["", "test", "finding"],
                                [["ok" if f.ok else "FAIL", f.name, f.sentence] for f in report.findings],
                                strong=[i for i, f in enumerate(report.findings) if not f.ok]),

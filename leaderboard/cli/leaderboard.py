@@ -34,29 +34,22 @@ def command(
 ) -> None:
     """Rank the results of a campaign and write the site."""
     with session(json, debug) as out:
-        from simnav.leaderboard import interface
-        from simnav.leaderboard.papers.page import find
-        from simnav.leaderboard.ranking.agreement import LEAST, correlation_table, rank_correlations
-        from simnav.leaderboard.ranking.confinement import confined, confinement_line
-        from simnav.leaderboard.ranking.failures import failure_table, failures
+        from simnav.leaderboard import publishing
+        from simnav.leaderboard.ranking.agreement import LEAST, correlation_table
+        from simnav.leaderboard.ranking.confinement import confinement_line
+        from simnav.leaderboard.ranking.failures import failure_table
         from simnav.leaderboard.ranking.ranking_table import ranking_tables
-        from simnav.leaderboard.site import sweeps as swept
-        from simnav.leaderboard.site.site import build
 
-        found = interface.results_of(results, series=True)
-        ranking = interface.rank(found)
-        correlations = [] if against is None else rank_correlations(ranking, interface.rank(against))
         with out.progress("site") as progress:
-            index = build(
-                found, ranking, output, progress=progress, workers=workers, papers=find(papers), runs_shown=runs_shown,
-                figures=figures, sweeps=swept.find(sweeps),
+            made = publishing.site(
+                results, output=output, papers=papers, sweeps=sweeps, runs_shown=runs_shown, figures=figures,
+                against=against, workers=workers, progress=progress,
             )  # fmt: skip
-        document = {"site": str(index), "runs": len(found), "failed": failures(found), "ranking": ranking.to_dict(),
-                    "confinement": confined(found)}  # fmt: skip
-        out.document(document | {"correlations": [c.to_dict() for c in correlations]})
-        out.print(*ranking_tables(ranking), *failure_table(found), *filter(None, [confinement_line(found)]))
-        if correlations:
-            out.print(correlation_table(correlations))
+        out.document(made.to_dict())
+        out.print(*ranking_tables(made.ranking), *failure_table(made.results))
+        out.print(*filter(None, [confinement_line(made.results)]))
+        if made.correlations:
+            out.print(correlation_table(made.correlations))
         elif against is not None:
             out.note(f"simnav: no track of {against} has {LEAST} rows in common with one of {results}")
-        out.print(f"site: {index}")
+        out.print(f"site: {made.index}")

@@ -44,7 +44,9 @@ Scenarios = Annotated[
 Estimators = Annotated[
     list[str] | None,
     typer.Option(
-        "--estimator", "-e", help="Names or files, separated by commas; 'ekf:gate=3' sets a parameter. Default: all."
+        "--estimator",
+        "-e",
+        help="Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter. Default: all.",
     ),
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")]
@@ -70,14 +72,14 @@ _STAGES = {"compile": "compiling kernels", "run": "running"}
 def parameters(given: Sequence[str] | None) -> dict[str, str]:
     """The values of ``--set``.
 
-    >>> parameters(["gate=3", "tau = 10"])
-    {'gate': '3', 'tau': '10'}
+    >>> parameters(["window=10", "spacing = 1"])
+    {'window': '10', 'spacing': '1'}
     """
     values = {}
     for text in given or ():
         name, equals, value = text.partition("=")
         if not equals or not name.strip().isidentifier():
-            raise RequestError(f"--set {text}: it should be name=value, like --set gate=3")
+            raise RequestError(f"--set {text}: it should be name=value, like --set window=10")
         values[name.strip()] = value.strip()
     return values
 

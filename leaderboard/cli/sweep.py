@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _DIAL = "A dial with its values, like multipath=0,1,2,4, or a key, like fault[0].sigma_m=1,2. Two make a map."
-_ESTIMATOR = "Names or files, separated by commas; 'ekf:gate=3' sets a parameter."
+_ESTIMATOR = "Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter."
 
 
 def command(

@@ -10,6 +10,7 @@ correlations", Psychometrika 65(1), 2000.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +91,7 @@ def _correlation(first: TrackRanking, second: TrackRanking) -> RankCorrelation |
     return RankCorrelation(first.track, second.track, rows, value, math.tanh(z - half), math.tanh(z + half))
 
 
-def correlation_table(found: list[RankCorrelation]) -> Table:
+def correlation_table(found: Sequence[RankCorrelation]) -> Table:
     """A line for each pair of tracks."""
     rows = [[c.track, c.other, len(c.rows), f"{c.value:.2f}", f"{c.low:.2f} to {c.high:.2f}"] for c in found]
     columns = ["track", "other track", "rows in common", "rank correlation", "95 % interval"]

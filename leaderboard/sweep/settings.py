@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,11 +59,14 @@ def parse_dials(given: Mapping[str, Sequence[float]] | Sequence[str] | str) -> d
     """Dials in any form that `simnav.sweep` takes."""
     if isinstance(given, Mapping):
         return dict(given)
-    return dict(map(parse_dial, [given] if isinstance(given, str) else given))
+    texts = [given] if isinstance(given, str) else list(given) if isinstance(given, Iterable) else [given]
+    if not all(isinstance(text, str) for text in texts):
+        raise RequestError(f"dials = {given!r}: a mapping is wanted, like {{'multipath': [0, 1, 2]}}")
+    return dict(map(parse_dial, texts))
 
 
-def checked_score(score: str, limit: float | None) -> None:
-    """Refuse a score that cannot be swept, or a limit that is none.
+def checked_score(score: str, limit: float | None = None) -> None:
+    """Refuse a score that cannot be swept or ranked, or a limit that is none.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def checked_score(score: str, limit: float | None) -> None:
     if score not in SCORES:
         raise RequestError(f"score = {score!r} is unknown{closest(score, list(SCORES))}")
     if SCORES[score].better != "lower":
-        raise RequestError(f"score = {score!r} is not better when lower; a sweep looks for an error that grows")
+        raise RequestError(f"score = {score!r} is not better when lower; an error is wanted, like horizontal_rmse")
     if limit is not None and not limit > 0.0:
         raise RequestError(f"limit = {limit:g} should be greater than 0")
 
@@ -95,7 +98,14 @@ def chosen_dials(scenario: Scenario, asked: Mapping[str, Sequence[float]]) -> li
     """
     if not 1 <= len(asked) <= 2:
         raise RequestError(f"{len(asked)} dials were asked for; a sweep turns one, or two for a map")
-    return [_chosen(scenario, name, [float(v) for v in values]) for name, values in asked.items()]
+    return [_chosen(scenario, name, _numbers(name, values)) for name, values in asked.items()]
+
+
+def _numbers(name: str, values: Sequence[float]) -> list[float]:
+    try:
+        return [float(v) for v in values]
+    except (TypeError, ValueError):
+        raise RequestError(f"dial {name!r}: its values should be a list of numbers, not {values!r}") from None
 
 
 def _chosen(scenario: Scenario, name: str, values: list[float]) -> tuple[Dial, list[float]]:

@@ -6,7 +6,8 @@ import contextlib
 import inspect
 import re
 import typing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -32,27 +33,38 @@ class Description:
         Other names under which it is found.
     summary : str
         First line of the docstring.
-    file : str
-        Path of the file where the class is defined.
-    line : int
-        Line of the class in this file.
     reference, slow : bool
         As in `Estimator`: it is told the truth; it takes several milliseconds an epoch or more.
     real_time_as : str
         As in `Estimator`: what it is in real time, where it only smooths beside.
     parameters : tuple of Parameter
         Parameters of its constructor.
+    cls : type
+        The class itself.
     """
 
     name: str
     aliases: tuple[str, ...]
     summary: str
-    file: str
-    line: int
     reference: bool
     slow: bool
     real_time_as: str
     parameters: tuple[Parameter, ...]
+    cls: type[Estimator] = field(repr=False)
+
+    @cached_property
+    def _place(self) -> tuple[str, int]:
+        return place_of(self.cls)  # parses the whole file, so only where it is asked for
+
+    @property
+    def file(self) -> str:
+        """Path of the file where the class is defined."""
+        return self._place[0]
+
+    @property
+    def line(self) -> int:
+        """Line of the class in this file."""
+        return self._place[1]
 
 
 def find(name_or_path: str) -> type[Estimator]:
@@ -80,14 +92,11 @@ def find(name_or_path: str) -> type[Estimator]:
 def describe(name_or_path: str) -> Description:
     """What an estimator is, where it is defined, and what parameters it takes."""
     cls = find(name_or_path)
-    file, line = place_of(cls)
     lines = (inspect.getdoc(cls) or "").strip().splitlines() if cls.__doc__ else []
     return Description(
         name=cls.name,
         aliases=aliases_of(cls.name),
         summary=lines[0] if lines else "",
-        file=file,
-        line=line,
         reference=cls.reference,
         slow=cls.slow,
         real_time_as=cls.real_time_as,
@@ -95,6 +104,7 @@ def describe(name_or_path: str) -> Description:
             Parameter(p.name, p.default, "" if p.annotation is p.empty else inspect.formatannotation(p.annotation))
             for p in parameters_of(cls)
         ),
+        cls=cls,
     )
 
 

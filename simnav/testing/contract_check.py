@@ -103,6 +103,14 @@ class Report:
     findings: tuple[Finding, ...]
     passed: bool
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain: what ``simnav check --json`` prints."""
+        return {
+            "estimator": self.estimator,
+            "passed": self.passed,
+            "findings": [{"name": f.name, "ok": f.ok, "sentence": f.sentence} for f in self.findings],
+        }
+
     def __str__(self) -> str:
         lines = [f"{'ok  ' if f.ok else 'FAIL'}  {f.name}: {f.sentence}" for f in self.findings]
         bad = sum(not f.ok for f in self.findings)

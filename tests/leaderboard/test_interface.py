@@ -6,7 +6,7 @@ import inspect
 import json
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,8 @@ from simnav.leaderboard.cli.new_estimator import write_estimator
 from simnav.leaderboard.interface import results_of, scenario_of
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.plain import plain
-from simnav.leaderboard.site.site import build
 from simnav.recording import Recording
+from simnav.warmup import warmup
 from tests.cases import POND
 
 
@@ -85,15 +85,11 @@ def call_simulate() -> Any:
 
 def call_leaderboard() -> Any:
     simnav.campaign("pond.toml", "gnss-only,ship-ekf", runs=2, output="out", workers=1, oracle=False)
-    results = results_of("out", series=True)
-    index = build(results, simnav.rank("out"), Path("mine"))
-    assert json.loads(index.with_name("results.json").read_text())["results"]
-    return {"runs": len(results), "ranking": simnav.rank(results).to_dict(), "failed": {}}
-
-
-def call_check() -> Any:
-    report = simnav.check("gnss-only:acceleration=0.5")
-    return {"estimator": report.estimator, "passed": report.passed, "findings": plain(list(report.findings))}
+    made = simnav.site("out", output="mine", workers=1)
+    assert made.index == Path("mine/index.html").resolve()
+    assert json.loads(made.index.with_name("results.json").read_text())["results"]
+    assert made.to_dict()["runs"] == len(results_of("out")) == 4
+    return made.to_dict()
 
 
 RATE = "instruments.gnss_position.rate_hz"
@@ -105,7 +101,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         lambda: simnav.run("pond.toml", ["gnss-only:acceleration=0.5", "ship-ekf"], seed=3).to_dict(),
     ),
     "simulate": (["simulate", "pond.toml", "-o", "theirs.npz", "--seed", "4"], call_simulate),
-    "check": (["check", "gnss-only:acceleration=0.5"], call_check),
+    "check": (["check", "gnss-only:acceleration=0.5"], lambda: simnav.check("gnss-only:acceleration=0.5").to_dict()),
     "bench": (
         ["bench", "gnss-only:acceleration=0.5", "--against", "ship-ekf", "-s", "pond.toml", "--epochs", "20",
          "--rounds", "1", "--seed", "3"],
@@ -141,6 +137,18 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
 ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "submit", "tune", "verify"}
+ELSEWHERE |= {"standard run", "standard check", "standard carry", "standard publish", "train anfis"}
+
+
+def commands() -> dict[str, Callable[..., Any]]:
+    """Every command with what it runs, those of groups by both words."""
+    found = {}
+    groups = [("", app)] + [(f"{g.name} ", g.typer_instance) for g in app.registered_groups]
+    for prefix, group in groups:
+        for c in group.registered_commands:
+            assert c.callback is not None
+            found[prefix + (c.name or c.callback.__name__)] = c.callback
+    return found
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -169,7 +177,45 @@ def test_a_command_and_its_call_say_the_same(here: Path, name: str) -> None:
 
 
 def test_every_command_is_compared() -> None:
-    assert {c.name for c in app.registered_commands} == set(CALLS) | ELSEWHERE
+    assert set(commands()) == set(CALLS) | ELSEWHERE
+
+
+#: The call of a command, where its name is another one; None where the maintainers of simnav alone need it.
+OTHER_NAMES: dict[str, Callable[..., Any] | None] = {
+    "list": simnav.names, "simulate": simnav.record, "leaderboard": simnav.site, "new-estimator": write_estimator,
+    "warmup": warmup, "reference": None, "train anfis": None, "standard run": simnav.run_standard,
+    "standard check": simnav.check_standard, "standard carry": simnav.carry_standard,
+    "standard publish": simnav.publish_standard,
+}  # fmt: skip
+
+#: Options that are no argument of the call: what is done with the object that it returns, and files that it writes.
+OF_THE_RESULT = {
+    "list": {"topic"},
+    "run": {"plot", "stanford", "alert_limit"},
+    "simulate": {"output", "csv"},
+    "sweep": {"plot", "workers", "time_limit", "memory_limit"},  # limits are **options of the call
+    "bound": {"csv"},
+    "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
+    "cite": {"text"},
+    "tune": {"output", "plot", "parameters"},  # parameters that are held are a pair with the estimator
+}
+SAME = {"set_": "parameters", "file": "estimator", "family": "families"}
+
+
+def arguments(function: Callable[..., Any], *, without: Collection[str] = ()) -> set[str]:
+    """Names of the arguments, in the singular."""
+    names = {SAME.get(name, name) for name in inspect.signature(function).parameters} - {*without}
+    return {name.removesuffix("s") for name in names}
+
+
+@pytest.mark.parametrize("name", commands())
+def test_every_option_is_an_argument_of_the_call_and_the_other_way_round(name: str) -> None:
+    call = OTHER_NAMES[name] if name in OTHER_NAMES else getattr(simnav, name)
+    if call is None:
+        return
+    options = arguments(commands()[name], without={"json", "debug", *OF_THE_RESULT.get(name, ())})
+    more = {"parameter"} if name == "tune" else {"option"}
+    assert options == arguments(call, without={"progress", "load", "processes"}) - more
 
 
 # -- what may be given, and what comes back ------------------------------------------------------------------
@@ -188,6 +234,13 @@ def test_names_load_with_their_first_use() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.usefixtures("here")
+def test_numbers_of_numpy_and_generators_are_taken() -> None:
+    report = simnav.run("pond.toml", (name for name in ("gnss-only", LastFix)), seed=np.int64(3))
+    assert [e.estimator for e in report.estimators] == ["gnss-only", "last-fix"]
+    assert type(report.recording.seed) is int
 
 
 def test_every_public_name_is_there() -> None:
@@ -268,6 +321,40 @@ class Unfinished(Estimator):
         (lambda: simnav.run("pond.toml", int), "int is no estimator"),
         (lambda: simnav.run("pond.toml", Unfinished), "lacks update"),
         (lambda: simnav.run("pond.toml", [3]), "3 is no estimator"),
+        (lambda: simnav.run("pond.toml", 3), "3 is no estimator"),
+        (lambda: simnav.run("pond.toml", LastFix()), "an object of LastFix was given; its class is wanted"),
+        (lambda: simnav.run("pond.toml", {"gnss-only": {"acceleration": 1}}), "a list of pairs"),
+        (lambda: simnav.run("pond.toml", []), "the list of estimators is empty"),
+        (lambda: simnav.run("pond.toml", "gnss-only", parameters=[1]), "a mapping is wanted"),
+        (lambda: simnav.run("pond.toml", "gnss-only", seed=1.5), "seed = 1.5: a whole number"),
+        (lambda: simnav.run(None, "gnss-only"), "None is no scenario"),
+        (lambda: simnav.run(["pond.toml"], "gnss-only"), "is no scenario"),
+        (lambda: simnav.record("pond.toml", -1), "seed = -1"),
+        (lambda: simnav.make("ekf", gait=3), "has no parameter 'gait'"),
+        (lambda: simnav.make(("ekf", 3)), "it is a pair"),
+        (lambda: simnav.make(("ekf", {}, 3)), "it is a pair"),
+        (lambda: simnav.check("efk"), "did you mean 'ekf'"),
+        (lambda: simnav.evaluate("gnss-only", "pond.toml", runs=0, against="ship-ekf"), "runs = 0"),
+        (lambda: simnav.evaluate("gnss-only", [], against="ship-ekf"), "the list of scenarios is empty"),
+        (lambda: simnav.evaluate("gnss-only", " ", against="ship-ekf"), "' ' names no scenario"),
+        (lambda: simnav.evaluate("gnss-only", "pond.toml", workers=1.5), "workers = 1.5"),
+        (lambda: simnav.evaluate("gnss-only", "pond.toml", time_limit="3"), "time_limit = '3'"),
+        (lambda: simnav.evaluate("gnss-only", "pond.toml", memory_limit=None), "memory_limit = None"),
+        (lambda: simnav.campaign("pond.toml", "gnss-only", runs=0), "runs = 0"),
+        (lambda: simnav.campaign("pond.toml", "gnss-only", runs=1, minutes="3"), "minutes = '3'"),
+        (lambda: simnav.campaign("pond.toml", "gnss-only", runs=1, output=""), "the path of a file or folder is empty"),
+        (lambda: simnav.campaign("pond.toml", "gnss-only", runs=1, output="o", shard=1), "should be a pair"),
+        (lambda: simnav.rank("nowhere", score="horizontal_rmze"), "did you mean 'horizontal_rmse'"),
+        (lambda: simnav.rank("nowhere", score="availability"), "not better when lower"),
+        (lambda: simnav.rank(None), "None is no path"),
+        (lambda: simnav.rank(["out"]), "a folder of results is wanted"),
+        (lambda: simnav.sweep("pond.toml", None, "gnss-only"), "dials = None"),
+        (lambda: simnav.sweep("pond.toml", {RATE: ["a", 1]}, "gnss-only"), "should be a list of numbers"),
+        (lambda: simnav.bound("open-sea", runs=1.5), "runs = 1.5"),
+        (lambda: simnav.reproduce("mao-2025", runs=-1), "runs = -1"),
+        (lambda: simnav.reproduce("mao-2025", methods="nobody"), "has no method 'nobody'"),
+        (lambda: simnav.merge([], "m"), "no folder was named"),
+        (lambda: simnav.site("nowhere"), "there are no results in"),
         (lambda: simnav.run("pond.toml", "ekf", parameters={"nothing": 1}), "no parameter 'nothing'"),
         (lambda: simnav.run("pond.toml", "ekf,ukf", parameters={"nothing": 1}), "nothing: none of the estimators"),
         (lambda: simnav.make("ekf,ukf"), "names 2 estimators"),

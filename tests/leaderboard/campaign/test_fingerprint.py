@@ -86,6 +86,62 @@ def test_a_file_and_what_it_imports_from_beside_it(folder: Path) -> None:
     ) == [True, True, False, True, False]
 
 
+def test_what_is_imported_from_a_folder_by_a_text_or_from_elsewhere(folder: Path) -> None:
+    """A folder without an __init__.py, importlib, a folder that the file adds to the path, data in a folder."""
+    imports = """
+import importlib, sys
+from pathlib import Path
+from fp_space import part
+KIND = "a"
+importlib.import_module("fp_by_text")
+importlib.import_module(f"fp_method_{KIND}")
+sys.path.insert(0, str(Path(__file__).parent.parent / "fp_lib"))
+import fp_elsewhere
+Path(__file__).with_name("fp_weights") / "net.json"
+"""
+    modules = ["mine/fp_space/part.py", "mine/fp_by_text.py", "mine/fp_method_a.py", "fp_lib/fp_elsewhere.py"]
+    for name in modules:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("A = 1\n")
+    weights = folder / "mine" / "fp_weights" / "net.json"
+    weights.parent.mkdir()
+    weights.write_text("1")
+    mine = write(folder / "mine" / "fp_many.py", imports=imports)
+    try:
+        for name in modules:
+            assert changed_by(mine, lambda name=name: (folder / name).write_text("A = 2\n")) == [True], name
+            assert changed_by(mine, lambda name=name: (folder / name).write_text("A = 2  # two\n")) == [False], name
+        assert changed_by(mine, lambda: weights.write_text("2")) == [True]
+        assert changed_by(mine, lambda: (folder / "mine" / "other.py").write_text("A = 1\n")) == [False]
+    finally:
+        sys.path[:] = [p for p in sys.path if str(folder) not in p]
+
+
+def test_what_an_instrument_of_others_imports(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The recordings of a scenario depend on it."""
+    for name in ("beacon.py", "echo.py", "excursion.py", "lagoon.toml"):
+        shutil.copy(Path(__file__).parents[2] / "simnav" / "plugins" / name, folder)
+    beacon = folder / "beacon.py"
+    beacon.write_text(beacon.read_text().replace("annotations\n", "annotations\nimport fp_of_beacon\n", 1))
+    helper = folder / "fp_of_beacon.py"
+    helper.write_text("A = 1\n")
+    code = (
+        "import sys, simnav\n"
+        "from simnav.leaderboard.campaign.fingerprint import recording_digest\n"
+        "print(recording_digest(simnav.load(sys.argv[1]), '1+0'))\n"
+    )
+
+    def found() -> str:
+        command = [sys.executable, "-c", code, str(folder / "lagoon.toml")]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    before = found()
+    helper.write_text("A = 1  # a comment\n")
+    assert found() == before
+    helper.write_text("A = 2\n")
+    assert found() != before
+
+
 def test_a_base_class_in_another_file(folder: Path) -> None:
     base = write(folder / "fp_base.py", "Base")
     mine = write(folder / "fp_derived.py", base="fp_base.Base", imports="import fp_base")

@@ -127,16 +127,43 @@ def test_a_class_is_carried_with_what_it_uses(session: Any) -> None:
         (("return FACTOR * x", "return x * FACTOR"), True),
         (("FACTOR = 2", "FACTOR = 2\nUNUSED = 5"), False),
         (("class Mine:", "\n\n\nclass Mine:"), False),
-        (("class Mine:", "class Mine:  # another text"), True),
+        (("class Mine:", "class Mine:  # a comment"), False),
+        (("class Mine:", 'class Mine:\n    """A docstring."""'), False),
+        (("class Mine:", "class Mine:\n    gain = 1"), True),
     ],
 )
 def test_the_text_holds_the_class_and_what_it_uses(session: Any, change: tuple[str, str], differs: bool) -> None:
     before, modules = source_of(session(BASE).Mine)
     assert modules == []
-    assert "class Mine" in before
-    assert "def double" in before
+    assert "name='Mine'" in before
+    assert "name='double'" in before
     after, _ = source_of(session(BASE.replace(*change)).Mine)
     assert (before != after) is differs
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "    gain = FACTOR",
+        "    gains = np.array([FACTOR])",
+        "    gains = [FACTOR]",
+        "    part = Part",
+        "    parts = (Part(),)",
+        "    def first(self, gain=FACTOR): pass",
+        "    def second(self, *, gain=FACTOR): pass",
+    ],
+)
+@pytest.mark.parametrize("with_text", [True, False])
+def test_what_a_class_computed_when_it_was_defined_counts(session: Any, line: str, with_text: bool) -> None:
+    """A constant that changes in another cell of the notebook, with the cell of the class as it was."""
+    text = "import numpy as np\nFACTOR = 2\n\nclass Part:\n    factor = FACTOR\n\nclass Mine:\n" + line + "\n"
+    found = []
+    for constant in ("FACTOR = 2", "FACTOR = 2", "FACTOR = 3"):
+        made = session(text.replace("FACTOR = 2", constant))
+        if not with_text:
+            linecache.cache.pop("<a_session>")
+        found.append(source_of(made.Mine)[0])
+    assert found[0] == found[1] != found[2]
 
 
 def test_without_a_text_the_compiled_code_stands_for_it(session: Any) -> None:
@@ -152,7 +179,7 @@ def test_without_a_text_the_compiled_code_stands_for_it(session: Any) -> None:
 
 def test_the_class_of_a_value_that_it_uses_counts(session: Any) -> None:
     gain = "class Gain:\n    def value(self):\n        return 1\n\nGAIN = Gain()\n"
-    assert "class Gain" in source_of(session(gain + BASE.replace("FACTOR *", "GAIN.value() *")).Mine)[0]
+    assert "ClassDef(name='Gain'" in source_of(session(gain + BASE.replace("FACTOR *", "GAIN.value() *")).Mine)[0]
 
 
 def test_files_beside_a_notebook_count_but_not_what_is_installed(
@@ -172,6 +199,20 @@ def test_files_beside_a_notebook_count_but_not_what_is_installed(
     helper.write_text("GAIN = 2\n")
     assert estimator_source(made.Mine) != before
     del sys.modules["beside_a_notebook"]
+
+
+def test_the_file_of_the_class_of_a_value_counts(session: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A session uses an object, and not the name of its class, which is in a file of the user's own."""
+    monkeypatch.syspath_prepend(tmp_path)
+    helper = tmp_path / "gain_of_a_notebook.py"
+    helper.write_text("class Gain:\n    value = 1\n")
+    made = session(
+        "import gain_of_a_notebook as g\nGAINS = [g.Gain()]\n" + BASE.replace("FACTOR *", "GAINS[0].value *")
+    )
+    before = estimator_source(made.Mine)
+    helper.write_text("class Gain:\n    value = 2\n")
+    assert estimator_source(made.Mine) != before
+    del sys.modules["gain_of_a_notebook"]
 
 
 def test_what_cannot_be_sent_is_told(session: Any) -> None:

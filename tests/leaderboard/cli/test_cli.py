@@ -420,3 +420,5 @@ def test_the_parser_too_answers_with_one_sentence(tmp_path):
         assert run.stdout == ""
         assert len(run.stderr.strip().splitlines()) == 1
         assert says in run.stderr
+    run = entry("run", "open-sea", "--seed", "-1", "--json", cwd=tmp_path)
+    assert json.loads(run.stdout)["code"] == run.returncode == 2

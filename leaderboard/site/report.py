@@ -1,0 +1,61 @@
+"""A site that was written, with the ranking that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.ranking.confinement import confined
+from simnav.leaderboard.ranking.failures import failures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from simnav.leaderboard.ranking.agreement import RankCorrelation
+    from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["SiteReport"]
+
+
+@dataclass(frozen=True, eq=False)
+class SiteReport:
+    """A site and what it was made of.
+
+    Attributes
+    ----------
+    index : Path
+        Its ``index.html``.
+    results : sequence of Result
+        All results.
+    ranking : Ranking
+        Of these.
+    correlations : tuple of RankCorrelation
+        How well the order agrees with that of other results, where there are any.
+    """
+
+    index: Path
+    results: Sequence[Result]
+    ranking: Ranking
+    correlations: tuple[RankCorrelation, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain: what the command prints with ``--json``."""
+        return {
+            "site": str(self.index),
+            "runs": len(self.results),
+            "failed": failures(self.results),
+            "ranking": self.ranking.to_dict(),
+            "confinement": confined(self.results),
+            "correlations": [c.to_dict() for c in self.correlations],
+        }
+
+    def to_frame(self) -> Any:
+        """The ranking, a row an estimator and track."""
+        return self.ranking.to_frame()
+
+    def plot(self) -> Figure:
+        """The ranking, drawn."""
+        return self.ranking.plot()
