@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterable
@@ -14,7 +15,16 @@ from simnav.scenario import Scenario
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["ScenarioLike", "Scenarios", "absolute", "results_of", "scenario_of", "scenarios_of"]
+__all__ = [
+    "ScenarioLike",
+    "Scenarios",
+    "absolute",
+    "require_lower",
+    "require_score",
+    "results_of",
+    "scenario_of",
+    "scenarios_of",
+]
 
 ScenarioLike: TypeAlias = "str | Path | Scenario"
 Scenarios: TypeAlias = "ScenarioLike | Iterable[ScenarioLike] | None"
@@ -101,6 +111,23 @@ def results_of(
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
     benchmark_of(r.provenance for r in results)
     return results
+
+
+def require_lower(score: str, why: str) -> None:
+    """Refuse a score that is unknown or not better when lower, with the reason why it has to be: RequestError."""
+    from simnav.scoring import SCORES
+    from simnav.spec import closest
+
+    if score not in SCORES:
+        raise RequestError(f"score = {score!r} is unknown{closest(score, list(SCORES))}")
+    if SCORES[score].better != "lower":
+        raise RequestError(f"score = {score!r} is not better when lower; {why}")
+
+
+def require_score(score: str | None, results: Iterable[Result]) -> None:
+    """Refuse a score, if one was asked for, that no result has: RequestError."""
+    if score is not None and not any(math.isfinite(r.scores.get(score, math.nan)) for r in results):
+        raise RequestError(f"no result has the score {score!r}; 'simnav rescore' computes it from kept trials")
 
 
 def _note(note: Callable[[str], None] | None, text: str) -> None:

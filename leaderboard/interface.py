@@ -25,6 +25,8 @@ from simnav.leaderboard.given import (
     ScenarioLike,
     Scenarios,
     absolute,
+    require_lower,
+    require_score,
     results_of,
     scenario_of,
     scenarios_of,
@@ -485,11 +487,19 @@ def rank(
     Returns
     -------
     simnav.leaderboard.ranking.board.Ranking
+
+    Raises
+    ------
+    RequestError
+        If the score is unknown or not better when lower, or no result has it.
     """
     from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
 
+    if score is not None:
+        require_lower(score, "a ranking is by errors")
     wanted = RANKED_SCORES | ({score} if score else set())
-    given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else results
+    given = results_of(results, scores=wanted) if isinstance(results, (str, os.PathLike)) else list(results)
+    require_score(score, given)
     return rank(given, score=score, tracks=tracks)
 
 
