@@ -51,19 +51,23 @@ def rank(
     Returns
     -------
     simnav.leaderboard.ranking.board.Ranking
+
+    Raises
+    ------
+    RequestError
+        If the score is unknown or not better when lower, or no result has it.
     """
-    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank
+    from simnav.leaderboard.ranking.ranking import RANKED_SCORES, rank, require_lower, require_score
     from simnav.leaderboard.results.result import Result
-    from simnav.leaderboard.sweep.settings import checked_score
 
     if score is not None:
-        checked_score(score)
+        require_lower(score, "a ranking is by errors")
     wanted = RANKED_SCORES | ({score} if score else set())
-    if results is None or isinstance(results, (str, os.PathLike)):
-        return rank(results_of(results, scores=wanted), score=score, tracks=tracks)
-    given = list(results)
+    folder = results is None or isinstance(results, (str, os.PathLike))
+    given = results_of(results, scores=wanted) if folder else list(results)
     if not all(isinstance(r, Result) for r in given):
         raise RequestError("a folder of results is wanted, or results; 'simnav.merge' puts several folders together")
+    require_score(score, given)
     return rank(given, score=score, tracks=tracks)
 
 

@@ -197,7 +197,7 @@ def compared(stored: Result, again: Result, close: float = CLOSE) -> Comparison:
     return found
 
 
-def listed(scores: Sequence[str], most: int = 3) -> str:
-    """The first few of them, and how many more there are."""
-    more = f"; and {len(scores) - most} more" if len(scores) > most else ""
-    return "; ".join(scores[:most]) + more
+def listed(scores: Sequence[str]) -> str:
+    """The first three of them, and how many more there are."""
+    more = f"; and {len(scores) - 3} more" if len(scores) > 3 else ""
+    return "; ".join(scores[:3]) + more

@@ -260,7 +260,7 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
     return fig
 
 
-def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log: bool = True) -> Figure:
+def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "") -> Figure:
     """One line for each estimator: the runs as faint points, and the figure with its interval.
 
     What is more than `FAR_OFF` times the median estimator stands at the edge, as a number.
@@ -289,7 +289,7 @@ def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "", log:
                 ax.plot([row.low, row.high], [y, y], color=colour, lw=1.6, marker="|", ms=6.0, zorder=3)
             ax.plot(row.value, y, style.marker(row.label), ms=4.5, mew=1.0, mec=colour,
                     mfc=PAPER if row.hollow else colour, zorder=4)  # fmt: skip
-        if log and any(math.isfinite(r.value) and r.value > 0 for r in rows):
+        if any(math.isfinite(r.value) and r.value > 0 for r in rows):
             ax.set_xscale("log")
             plain_log_ticks(ax.xaxis)
         ax.set_xlim(right=min(ax.get_xlim()[1], limit))

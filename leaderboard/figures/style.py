@@ -108,11 +108,11 @@ class Style:
     def _of(self, label: str) -> int:
         return self._index.setdefault(label, len(self._index))
 
-    def colour(self, label: str, dark: bool = False) -> str:
-        """Hex colour on a light (or dark) ground."""
+    def colour(self, label: str) -> str:
+        """Hex colour on a light ground."""
         if label in self._references:
-            return _DARK[GREY] if dark else GREY
-        return PALETTE[self._of(label) % len(PALETTE)][dark]
+            return GREY
+        return PALETTE[self._of(label) % len(PALETTE)][0]
 
     def line(self, label: str) -> Any:
         """Matplotlib line style: changes once the colours are used up."""

@@ -57,12 +57,14 @@ from simnav.leaderboard.ranking.statistics import (
     weighted_quantile,
 )
 from simnav.leaderboard.ranking.tracks import RECORDED, Track, catalogued_tracks, tracks_of
-from simnav.scoring import badge
+from simnav.leaderboard.results.errors import RequestError
+from simnav.scoring import SCORES, badge
+from simnav.spec import closest
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["PROVISIONAL", "RANKED_SCORES", "rank"]
+__all__ = ["PROVISIONAL", "RANKED_SCORES", "rank", "require_lower", "require_score"]
 
 Array = NDArray[np.float64]
 Unit = tuple[str, Any]  # scenario, and seed or recording
@@ -78,6 +80,20 @@ RANKED_SCORES = frozenset({"horizontal_rmse", "smoothed_horizontal_rmse", "updat
 _CAP = math.log(FAILURE)
 _LEAST = math.log(1e-9)  # of an error of zero
 _RECORDING = re.compile(r"recording '([^']*)'")
+
+
+def require_lower(score: str, why: str) -> None:
+    """Refuse a score that is unknown or not better when lower, with the reason why it has to be: RequestError."""
+    if score not in SCORES:
+        raise RequestError(f"score = {score!r} is unknown{closest(score, list(SCORES))}")
+    if SCORES[score].better != "lower":
+        raise RequestError(f"score = {score!r} is not better when lower; {why}")
+
+
+def require_score(score: str | None, results: Iterable[Result]) -> None:
+    """Refuse a score, if one was asked for, that no result has: RequestError."""
+    if score is not None and not any(math.isfinite(r.scores.get(score, math.nan)) for r in results):
+        raise RequestError(f"no result has the score {score!r}; 'simnav rescore' computes it from kept trials")
 
 
 def rank(results: Iterable[Result], *, score: str | None = None, tracks: Mapping[str, str] | None = None) -> Ranking:

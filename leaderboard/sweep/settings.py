@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simnav.leaderboard.ranking.ranking import require_lower
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.scenario import Dial, Scenario
-from simnav.scoring import SCORES
-from simnav.spec import closest
 
 __all__ = ["DEFAULT_VALUES", "Setting", "checked_score", "chosen_dials", "parse_dial", "parse_dials", "settings"]
 
@@ -72,10 +71,7 @@ def checked_score(score: str, limit: float | None = None) -> None:
     ------
     RequestError
     """
-    if score not in SCORES:
-        raise RequestError(f"score = {score!r} is unknown{closest(score, list(SCORES))}")
-    if SCORES[score].better != "lower":
-        raise RequestError(f"score = {score!r} is not better when lower; an error is wanted, like horizontal_rmse")
+    require_lower(score, "an error is wanted, like horizontal_rmse")
     if limit is not None and not limit > 0.0:
         raise RequestError(f"limit = {limit:g} should be greater than 0")
 

@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from simnav.recording import Recording
 from simnav.scoring.registry import SCORES, Score, ScoringInput
 from simnav.trial import Trial
+from simnav.types import Array
 
 __all__ = ["ScoreWarning", "score"]
 
@@ -46,9 +52,38 @@ def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None
     ScoreWarning
         Of a score that raises or is infinite: it is NaN, and the others stand.
     """
-    given = ScoringInput(trial, recording)
+    given = _SharedInput(trial, recording)
     chosen = dict(SCORES) if names is None else {name: SCORES[name] for name in names}
     return {name: _value(one, given) for name, one in chosen.items()}
+
+
+class _SharedInput(ScoringInput):
+    """The input that all scores of a trial share: none of them can write into its arrays, or into the trial's."""
+
+    def __init__(self, trial: Trial, recording: Recording):
+        arrays: dict[str, Any] = {n: _read_only(v) for n, v in vars(trial).items() if isinstance(v, np.ndarray)}
+        super().__init__(replace(trial, **arrays), recording)
+        self.error = _read_only(self.error)
+
+    @cached_property
+    def held_error(self) -> Array:
+        return _read_only(super().held_error)
+
+    @cached_property
+    def horizontal(self) -> Array:
+        return _read_only(super().horizontal)
+
+    @cached_property
+    def smoothed_error(self) -> Array | None:
+        found = super().smoothed_error
+        return None if found is None else _read_only(found)
+
+
+def _read_only(array: Array) -> Array:
+    """A view that nobody can write into."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def _value(one: Score, given: ScoringInput) -> float:
@@ -57,7 +92,7 @@ def _value(one: Score, given: ScoringInput) -> float:
         if not math.isinf(value):
             return value
         problem = "it is infinite"
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         problem = f"{type(error).__name__}: {error}"
     estimator, scenario = given.trial.estimator, given.recording.scenario
     warnings.warn(f"score {one.name!r} of {estimator} on {scenario} is left out: {problem}", ScoreWarning, stacklevel=3)

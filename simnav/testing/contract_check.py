@@ -7,8 +7,10 @@ order of the report. The checks say nothing of accuracy.
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import hashlib
+import operator
 import pickle
 import tomllib
 import warnings
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 from simnav.estimator import Estimator, make
 from simnav.recording import AidStream, Block, Recording
 from simnav.trial import Trial, run_trial
-from simnav.types import KINDS, Estimate, ImuSamples, Instruments
+from simnav.types import KINDS, Estimate, ImuSamples, Instruments, NavigationStates
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
@@ -149,6 +151,11 @@ class Candidate:
         """The first run over the recording."""
         return run_trial(self._first, self.recording)
 
+    @cached_property
+    def unsteady(self) -> str | None:
+        """Where two instances differ on the same recording, or None."""
+        return _difference(_run(self.factory(), self.recording), _run(self.factory(), self.recording))
+
 
 @dataclass(frozen=True)
 class Check:
@@ -185,13 +192,20 @@ class Check:
         """Why the check would say nothing new about an estimator; empty if it would.
 
         Where the output is not valid, the other checks would only repeat this. The exception is ``units`` of an
-        estimator that diverges, because wrong units may be the reason.
+        estimator that diverges, because wrong units may be the reason. Where two instances differ, it says nothing
+        that a run after a reset, or with other data later on, differs, too.
         """
-        if self.name == "output" or _output(candidate, candidate.recording)[0]:
+        if self.name == "output":
             return ""
-        if self.name == "units" and candidate.trial.status == "diverged":
-            return ""
-        return "the check 'output' fails, and this check would only repeat it"
+        if not _output(candidate, candidate.recording)[0]:
+            if self.name == "units" and candidate.trial.status == "diverged":
+                return ""
+            return "the check 'output' fails, and this check would only repeat it"
+        if self.name in ("reset", "causality"):
+            with contextlib.suppress(Exception):  # the check itself says what was raised
+                if candidate.unsteady is not None:
+                    return "the check 'determinism' fails, and this check would only repeat it"
+        return ""
 
 
 def _demand(name: str) -> Callable[[_Function], _Function]:
@@ -300,7 +314,7 @@ def _units(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
     Wrong units are off by a factor of 57 or more, or by a whole Earth, so that coarse limits are enough.
     """
-    first = _run(candidate.factory(), recording)[0]
+    first = next(iter(_steps(candidate.factory(), recording)))
     start = recording.start
     wrong: list[str] = []
     mask = first.mask()
@@ -323,8 +337,8 @@ def _units(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
 @_demand("determinism")
 def _determinism(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """Two instances give the same estimates on the same recording, bit for bit."""
-    where = _difference(_run(candidate.factory(), recording), _run(candidate.factory(), recording))
+    """Two instances give the same estimates, diagnostics, flags and smoothed trajectory, bit for bit."""
+    where = candidate.unsteady
     return where is None, where or "two instances agree bit for bit on the same recording"
 
 
@@ -349,7 +363,8 @@ def _causality(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """
     changed = _altered(recording, _HALF)
     n = int(np.searchsorted(recording.data.truth.time, _HALF + 1e-6))
-    where = _difference(_run(candidate.factory(), recording)[:n], _run(candidate.factory(), changed)[:n])
+    runs = (_run(candidate.factory(), each).estimates[:n] for each in (recording, changed))
+    where = _parting(*runs)
     ok = where is None
     return ok, "estimates do not know later data" if ok else f"later data change it: {where}"
 
@@ -357,10 +372,19 @@ def _causality(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 @_demand("input")
 def _input(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """The estimator does not write into its input."""
-    before = _digests(recording)
-    _run(candidate.factory(), recording)
+    before, lists = _digests(recording), []
+    estimator = candidate.factory()
+    if estimator.reference:
+        estimator.reveal(recording)
+    estimator.reset(recording.start, recording.instruments)
+    for packet in recording.steps():
+        given = list(packet.aids)
+        estimator.update(packet)
+        lists.append(len(given) == len(packet.aids) and all(map(operator.is_, given, packet.aids)))
+    estimator.smooth()
     after = _digests(recording)
     spoilt = [name for name in before if before[name] != after[name]]
+    spoilt += [] if all(lists) else ["the list of measurements"]
     ok = not spoilt
     return ok, "it leaves its input alone" if ok else f"it writes into: {', '.join(spoilt)}"
 
@@ -372,7 +396,8 @@ def _aliasing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     kept: list[tuple[Estimate, Estimate]] = []
     for estimate in _steps(estimator, recording):
         kept.append((estimate, copy.deepcopy(estimate)))
-    where = _difference([a for a, _ in kept], [b for _, b in kept])
+    estimator.smooth()
+    where = _parting([a for a, _ in kept], [b for _, b in kept])
     ok = where is None
     return ok, "later steps leave them alone" if ok else f"a later step writes into one (copy it): {where}"
 
@@ -418,17 +443,49 @@ def _steps(estimator: Estimator, recording: Recording) -> Iterable[Estimate]:
         yield estimator.update(packet)
 
 
-def _run(estimator: Estimator, recording: Recording) -> list[Estimate]:
-    return [copy.deepcopy(e) for e in _steps(estimator, recording)]
+@dataclass(frozen=True)
+class _Output:
+    """All that an estimator gave in a run."""
+
+    estimates: list[Estimate]
+    smoothed: NavigationStates | None
 
 
-def _difference(first: Sequence[Estimate], second: Sequence[Estimate]) -> str | None:
+def _run(estimator: Estimator, recording: Recording) -> _Output:
+    """A run over a copy of a recording: what is written into it does not reach the next run."""
+    estimates = [copy.deepcopy(e) for e in _steps(estimator, copy.deepcopy(recording))]
+    return _Output(estimates, copy.deepcopy(estimator.smooth()))
+
+
+def _difference(first: _Output, second: _Output) -> str | None:
+    """Where two runs part, or None."""
+    where = _parting(first.estimates, second.estimates)
+    if where is not None:
+        return where
+    a, b = first.smoothed, second.smoothed
+    if (a is None) != (b is None):
+        return "smooth() gives a trajectory in one run only"
+    if a is not None and b is not None:
+        for name in ("time", "position", "velocity", "attitude"):
+            if not np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True):
+                return f"{name} of the smoothed trajectory differs"
+    return None
+
+
+def _parting(first: Sequence[Estimate], second: Sequence[Estimate]) -> str | None:
     """Where two series of estimates part, or None."""
     for a, b in zip(first, second, strict=True):
+        when = f"differs at {float(b.time):g} s"
         for name in ("time", "position", "velocity", "attitude", "covariance", "estimated"):
             x, y = getattr(a, name), getattr(b, name)
             if (x is None) != (y is None) or (x is not None and not np.array_equal(x, y, equal_nan=True)):
-                return f"{name} differs at {float(b.time):g} s"
+                return f"{name} {when}"
+        if list(a.flagged) != list(b.flagged):
+            return f"flagged {when}"
+        for name in {**a.diagnostics, **b.diagnostics}:
+            x, y = a.diagnostics.get(name), b.diagnostics.get(name)
+            if x is None or y is None or not np.array_equal(x, y, equal_nan=True):
+                return f"the diagnostic {name!r} {when}"
     return None
 
 

@@ -85,7 +85,8 @@ def parametrize_with_checks(
     """Make one test of each check of the contract and each estimator.
 
     The id of a test is the label of the estimator and the name of the check: ``MyFilter-causality``. The checks are
-    those of ``simnav check``. Where the check ``output`` fails, those that would only repeat it are skipped.
+    those of ``simnav check``. Where the check ``output`` fails, those that would only repeat it are skipped;
+    where ``determinism`` fails, ``reset`` and ``causality`` are.
 
     Parameters
     ----------

@@ -25,6 +25,7 @@ __all__ = [
 _LINUX = sys.platform == "linux"
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_PATIENCE = 5.0  # s, for which descendants are killed at most
 _MADV_COLLAPSE, _HUGE = 25, 2 << 20  # of madvise(2); bytes of a huge page where a page has 4 KiB
 
 
@@ -101,9 +102,9 @@ def become_reaper() -> None:
             ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
-def kill_descendants(patience: float = 5.0) -> None:
+def kill_descendants() -> None:
     """Kill all children of this process, and theirs once they have become its own."""
-    deadline = time.monotonic() + patience
+    deadline = time.monotonic() + _PATIENCE
     while time.monotonic() < deadline:
         for child in _children():
             with contextlib.suppress(OSError):

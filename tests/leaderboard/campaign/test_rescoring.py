@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -68,6 +69,16 @@ def test_a_new_score_after_a_campaign(here: Path, monkeypatch: pytest.MonkeyPatc
         kept = {name: repr(value) for name, value in new.scores.items() if name != "north_spread"}
         assert kept == {name: repr(value) for name, value in old.scores.items()}
         assert new.scores["north_spread"] > 0.0
+    for name, says in (
+        ("north_spred", "score = 'north_spred' is unknown; did you mean 'north_spread'"),
+        ("coverage_95", "score = 'coverage_95' is not better when lower; a ranking is by errors"),
+        (
+            "smoothed_horizontal_rmse",
+            "no result has the score 'smoothed_horizontal_rmse'; 'simnav rescore'",
+        ),
+    ):
+        with pytest.raises(RequestError, match=re.escape(says)):
+            simnav.rank("out", score=name)
     ranking = simnav.rank("out", score="north_spread")
     assert ranking.tracks[0].score == "north_spread"
     medians = {row.estimator: row.median for row in ranking.scenarios[0].rows}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import re
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,32 @@ def test_a_score_that_fails_harms_no_other(recording: Recording, make_trial: Any
         found = score(trial, recording)
     assert np.isnan(found["broken"])
     assert found["horizontal_rmse"] == pytest.approx(np.sqrt(2.0), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("harm", "says"),
+    [
+        (lambda given: given.error.fill(0.0), "read-only"),
+        (lambda given: given.horizontal.fill(0.0), "read-only"),
+        (lambda given: given.trial.position.fill(0.0), "read-only"),
+        (lambda given: sys.exit("I give up"), "SystemExit: I give up"),
+        (lambda given: "12 metres", "could not convert string to float"),
+        (lambda given: given.horizontal, "TypeError"),
+        (lambda given: None, "TypeError"),
+    ],
+)
+def test_a_score_can_neither_change_what_others_are_given_nor_end_the_run(
+    recording: Recording, make_trial: Any, harm: Any, says: str
+) -> None:
+    trial = make_trial(recording, np.ones(9))
+    position, before = trial.position.copy(), score(trial, recording)
+    register_score("harmful", title="Harmful", unit="m")(harm)
+    with pytest.warns(ScoreWarning, match=f"score 'harmful' of given on tiny-v1 is left out: .*{says}"):
+        found = score(trial, recording)
+    assert np.isnan(found.pop("harmful"))
+    np.testing.assert_array_equal(list(found.values()), list(before.values()))
+    np.testing.assert_array_equal(trial.position, position)
+    assert trial.position.flags.writeable
 
 
 def test_what_several_scores_need_is_computed_once(recording: Recording, make_trial: Any) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.testing.contract_check import CHECKS, Candidate, check, contract_recording
-from simnav.types import KINDS, Estimate
+from simnav.types import KINDS, Estimate, NavigationStates
 
 
 class Good(Estimator):
@@ -72,6 +72,35 @@ class Random(Good):
         return Estimate(measurements.time, self.position + np.array([0.0, 0.0, np.random.default_rng().normal()]))
 
 
+class RandomFlags(Good):
+    def update(self, measurements):
+        estimate = super().update(measurements)
+        estimate.flagged = [("gnss_position", measurements.time)] * int(np.random.default_rng().integers(0, 9))
+        return estimate
+
+
+class RandomDiagnostic(Good):
+    def update(self, measurements):
+        estimate = super().update(measurements)
+        estimate.diagnostics = {"drawn": np.random.default_rng().normal()}
+        return estimate
+
+
+class RandomSmoother(Good):
+    def reset(self, start, instruments):
+        super().reset(start, instruments)
+        self.times = []
+
+    def update(self, measurements):
+        self.times.append(measurements.time)
+        return super().update(measurements)
+
+    def smooth(self):
+        n = len(self.times)
+        position = np.tile(self.start.position, (n, 1)) + np.random.default_rng().normal(0.0, 1e-9, (n, 3))
+        return NavigationStates(np.array(self.times), position, np.full((n, 3), np.nan), np.full((n, 3), np.nan))
+
+
 class Forgetful(Good):
     total = 0.0
 
@@ -95,6 +124,25 @@ class Vandal(Good):
             if m.kind == "depth":
                 m.value[...] += 1.0
         return super().update(measurements)
+
+
+class Emptying(Good):
+    def update(self, measurements):
+        estimate = super().update(measurements)
+        measurements.aids.clear()
+        return estimate
+
+
+class AliasingDiagnostic(Good):
+    def reset(self, start, instruments):
+        super().reset(start, instruments)
+        self.count = np.zeros(2)
+
+    def update(self, measurements):
+        self.count += 1.0
+        estimate = super().update(measurements)
+        estimate.diagnostics = {"count": self.count}
+        return estimate
 
 
 class Aliasing(Good):
@@ -144,9 +192,14 @@ def test_a_good_one_passes():
         (YawInDegrees, "units", "yaw 40"),
         (Knots, "units", "velocity"),
         (Random, "determinism", "position differs at 1 s"),
+        (RandomFlags, "determinism", "flagged differs at"),
+        (RandomDiagnostic, "determinism", "the diagnostic 'drawn' differs at 1 s"),
+        (RandomSmoother, "determinism", "position of the smoothed trajectory differs"),
         (Forgetful, "reset", "position differs at 1 s"),
         (Prophet, "causality", "position differs at 1 s"),
         (Vandal, "input", "the measurements of depth"),
+        (Emptying, "input", "the list of measurements"),
+        (AliasingDiagnostic, "estimates", "the diagnostic 'count' differs at 1 s"),
         (Aliasing, "estimates", "copy it"),
         (NeedsData, "silence", "every aiding instrument falls silent: error"),
         (NeedsDvl, "missing instruments", "without dvl: error"),
@@ -190,6 +243,14 @@ def test_checks_that_would_repeat_a_bad_output_are_left_out():
     short = Candidate(WrongShape)
     assert [c.name for c in CHECKS if not c.left_out(short)] == ["output"]
     assert [c.name for c in CHECKS if not c.left_out(Candidate(Degrees))] == ["output", "units"]
+
+
+@pytest.mark.parametrize(
+    ("cls", "breach"),
+    [(Random, "determinism"), (RandomSmoother, "determinism"), (Vandal, "input"), (Forgetful, "reset")],
+)  # fmt: skip
+def test_one_breach_is_one_finding(cls: type[Estimator], breach: str):
+    assert [f.name for f in check(cls).findings if not f.ok] == [breach]
 
 
 def test_a_name_with_parameters():
