@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.given import absolute
 from simnav.leaderboard.interface import CampaignProgress, campaign
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.standard.carrying import Carried
     from simnav.leaderboard.standard.currency import Outdated
     from simnav.leaderboard.standard.publication import Published
+    from simnav.leaderboard.submission.bundle import Row
     from simnav.leaderboard.submission.verifying import SubmissionReport
 
 __all__ = [
@@ -116,7 +118,7 @@ def submit(
     from simnav.leaderboard.results.packing import pack
     from simnav.leaderboard.results.provenance import BENCHMARK
     from simnav.leaderboard.results.store import StoreError
-    from simnav.leaderboard.submission.bundle import SUFFIX, Row, write_bundle
+    from simnav.leaderboard.submission.bundle import SUFFIX, write_bundle
     from simnav.leaderboard.submission.source import source_of
     from simnav.leaderboard.submission.verifying import runs_of
 
@@ -142,11 +144,7 @@ def submit(
             found = pack(folder, Path(scratch) / "results", [r.label for r in source.requests])
         ran = {r.scenario for r in found}
         runs = {s: n for s, n in runs_of(str(profile)).items() if s in ran}
-        points = {r.label: _point(r.name) for r in source.requests}
-        rows = [
-            Row(label=r.label, name=_within(r.name), point=points[r.label], parameters=dict(r.parameters))
-            for r in source.requests
-        ]
+        rows = [_row(r) for r in source.requests]
         digest = write_bundle(
             target, title=source.title, benchmark=BENCHMARK, profile=name, runs=runs, main=source.main, estimators=rows,
             requires=source.requires, source=source.files, results=Path(scratch) / "results",
@@ -161,15 +159,18 @@ def submit(
     return Submission(target, digest, tuple(r.label for r in rows), name, len(found), failed, tuple(remarks))
 
 
-def _point(name: str) -> str:
+def _row(request: EstimatorRequest) -> Row:
+    """What a bundle says of an estimator: the file without its folder, or the entry point of its package."""
     from simnav.estimator.registry import point_of
+    from simnav.leaderboard.submission.bundle import Row
 
-    return "" if ".py" in name else point_of(name)
-
-
-def _within(name: str) -> str:
-    """The name of an estimator without the folder of its file."""
-    return os.path.basename(name) if ".py" in name else name
+    packaged = not file_of(request.name)
+    return Row(
+        label=request.label,
+        name=request.name if packaged else os.path.basename(request.name),
+        point=point_of(request.name) if packaged else "",
+        parameters=dict(request.parameters),
+    )
 
 
 def verify_bundle(

@@ -22,6 +22,7 @@ __all__ = [
     "EstimatorRequest",
     "comes_with_simnav",
     "enlist",
+    "file_of",
     "kebab",
     "request",
     "requests",
@@ -151,7 +152,7 @@ def requests(
             mine = common if len(items) == 1 or not common else _known(item, common)
             unused -= set(mine)
             found = request(item, mine)
-            if ".py" not in found.name and not found.point and comes_with_simnav(found.cls or find(found.name)):
+            if not file_of(found.name) and not found.point and comes_with_simnav(found.cls or find(found.name)):
                 found.make()  # so that a mistake shows now; the code of others runs in a process of its own
             _has_a_name_of_its_own(found)
         made.append(found)
@@ -181,7 +182,7 @@ def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
 
 def _source(found: EstimatorRequest) -> str:
     """The name, or the file with its whole path."""
-    return os.path.realpath(found.name) if ".py" in found.name else found.name
+    return os.path.realpath(found.name) if file_of(found.name) else found.name
 
 
 def _has_a_name_of_its_own(found: EstimatorRequest) -> None:
@@ -221,6 +222,16 @@ def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]
 
     known = {p.name for p in describe(request(item).name).parameters}
     return {k: v for k, v in parameters.items() if k in known}
+
+
+def file_of(name: str) -> str:
+    """The file in which an estimator of this name is; empty for a registered name.
+
+    >>> file_of("filters/my.py:MyFilter"), file_of("ekf")
+    ('filters/my.py', '')
+    """
+    found = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
+    return found[1] if found else ""
 
 
 def comes_with_simnav(cls: type) -> bool:

@@ -19,7 +19,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.submission.archive import digest_of, opened, unpack, write_archive
 
@@ -273,7 +273,7 @@ def _check_rows(contents: Contents, what: str, files: Mapping[str, Path]) -> Non
     for row in contents.estimators:
         if is_own(row.label) or (row.point and is_own(row.name)):
             raise RequestError(f"{what}: {row.label} is a name of one of simnav's own estimators; choose another one")
-        file = row.name.partition(".py")[0] + ".py"
+        file = file_of(row.name)
         if contents.main.endswith(".whl"):
             if not row.point:
                 raise RequestError(f"{what}: {row.label}: the entry point of the package is missing")
