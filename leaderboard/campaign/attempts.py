@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.confinement.attempt import Attempt, attempt, close_server, prepare, seed_words
+from simnav.leaderboard.campaign.confinement.estimator_process import seed_generators
 from simnav.leaderboard.campaign.confinement.session import NoAnswerError
 from simnav.leaderboard.campaign.isolation import isolate
 
@@ -66,11 +66,7 @@ def try_estimator(
 
 def _in_a_fork(entrant: Entrant, recording: Recording) -> Trial:
     """In the isolated process: make the estimator and run it."""
-    import numpy as np
-
     from simnav.trial import run_trial
 
-    words = seed_words(recording, entrant)
-    random.seed(sum(word << 32 * k for k, word in enumerate(words)))
-    np.random.seed(words)  # noqa: NPY002
+    seed_generators(seed_words(recording, entrant))
     return run_trial(entrant.make(), recording)

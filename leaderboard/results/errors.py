@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-__all__ = ["RequestError", "mistakes", "printable", "sentence", "shortened"]
+__all__ = ["RequestError", "mistakes", "named", "printable", "sentence", "shortened"]
 
 _MOST = 1000  # characters of a message
 
@@ -37,6 +37,15 @@ def sentence(error: BaseException) -> str:
     else:
         text = str(error)
     return shortened(printable(" ".join(text.split()))) or type(error).__name__
+
+
+def named(error: BaseException) -> str:
+    """The class of an exception, and its message where it has one that can be had."""
+    try:
+        text = str(error)
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def printable(text: str) -> str:

@@ -87,11 +87,14 @@ def chosen_confinement(asked: str = "auto") -> str:
         if asked in ("bubblewrap", "process"):
             raise ValueError(f"confinement = {asked!r} needs a POSIX system")
         return "none"
-    why_not = bubblewrap.available() if asked in ("auto", "bubblewrap") else ""
-    if asked == "bubblewrap" and why_not:
+    if asked in ("process", "none"):
+        return asked
+    why_not = bubblewrap.available()
+    if not why_not:
+        return "bubblewrap"
+    if asked == "bubblewrap":
         raise ValueError(f"confinement = 'bubblewrap': {why_not}")
-    return "bubblewrap" if asked == "bubblewrap" or (asked == "auto" and not why_not) else (
-        "process" if asked == "auto" else asked)  # fmt: skip
+    return "process"
 
 
 def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, sealed: bool = False) -> EstimatorServer:
@@ -164,9 +167,7 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
             trial = run_session(session, recording, log)
             session.end()
         status, reason = trial.status, trial.reason
-    except StoppedError as error:
-        status, reason, trial = error.status, error.reason, None
-    except FailureError as error:  # of the constructor
+    except (StoppedError, FailureError) as error:  # of the constructor, or the process is no more there
         status, reason, trial = error.status, error.reason, None
     except InvalidOutputError as error:
         status, reason, trial = "invalid-output", str(error), None
@@ -182,8 +183,7 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     Returns
     -------
     dict
-        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty), and
-        ``learned_from`` as it was told, not checked.
+        ``reference``, ``source`` (a digest), and ``learned_from`` as it was told, not checked.
 
     Raises
     ------
@@ -198,8 +198,9 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
             session.end()
     except (StoppedError, FailureError, InvalidOutputError) as error:
         raise ValueError(str(error)) from None
-    source, failure = facts.get("source"), facts.get("failure")
-    if not isinstance(source, str) or not isinstance(failure, str) or len(source) > 200:
+    source = facts.get("source")
+    if not isinstance(source, str) or len(source) > 200:
         raise ValueError("it says nothing of itself that can be read")
-    known = {"reference": facts.get("reference") is True, "source": source, "failure": failure[:1000]}
-    return {**known, "learned_from": facts.get("learned_from", [])}
+    return {
+        "reference": facts.get("reference") is True, "source": source, "learned_from": facts.get("learned_from", []),
+    }  # fmt: skip
