@@ -21,7 +21,7 @@ from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.session_class import is_session, source_of
-from simnav.leaderboard.campaign.sources import digest, files_digest, followed
+from simnav.leaderboard.campaign.sources import code_digest, digest, files_digest, followed
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -47,10 +47,6 @@ _LOGS = "simnav.log"
 _ABSENT = "absent"
 
 
-def _code_digest(code: Mapping[str, str]) -> str:
-    return digest(*(part for item in code.items() for part in item))
-
-
 def _package_code(folder: Path) -> str:
     """Digest of all files of a package, but for what Python makes of them, and of what it imports of simnav."""
     found = []
@@ -59,7 +55,7 @@ def _package_code(folder: Path) -> str:
         found += [Path(place, n) for n in names if not n.startswith(".") and not n.endswith((".pyc", "~"))]
     files = files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
     code = followed(files=sorted(p for p in found if p.suffix == ".py"))
-    return digest(files, _code_digest({name: c for name, c in code.items() if _in_simnav(name)}))
+    return digest(files, code_digest({name: c for name, c in code.items() if _in_simnav(name)}))
 
 
 def _installed_code(package: str) -> str:
@@ -72,14 +68,14 @@ def _installed_code(package: str) -> str:
     if origin is None:
         return digest(package, "no file")
     path = Path(origin)
-    return _package_code(path.parent) if path.name == "__init__.py" else _code_digest(followed(files=[path]))
+    return _package_code(path.parent) if path.name == "__init__.py" else code_digest(followed(files=[path]))
 
 
 def simulator_version() -> str:
     """Version of simnav with a digest of the code that makes recordings; what reads log files is not in it."""
     from importlib.metadata import version
 
-    return f"{version('simnav')}+{_code_digest(followed(SIMULATOR, without=[_LOGS]))[:12]}"
+    return f"{version('simnav')}+{code_digest(followed(SIMULATOR, without=[_LOGS]))[:12]}"
 
 
 def recording_digest(scenario: Scenario, simulator: str) -> str:
@@ -111,7 +107,7 @@ def _log_digest(scenario: Scenario) -> str:
                 files.append((f"{recording}/{file.path}", path))
     except (ValueError, OSError):  # every run says so
         return _ABSENT
-    return digest(files_digest(files), _code_digest(followed([f"{_LOGS}.source"])))
+    return digest(files_digest(files), code_digest(followed([f"{_LOGS}.source"])))
 
 
 def has_recordings(scenario: Scenario) -> bool:
@@ -143,7 +139,7 @@ def estimator_source(cls: type[Estimator]) -> str:
         loaded = sys.modules.get(module)
         file = getattr(loaded, "__file__", None)
         if file is not None and "." not in module and not hasattr(loaded, "__path__"):
-            parts.append(_code_digest(followed(files=[Path(file).resolve()])))
+            parts.append(code_digest(followed(files=[Path(file).resolve()])))
         elif module in {base.__module__ for base in cls.__mro__}:
             parts.append(_installed_code(package))
     for base in cls.__mro__:
@@ -152,7 +148,7 @@ def estimator_source(cls: type[Estimator]) -> str:
             parts += [digest(text), *filter(None, map(_used_digest, modules))]
             ours.update(filter(_in_simnav, modules))
     parts += [content for _, content in named_files(p.default for p in parameters_of(cls))]
-    return digest(_code_digest(followed(sorted(ours))), *dict.fromkeys(parts))
+    return digest(code_digest(followed(sorted(ours))), *dict.fromkeys(parts))
 
 
 def _homes(item: Any, depth: int = 3) -> Iterator[str]:
@@ -191,7 +187,7 @@ def _used_digest(module: str) -> str:
     path, installed = Path(file).resolve(), map(Path, sysconfig.get_paths().values())
     if any(path.is_relative_to(folder.resolve()) for folder in installed):
         return ""
-    return _code_digest(followed(files=[path]))
+    return code_digest(followed(files=[path]))
 
 
 def _in_simnav(module: str) -> bool:

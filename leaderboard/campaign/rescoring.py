@@ -6,14 +6,15 @@ import os
 import time
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code, scoring_differs
+from simnav.leaderboard.campaign.single_run import record
 from simnav.leaderboard.results import store, trials
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.seal import Seal
@@ -52,14 +53,8 @@ class Rescored:
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav rescore --json`` prints."""
-        return {
-            "results": str(self.folder),
-            "scores": list(self.scores),
-            "rescored": self.rescored,
-            "complete": self.complete,
-            "without_trial": self.without_trial,
-            "seconds": self.seconds,
-        }
+        facts = asdict(self)
+        return {"results": str(facts.pop("folder")), **facts}
 
 
 def rescore_results(
@@ -70,21 +65,12 @@ def rescore_results(
     keys: Collection[str] | None = None,
     seal: Seal | None = None,
 ) -> Rescored:
-    """Compute scores of the current results of a folder, from the trials that were kept.
-
-    A trial is kept in single precision. What the campaign computed from all digits therefore stays, unless it is asked
-    for by name.
+    """Compute scores of the current results of a folder; see `simnav.leaderboard.inspection.rescore`.
 
     Parameters
     ----------
-    folder : path
-        Folder of the results.
-    names : iterable of str
-        Of scores; default: those that a result lacks, and those of simnav whose code has changed since.
-    scenarios : iterable of Scenario
-        Those that are not in the catalogue.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
+    folder, names, scenarios, progress
+        As there.
     keys : collection of str, optional
         Of the results; default: all that have a trial.
     seal : Seal, optional
@@ -104,7 +90,6 @@ def rescore_results(
         If the folder or a trial in it cannot be used.
     """
     from simnav.scoring import SCORES, score
-    from simnav.source import record
     from simnav.spec import closest
 
     started = time.monotonic()
@@ -140,8 +125,7 @@ def rescore_results(
     for done, ((scenario, seed), found) in enumerate(sorted(by_run.items(), key=lambda item: item[0])):
         if progress is not None:
             progress(done, len(by_run), note=f"{scenario}, seed {seed}")
-        with mistakes(ValueError, FileNotFoundError):
-            recording = record(known[scenario], seed if seal is None else seal.seed(scenario, seed))
+        recording = record(known[scenario], seed if seal is None else seal.seed(scenario, seed))
         for result, chosen in found:
             trial, thinned = trials.read(path, result.key, recording)
             now = [n for n in chosen if not (thinned and SCORES[n].uses_covariance and n in result.scores)]

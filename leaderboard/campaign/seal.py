@@ -14,7 +14,7 @@ from pathlib import Path
 from simnav.leaderboard.campaign.sources import digest
 from simnav.leaderboard.results.errors import RequestError
 
-__all__ = ["Seal", "read_seal"]
+__all__ = ["Seal", "read_seal", "unreadable"]
 
 _LEAST, _MOST = 16, 4096  # bytes of a key file
 
@@ -58,6 +58,11 @@ class Seal:
         """
         h = hashlib.blake2b(f"{scenario}/{number}".encode(), digest_size=8, key=self.key, person=b"simnav seed")
         return int.from_bytes(h.digest()) >> 1
+
+
+def unreadable(folder: Path, seal: Seal | None) -> tuple[Path, ...]:
+    """What estimators must not read: the folder with other results and the trials that are kept, and a secret key."""
+    return (folder,) if seal is None or seal.file is None else (folder, seal.file)
 
 
 def read_seal(path: str | os.PathLike[str]) -> Seal:

@@ -20,7 +20,7 @@ from types import MappingProxyType
 
 import simnav
 
-__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "followed"]
+__all__ = ["LIBRARY", "code_digest", "code_of", "digest", "files_digest", "followed"]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
 LIBRARY = Path(simnav.__file__).parent
@@ -238,6 +238,11 @@ def followed(
         walk.file(path, path.parent)
     walk.run()
     return dict(sorted(walk.found.items()))
+
+
+def code_digest(code: Mapping[str, str]) -> str:
+    """Digest of all that `followed` gave."""
+    return digest(*(part for item in code.items() for part in item))
 
 
 class _Walk:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
-__all__ = ["CLOSE", "Comparison", "Verification", "compared", "listed", "verify_results"]
+__all__ = ["CLOSE", "Comparison", "Verification", "compared", "listed", "request_of", "verify_results"]
 
 #: Relative difference of a score that was computed from a trial in single precision.
 CLOSE = 1e-6
@@ -85,25 +85,7 @@ def verify_results(
     estimators: Sequence[EstimatorRequest] = (),
     progress: Callable[..., None] | None = None,
 ) -> Verification:
-    """Check the seal of all results, and repeat a sample drawn at random.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the results.
-    seal : Seal, optional
-        Of the published key; none for public seeds.
-    sample : int
-        How many runs are repeated at most.
-    scenarios, estimators : sequence
-        That are not in the catalogue or not registered.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
-
-    Returns
-    -------
-    Verification
-    """
+    """Check the seal of all results, and repeat a sample of them; see `simnav.leaderboard.inspection.verify`."""
     found = store.load(folder, series=False)
     if not found:
         raise RequestError(f"there are no results in {folder}")
@@ -151,15 +133,18 @@ def _repeat(
     requests: Mapping[str, EstimatorRequest],
 ) -> Result:
     scenario = known.get(result.scenario) or load(result.scenario)
-    request = requests.get(result.estimator)
-    if request is None:
-        request = EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
+    request = requests.get(result.estimator) or request_of(result)
     run_campaign(
         [scenario], [request], [result.seed], folder, workers=1, timeout=result.time_limit or None,
-        memory=result.memory_limit or 2 << 30, seal=seal,
+        memory=result.memory_limit or MEMORY, seal=seal,
     )  # fmt: skip
     mine = (result.scenario, result.estimator, result.seed)
     return next(r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)
+
+
+def request_of(result: Result) -> EstimatorRequest:
+    """The registered estimator of a result, with its parameters and its label."""
+    return EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
 
 
 class Comparison(NamedTuple):

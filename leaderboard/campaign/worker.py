@@ -19,7 +19,7 @@ from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
-from simnav.leaderboard.campaign.seal import Seal
+from simnav.leaderboard.campaign.seal import Seal, unreadable
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
@@ -51,10 +51,8 @@ class Unit:
         As in `Result`.
     folder : Path
         Folder of the results.
-    timeout : float
-        Of an estimator [s].
-    memory : int
-        Of an estimator [bytes].
+    limits : Limits
+        Of an estimator.
     scores : OwnScores
         Scores of others that workers must be sent.
     scoring : str
@@ -75,20 +73,13 @@ class Unit:
     recording: str
     simulator: str
     folder: Path
-    timeout: float
-    memory: int
+    limits: Limits
     scores: OwnScores = field(default_factory=OwnScores)
     scoring: str = ""
     keep_trials: bool = False
     covariance_interval: float = 0.0
     confinement: str = "process"
     seal: Seal | None = None
-
-    @property
-    def hidden(self) -> tuple[Path, ...]:
-        """What estimators must not read: other results, the trials that are kept, and a secret key."""
-        key = None if self.seal is None else self.seal.file
-        return (self.folder,) if key is None else (self.folder, key)
 
     @property
     def weight(self) -> float:
@@ -109,8 +100,8 @@ class Unit:
             key=key,
             recording=self.recording,
             simnav=self.simulator,
-            time_limit=self.timeout,
-            memory_limit=self.memory,
+            time_limit=self.limits.timeout,
+            memory_limit=self.limits.memory,
             scoring="{}",  # nothing is scored yet
             scenario_digest=self.scenario.content_hash(),
             estimator_digest=entrant.source,
@@ -137,8 +128,8 @@ def _prepare_worker(unit: Unit) -> None:
     """Start the server of estimators, and load the kernels of this process once."""
     global _prepared
     first, _prepared = not _prepared, True
-    if unit.confinement != "none":
-        prepare(unit.confinement, unit.hidden)  # loads its kernels while the first recording is made
+    if unit.confinement != "none":  # it loads its kernels while the first recording is made
+        prepare(unit.confinement, unreadable(unit.folder, unit.seal))
     if first:
         _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
 
@@ -179,7 +170,7 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     recording: Recording | None = None
     try:
         seed = unit.seed if unit.seal is None else unit.seal.seed(unit.scenario.id, unit.seed)
-        recording = record_within(unit.scenario, seed, max(unit.timeout, time_limit(unit.scenario)))
+        recording = record_within(unit.scenario, seed, max(unit.limits.timeout, time_limit(unit.scenario)))
     except NoRecordingError as error:
         reason = f"no recording: {error}"
         for entrant, key in unit.entrants:
@@ -199,10 +190,8 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
 
     from simnav.scoring import score, series
 
-    limits = Limits(unit.timeout, unit.memory)
-    made = try_estimator(
-        entrant, recording, limits, unit.confinement, unit.hidden, sealed=unit.seal is not None
-    )  # fmt: skip
+    hidden, sealed = unreadable(unit.folder, unit.seal), unit.seal is not None
+    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=sealed)
     trial = made.trial
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),

@@ -23,8 +23,7 @@ from typing import Any
 
 from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
-from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.verification import compared, listed
+from simnav.leaderboard.campaign.verification import compared, listed, request_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
@@ -128,7 +127,7 @@ def carry(
     with tempfile.TemporaryDirectory(prefix="simnav-carry-") as name:
         for k, (rows, seeds) in enumerate(_campaigns(stale, runs)):
             scenarios = list({s: stale[s, label][0] for s, label in rows}.values())
-            requests = list({label: _request(of[s, label][0]) for s, label in rows}.values())
+            requests = list({label: request_of(of[s, label][0]) for s, label in rows}.values())
             place = Path(name) / str(k)
             run_campaign(scenarios, requests, seeds, place, workers=workers, progress=progress)
             again = {(r.scenario, r.estimator, r.seed): r for r in store.load(place, series=False)}
@@ -192,10 +191,6 @@ def _campaigns(stale: Mapping[_Row, tuple[Scenario, list[int]]], runs: int) -> l
         else:  # each by itself
             found += [([row], draw(seeds, min(runs, len(seeds)))) for row in rows for _, seeds in [stale[row]]]
     return found
-
-
-def _request(result: Result) -> EstimatorRequest:
-    return EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
 
 
 def _difference(stored: Result, fresh: Result) -> str:
