@@ -42,7 +42,8 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
             raise RequestError(f"estimator {request.name!r}: a package that is not trusted is not run unconfined")
         entrant = Entrant(name, parameters, request.label, False, "", point=request.point, search=request.search)
     else:
-        _import_estimators()
+        with contextlib.suppress(ImportError):  # ours, once here, so that forked processes need not do it
+            importlib.import_module("simnav.estimators")
         with mistakes(EstimatorError):
             cls = request.cls or find(name)
         entrant = Entrant(name, parameters, request.label, False, "", point=point_of(cls.name))
@@ -91,12 +92,6 @@ def _describe(entrant: Entrant) -> dict[str, Any]:
     made = entrant.make()
     cls = type(made)
     return {"reference": cls.reference, "source": estimator_source(cls), "learned_from": declared_ranges(made)}
-
-
-def _import_estimators() -> None:
-    """Our own estimators, imported once here, so that forked processes need not do it."""
-    with contextlib.suppress(ImportError):
-        importlib.import_module("simnav.estimators")
 
 
 def variant_of(entrant: Entrant, recording: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import pickle
 import random
@@ -12,18 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
-from simnav.kinds import INSTRUMENTS
+from simnav.leaderboard.campaign.confinement.kinds import load_kinds
 from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, read_message, write_all
 from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.campaign.training_runs import declared_ranges
 from simnav.leaderboard.results.errors import named
-from simnav.plugins import load_plugin
 from simnav.trial import describe_failure
 from simnav.trial.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
 from simnav.types import NavigationStates
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.confinement.kinds import Home
     from simnav.leaderboard.campaign.entrant import Entrant
 
 __all__ = ["LIBRARIES", "live", "seed_generators"]
@@ -108,7 +105,7 @@ class _Session:
             return _failure("error", named(error))
         self._decode = PacketDecoder(streams)
         try:
-            _load_kinds(homes)
+            load_kinds(homes)
             self._estimator.reset(start, instruments)
         except BaseException as error:
             return self._raised(error)
@@ -168,14 +165,3 @@ def seed_generators(words: list[int]) -> None:
     """Whoever draws from a global generator gets the same numbers in every campaign, and learns nothing from them."""
     random.seed(sum(word << 32 * k for k, word in enumerate(words)))
     np.random.seed(words)  # noqa: NPY002
-
-
-def _load_kinds(homes: list[Home]) -> None:
-    """Import what registers the kinds of the instruments: modules, files of plug-ins, classes of a session."""
-    for kind, module, file, code in homes:
-        if code:
-            INSTRUMENTS.add(kind, pickle.loads(code))
-        elif file:
-            load_plugin(file)
-        else:
-            importlib.import_module(module)
