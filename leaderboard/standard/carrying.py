@@ -11,12 +11,10 @@ that computed it. What was repeated is recorded in a CSV file, one line for each
 
 from __future__ import annotations
 
-import csv
-import io
 import random
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,7 @@ from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
 from simnav.leaderboard.campaign.verification import compared, listed, request_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
@@ -90,27 +88,7 @@ def carry(
     workers: int = 2,
     progress: Callable[[Progress], None] | None = None,
 ) -> Carried:
-    """Repeat runs of results that are out of date, and give those the keys of today whose scores are the same.
-
-    Parameters
-    ----------
-    folder : Path
-        Packed results; replaced as a whole.
-    record : Path
-        CSV file to which a line is added: date, commit, what was carried over, and how many runs were repeated.
-    runs : int
-        How many runs of each scenario and estimator are repeated, drawn at random from those that are stored; all where
-        there are fewer.
-    workers : int
-        Processes.
-    progress : callable, optional
-        As for `simnav.leaderboard.campaign.campaign.run_campaign`.
-
-    Raises
-    ------
-    RequestError
-        If ``runs`` is below 1, or the code differs from the commit that the record would name.
-    """
+    """Repeat runs of results that are out of date; see `simnav.leaderboard.publishing.carry_standard`."""
     if runs < 1:
         raise RequestError(f"runs = {runs}: at least one run of each scenario and estimator has to be repeated")
     provenance = here()
@@ -208,9 +186,6 @@ def _rekeyed(result: Result, fresh: Result) -> Result:
 
 def _add(path: Path, line: _Line) -> None:
     """Add a line to the record; it begins with the names of its columns."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    if not path.exists():
-        writer.writerow(f.name for f in fields(_Line))
-    writer.writerow(asdict(line).values())
-    write_whole(path, (path.read_text(encoding="utf-8") if path.exists() else "") + text.getvalue())
+    facts = asdict(line)
+    before = path.read_text(encoding="utf-8") if path.exists() else csv_text([facts.keys()])
+    write_whole(path, before + csv_text([facts.values()]))

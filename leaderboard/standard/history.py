@@ -7,7 +7,6 @@ quoted can be found. The column ``code`` is the version of a row: the digest of 
 from __future__ import annotations
 
 import csv
-import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -15,7 +14,7 @@ from pathlib import Path
 
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
 
@@ -127,7 +126,7 @@ def append(path: Path, ranking: Ranking, results: Sequence[Result]) -> int:
     lines = lines_of(ranking, results, last + 1)
     if _facts(lines) == _facts(line for line in before if line.edition == last):
         return last
-    write_whole(path, _text([*before, *lines]))
+    write_whole(path, csv_text([_NAMES, *map(_cells, [*before, *lines])]))
     return last + 1
 
 
@@ -148,11 +147,3 @@ def _cells(line: Line) -> list[str]:
     values = [getattr(line, name) for name in _NAMES]
     return ["" if isinstance(v, float) and math.isnan(v) else f"{v:.5g}" if isinstance(v, float) else str(v)
             for v in values]  # fmt: skip
-
-
-def _text(lines: Iterable[Line]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_NAMES)
-    writer.writerows(_cells(line) for line in lines)
-    return text.getvalue()
