@@ -9,9 +9,9 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.request import EstimatorLike, requests
+from simnav.leaderboard.campaign.request import Estimators, requests
 from simnav.leaderboard.given import ScenarioLike, Scenarios, absolute, results_of, scenario_of, scenarios_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["bound", "cite", "merge", "reproduce", "rescore", "verify"]
-
-Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
 
 
 def rescore(

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, requests, together
+from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
 from simnav.leaderboard.given import (
     ScenarioLike,
@@ -74,7 +74,6 @@ __all__ = [
     "verify",
 ]
 
-Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
 CampaignProgress: TypeAlias = "Callable[[Progress], None] | None"
 
 
@@ -352,10 +351,11 @@ def campaign(
     seed, parameters, workers, time_limit, memory_limit, progress
         As for `evaluate`.
     retry : bool
-        Run failures again that are in the folder. A run that a shorter time limit or a smaller memory limit than
-        today's ended is run again in any case.
+        Run failures again that are in the folder (errors, timeouts, out of memory, diverged, invalid output). A run
+        that could not be recorded, or that a shorter time limit or a smaller memory limit than today's ended, is run
+        again in any case.
     keep_trials : bool
-        Keep what the estimators gave, for `rescore`: about 190 bytes an epoch and run.
+        Keep the estimates, covariances, diagnostics and flags, for `rescore`: about 190 bytes an epoch and run.
     covariance_interval : float
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.

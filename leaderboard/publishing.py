@@ -189,7 +189,8 @@ def verify_bundle(
     bundle : path
         That `submit` wrote.
     key : path, optional
-        File of a secret key: the estimators also run on seeds that are derived from it.
+        File of a secret key. The estimators also run on seeds that are derived from it, which the submission cannot
+        know, and should be no worse there.
     sample : int
         Runs that are repeated at most.
     present : bool
@@ -206,7 +207,7 @@ def verify_bundle(
     Raises
     ------
     RequestError
-        If the file is no bundle, was changed, or cannot be run here.
+        If the file is no bundle, was changed, or cannot be run here, as without a new environment.
     """
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.submission.verifying import TOLERANCE
@@ -278,15 +279,22 @@ def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
     RequestError
         If there are no results.
     """
-    from simnav.leaderboard import standard
     from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.currency import outdated
 
-    folder = standard.RESULTS if results is None else absolute(results)
-    if not standard.shipped(folder):
-        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    folder = _standard_results(results)
     with mistakes(StoreError):
         return outdated(folder)
+
+
+def _standard_results(given: str | os.PathLike[str] | None) -> Path:
+    """The folder of a standard result that is there: what was given, or what comes with simnav."""
+    from simnav.leaderboard import standard
+
+    folder = standard.RESULTS if given is None else absolute(given)
+    if not standard.shipped(folder):
+        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    return folder
 
 
 def carry_standard(
@@ -302,9 +310,13 @@ def carry_standard(
     Parameters
     ----------
     runs : int
-        How many runs of each scenario and estimator that are out of date are repeated.
-    shipped, record : path, optional
-        Folder of the packed results, and file that says what was carried over; default: those that come with simnav.
+        How many runs of each scenario and estimator that are out of date are repeated, drawn at random from those that
+        are stored; all where there are fewer.
+    shipped : path, optional
+        Folder of the packed results, which is replaced as a whole; default: that which comes with simnav.
+    record : path, optional
+        CSV file to which a line is added: date, commit, what was carried over, and how many runs were repeated;
+        default: that which comes with simnav.
     workers : int
         Processes.
     progress : callable, optional
@@ -317,15 +329,13 @@ def carry_standard(
     Raises
     ------
     RequestError
-        If there are no results, or the code differs from its commit.
+        If ``runs`` is below 1, there are no results, or the code differs from its commit, which the record would name.
     """
     from simnav.leaderboard import standard
     from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.carrying import carry
 
-    folder = standard.RESULTS if shipped is None else absolute(shipped)
-    if not standard.shipped(folder):
-        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    folder = _standard_results(shipped)
     with mistakes(StoreError):
         return carry(
             folder, standard.CARRIED if record is None else absolute(record), runs=runs, workers=workers,
@@ -347,22 +357,25 @@ def publish_standard(
 ) -> Published:
     """Make what comes with simnav from the results of `run_standard`: packed results, history, README, and a site.
 
+    Results that the profile does not name, as those of submissions, are published as long as they are not out of date.
+
     Parameters
     ----------
     results : path
-        Folder of the results. If it is not there, the results that come with simnav are taken.
+        Folder of the results, which may be the one that is written. If it is not there, the results that come with
+        simnav are taken.
     profile : str or path
         That the results should hold as a whole.
     shipped, history : path, optional
         Folder of the packed results, and file of the editions; default: those that come with simnav.
     readme : path, optional
-        Whose tables are written; default: none.
+        Whose tables are written, between the marks of `simnav.leaderboard.standard.readme`; default: none.
     site : path, optional
         Folder of a site that is drawn; default: none.
     workers : int
         Processes that draw.
     preliminary : bool
-        Also if runs are missing; the tables say so, and there is no edition.
+        Also if runs are missing. The tables then say how many are there, and there is no edition.
     progress : callable, optional
         Called with how many of how many pages are done.
 

@@ -166,20 +166,12 @@ def run_campaign(
         What is run: every estimator on every scenario with every seed.
     folder : path
         Of the results; made if it is not there.
-    workers : int
-        Processes.
+    workers, retry, keep_trials, covariance_interval, confinement, minutes
+        As for `simnav.leaderboard.interface.campaign`.
     timeout : float, optional
         Wall-clock time that an estimator may take for a run [s]; default: `time_limit`.
     memory : int
         Memory that an estimator may take beyond the recording [bytes].
-    retry : bool
-        Run failures again (errors, timeouts, out of memory, diverged, invalid output). Without it, only those runs are
-        that could not be recorded, or that a shorter time limit or a smaller memory limit than today's ended.
-    keep_trials : bool
-        Keep the estimates, covariances, diagnostics and flags, so that any score can be computed later
-        (`simnav.leaderboard.campaign.rescoring`): about 190 bytes an epoch.
-    covariance_interval : float
-        Least time between two covariances that are kept [s]; 0 keeps all.
     progress : callable, optional
         Called with a `Progress` now and then.
     backend : {"loky", "dask"}
@@ -190,13 +182,8 @@ def run_campaign(
     shard : pair of int
         Which of how many parts of the runs to do, from 1. All parts together are the campaign; `simnav.merge` puts
         their folders together.
-    confinement : {"auto", "bubblewrap", "process", "none"}
-        How estimators are kept apart from the recording, see docs/explanation/security.md; ``auto`` is the strongest
-        that works.
     seal : Seal, optional
         Derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
-    minutes : float, optional
-        Time after which no further run is started. The same campaign, started again, continues.
 
     Returns
     -------

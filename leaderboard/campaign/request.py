@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "EstimatorLike",
     "EstimatorRequest",
+    "Estimators",
     "comes_with_simnav",
     "enlist",
     "file_of",
@@ -77,6 +78,8 @@ class EstimatorRequest:
 EstimatorLike: TypeAlias = (
     "str | Path | type[Estimator] | EstimatorRequest | tuple[str | Path | type[Estimator], Mapping[str, Any]]"
 )
+#: One or several; a text may name several, separated by commas.
+Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
 
 
 def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -> EstimatorRequest:
@@ -124,9 +127,7 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
     return EstimatorRequest(name, {**(parameters or {}), **own})
 
 
-def requests(
-    given: EstimatorLike | Iterable[EstimatorLike] | None, parameters: Mapping[str, Any] | None = None
-) -> list[EstimatorRequest]:
+def requests(given: Estimators, parameters: Mapping[str, Any] | None = None) -> list[EstimatorRequest]:
     """All that were asked for, each label once; all registered ones where none was.
 
     Parameters
@@ -192,7 +193,7 @@ def _has_a_name_of_its_own(found: EstimatorRequest) -> None:
         raise RequestError(f"{found.name}: {stem[1]!r} is a row that comes with simnav; give the file another name")
 
 
-def _items(given: EstimatorLike | Iterable[EstimatorLike] | None) -> list[EstimatorLike]:
+def _items(given: Estimators) -> list[EstimatorLike]:
     """One by one; what is separated by commas is taken apart."""
     if given is None:
         return []

@@ -142,28 +142,7 @@ def verify_bundle(
     tolerance: float = TOLERANCE,
     progress: Callable[..., None] | None = None,
 ) -> SubmissionReport:
-    """Check a submission, and repeat some of its runs.
-
-    Parameters
-    ----------
-    path : Path
-        The bundle.
-    seal : Seal, optional
-        A key whose seeds the submission cannot know. The estimators are run on them, and should be no worse there.
-    sample : int
-        Runs that are repeated at most.
-    present : bool
-        Repeat in the present environment. By default a new one is made.
-    tolerance : float
-        Largest relative difference of a score that counts as the same.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
-
-    Raises
-    ------
-    RequestError
-        If the file is no bundle or was changed, or if no environment can be made: one sentence.
-    """
+    """Check a submission, and repeat some of its runs; see `simnav.leaderboard.publishing.verify_bundle`."""
     report = progress or (lambda *_, **__: None)
     with mistakes(ValueError):
         confinement = chosen_confinement("auto")
