@@ -54,7 +54,7 @@ class Rescored:
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav rescore --json`` prints."""
         facts = asdict(self)
-        return {"results": str(facts.pop("folder")), **facts}
+        return {"results": str(facts.pop("folder")), **facts, "scores": list(self.scores)}
 
 
 def rescore_results(
