@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, find, make, names, register
 from simnav.leaderboard.results.errors import RequestError, mistakes
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 __all__ = [
     "EstimatorLike",
@@ -110,8 +108,7 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
     if isinstance(given, EstimatorRequest):
         if not parameters:
             return given
-        return EstimatorRequest(given.name, {**parameters, **given.parameters}, cls=given.cls, point=given.point,
-                                search=given.search)  # fmt: skip
+        return replace(given, parameters={**parameters, **given.parameters}, label="")
     if isinstance(given, type):
         with mistakes():
             name = enlist(given)
@@ -200,21 +197,14 @@ def _items(given: Estimators) -> list[EstimatorLike]:
     single = isinstance(given, (str, Path, type, EstimatorRequest)) or (
         isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], Mapping)
     )
-    items: Sequence[Any] = [given] if single else list(given)  # type: ignore[arg-type]
+    items: Iterable[Any] = [given] if single else given  # type: ignore[assignment]
     found: list[EstimatorLike] = []
-    texts: list[str] = []
-    for item in items:
-        if isinstance(item, (str, Path)):
-            texts.append(str(item))
+    for texts, group in itertools.groupby(items, lambda item: isinstance(item, (str, Path))):
+        if texts:
+            found += [EstimatorRequest(name, values) for name, values in split_estimators(map(str, group))]
         else:
-            found += _split(texts)
-            found.append(item)
-            texts = []
-    return found + _split(texts)
-
-
-def _split(texts: list[str]) -> list[EstimatorLike]:
-    return [EstimatorRequest(name, values) for name, values in split_estimators(texts)]
+            found += group
+    return found
 
 
 def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.attempts import try_estimator
-from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare
+from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare, try_estimator
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.own_scores import OwnScores

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 __all__ = [
+    "PR_SET_NO_NEW_PRIVS",
     "RSS_UNIT",
     "WATCH",
     "become_reaper",
@@ -23,6 +24,7 @@ __all__ = [
     "lift_memory_limit",
     "limit",
     "out_of_memory_kills",
+    "prctl",
     "resident",
     "use_huge_pages",
     "why_it_died",
@@ -34,6 +36,8 @@ WATCH = 0.02 if _LINUX else 0.5
 #: Of ``ru_maxrss`` [bytes].
 RSS_UNIT = 1 if sys.platform == "darwin" else 1024
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
+#: Of `prctl`: no program that is started has more rights. Without it no rights can be given up.
+PR_SET_NO_NEW_PRIVS = 38
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _MADV_COLLAPSE, _HUGE = 25, 2 << 20  # of madvise(2); bytes of a huge page where a page has 4 KiB
 
@@ -92,11 +96,17 @@ def lift_memory_limit() -> None:
 
 def _die_with_parent(parent: int) -> None:
     """A process that is killed takes this one with it (Linux; elsewhere the limit of CPU time ends it)."""
-    if _LINUX:
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+
+
+def prctl(option: int, value: int) -> bool:
+    """Set an attribute of this process, see prctl(2); whether that worked (Linux)."""
+    if _LINUX:
+        with contextlib.suppress(OSError, AttributeError):
+            return bool(ctypes.CDLL(None).prctl(option, value, 0, 0, 0) == 0)
+    return False
 
 
 def keep_freed_memory() -> None:
@@ -132,9 +142,7 @@ def use_huge_pages() -> None:
 
 def become_reaper() -> None:
     """Descendants whose parents are gone become children of this process (Linux)."""
-    if _LINUX:
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    prctl(_PR_SET_CHILD_SUBREAPER, 1)
 
 
 def kill_descendants(patience: float = 5.0) -> None:
