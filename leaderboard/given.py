@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes, sentence
 from simnav.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def scenarios_of(
     """
     from simnav.scenario import headers, names
 
+    note = note or partial(warnings.warn, stacklevel=2)
     items = [] if given is None else [given] if isinstance(given, (str, Path, Scenario)) else list(given)
     asked: list[ScenarioLike] = []
     tracks: dict[str, list[ScenarioLike]] = {}
@@ -69,7 +71,7 @@ def scenarios_of(
             except (ValueError, OSError) as error:
                 if asked and not optional:
                     raise RequestError(sentence(error)) from error
-                _note(note, f"{chosen.name} is left out: {sentence(error)}")
+                note(f"{chosen.name} is left out: {sentence(error)}")
                 continue
         found.append(chosen)
     if not found:
@@ -92,7 +94,7 @@ def results_of(
         Only these scores. Default: all.
     """
     from simnav.leaderboard.results.provenance import benchmark_of
-    from simnav.leaderboard.results.store import StoreError, load
+    from simnav.leaderboard.results.store import load
 
     path = absolute(folder)
     with mistakes(StoreError):
@@ -101,13 +103,6 @@ def results_of(
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
     benchmark_of(r.provenance for r in results)
     return results
-
-
-def _note(note: Callable[[str], None] | None, text: str) -> None:
-    if note is not None:
-        note(text)
-    else:
-        warnings.warn(text, stacklevel=3)
 
 
 def absolute(path: str | os.PathLike[str]) -> Path:

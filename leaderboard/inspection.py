@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.request import Estimators, requests
 from simnav.leaderboard.given import ScenarioLike, Scenarios, absolute, results_of, scenario_of, scenarios_of
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
@@ -60,7 +60,6 @@ def rescore(
     """
     from simnav.leaderboard.campaign.rescoring import rescore_results
     from simnav.leaderboard.campaign.seal import read_seal
-    from simnav.leaderboard.results.store import StoreError
 
     names = scores.split(",") if isinstance(scores, str) else scores
     given = [] if scenarios is None else scenarios_of(scenarios)
@@ -74,12 +73,14 @@ def rescore(
 def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str]) -> list[Result]:
     """Put the results of several folders into one, e.g. of the shards of a campaign.
 
+    A run that several of them hold counts once. The copy of a file that is damaged is set aside, with a warning.
+
     Parameters
     ----------
     folders : iterable of path
         They stay as they are. A bundle of `simnav.submit` stands for its results; verify it first.
     output : path
-        New, or a folder of results, which are kept.
+        A new or empty folder, or one of results, which are kept.
 
     Returns
     -------
@@ -90,10 +91,9 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     ------
     RequestError
         If the folders belong to different versions of the benchmark, or if a scenario, the simulator or an estimator
-        differs between them.
+        differs between them. Then the output is as it was.
     """
     from simnav.leaderboard.results.gathering import gather
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.submission.bundle import open_bundle
 
     with tempfile.TemporaryDirectory(prefix="simnav-merge-") as scratch, mistakes(StoreError):
@@ -187,7 +187,6 @@ def verify(
     """
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.campaign.verification import verify_results
-    from simnav.leaderboard.results.store import StoreError
 
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
@@ -249,7 +248,6 @@ def reproduce(
     from simnav.leaderboard.papers import sequential
     from simnav.leaderboard.papers import stored as shipped
     from simnav.leaderboard.papers.reproduction import reproduce
-    from simnav.leaderboard.results.store import StoreError
 
     if stored and (until_decided or runs is not None):
         raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")

@@ -30,7 +30,7 @@ from simnav.leaderboard.given import (
     scenarios_of,
 )
 from simnav.leaderboard.inspection import bound, cite, merge, reproduce, rescore, verify
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -579,7 +579,7 @@ def _run(
     time_limit: float | None, memory_limit: float, progress: CampaignProgress, **options: Any,
 ) -> Summary:  # fmt: skip
     from simnav.leaderboard.campaign.campaign import run_campaign
-    from simnav.leaderboard.results.store import StoreError, create
+    from simnav.leaderboard.results.store import create
 
     with mistakes(StoreError):
         create(folder)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.given import absolute
 from simnav.leaderboard.interface import CampaignProgress, campaign
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
@@ -117,7 +117,6 @@ def submit(
     from simnav.leaderboard.profiles import load
     from simnav.leaderboard.results.packing import pack
     from simnav.leaderboard.results.provenance import BENCHMARK
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.submission.bundle import SUFFIX, write_bundle
     from simnav.leaderboard.submission.source import source_of
     from simnav.leaderboard.submission.verifying import runs_of
@@ -253,7 +252,6 @@ def run_standard(
         Its summary says how many runs are left.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.publication import begin
 
     folder = absolute(results)
@@ -279,7 +277,6 @@ def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
     RequestError
         If there are no results.
     """
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.currency import outdated
 
     folder = _standard_results(results)
@@ -332,7 +329,6 @@ def carry_standard(
         If ``runs`` is below 1, there are no results, or the code differs from its commit, which the record would name.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.carrying import carry
 
     folder = _standard_results(shipped)
@@ -388,7 +384,6 @@ def publish_standard(
     from simnav.leaderboard.interface import results_of
     from simnav.leaderboard.papers.page import find
     from simnav.leaderboard.profiles import load
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.editions import pages_of
     from simnav.leaderboard.standard.history import read

@@ -5,13 +5,17 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-__all__ = ["RequestError", "mistakes", "named", "printable", "sentence", "shortened"]
+__all__ = ["RequestError", "StoreError", "mistakes", "named", "printable", "sentence", "shortened"]
 
 _MOST = 1000  # characters of a message
 
 
 class RequestError(ValueError):
     """A request cannot be carried out; the message is one sentence that says what would be right."""
+
+
+class StoreError(RuntimeError):
+    """A results folder that cannot be used; the message is one sentence."""
 
 
 @contextlib.contextmanager

@@ -22,13 +22,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.folder import (
     COMPACTED,
     FILES,
     LOOSE,
     PROVENANCE,
     DamagedError,
-    StoreError,
     StoreWarning,
     atomic,
     contents,

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.results.errors import RequestError
@@ -64,6 +65,8 @@ class Line:
 
 
 _NAMES = [f.name for f in fields(Line)]
+_OF_TYPE: dict[Any, Callable[[str], Any]] = {"int": int, "str": str, "float": lambda cell: float(cell or "nan")}
+_READ = [_OF_TYPE[f.type] for f in fields(Line)]  # by column
 
 
 def lines_of(ranking: Ranking, results: Sequence[Result], edition: int) -> list[Line]:
@@ -111,9 +114,7 @@ def read(path: Path) -> list[Line]:
             try:
                 if len(row) != len(_NAMES):
                     raise ValueError(f"{len(row)} values where {len(_NAMES)} are wanted")
-                found.append(
-                    Line(int(row[0]), *row[1:8], *(float(v) if v else math.nan for v in row[8:11]), *map(int, row[11:]))  # type: ignore[arg-type]
-                )
+                found.append(Line(*(read_cell(cell) for read_cell, cell in zip(_READ, row, strict=True))))
             except ValueError as error:
                 raise RequestError(f"{path}, line {number}: {error}") from None
     return found

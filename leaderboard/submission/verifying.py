@@ -10,7 +10,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -171,9 +171,12 @@ def verify_bundle(
     for run in (a for a in again if not a.sealed):
         before = known[run.scenario, run.label, run.seed]
         said = _difference(before, run, tolerance, where)
-        identical += said == "" and _same_bits(before, run)
-        close += said == "" and not _same_bits(before, run)
-        different += [f"{run.label} on {run.scenario}, seed {run.seed}: {said}"] if said else []
+        if said:
+            different.append(f"{run.label} on {run.scenario}, seed {run.seed}: {said}")
+        elif _same_bits(before, run):
+            identical += 1
+        else:
+            close += 1
         unknown |= dict.fromkeys(n for n in before.scores if run.scores and n not in run.scores)
     missing = len(chosen) - identical - close - len(different)
     if missing > 0:
@@ -388,16 +391,13 @@ def _compared(results: Sequence[Result], again: Sequence[Again]) -> tuple[Sealed
         mine = [a for a in again if (a.scenario, a.label) == (scenario, label)]
         sealed = [_error(a.status, {n: float.fromhex(v) for n, v in a.scores.items()}) for a in mine]
         failed = sum(a.status != "ok" for a in mine)
-        found.append((label, scenario, public, sealed, failed, _rank_test(public, sealed)))
-    order = sorted(range(len(found)), key=lambda k: found[k][5])
-    adjusted, largest = dict[int, float](), 0.0
-    for place, k in enumerate(order):  # Holm (1979)
-        largest = max(largest, min(1.0, (len(order) - place) * found[k][5]))
-        adjusted[k] = largest
-    return tuple(
-        SealedRuns(label, scenario, len(public), len(sealed), failed, _ratio(public, sealed), adjusted[k])
-        for k, (label, scenario, public, sealed, failed, _) in enumerate(found)
-    )
+        ratio, p_value = _ratio(public, sealed), _rank_test(public, sealed)
+        found.append(SealedRuns(label, scenario, len(public), len(sealed), failed, ratio, p_value))
+    largest, adjusted = 0.0, dict[SealedRuns, float]()
+    for place, one in enumerate(sorted(found, key=lambda s: s.p_value)):  # Holm (1979)
+        largest = max(largest, min(1.0, (len(found) - place) * one.p_value))
+        adjusted[one] = largest
+    return tuple(replace(s, p_value=adjusted[s]) for s in found)
 
 
 def _error(status: str, scores: Mapping[str, float]) -> float:
