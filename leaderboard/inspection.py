@@ -66,7 +66,7 @@ def rescore(
     with mistakes(StoreError):
         return rescore_results(
             absolute(results), [n.strip() for n in names if n.strip()], given, progress,
-            seal=None if key is None else read_seal(key),
+            seal=read_seal(key),
         )  # fmt: skip
 
 
@@ -191,7 +191,7 @@ def verify(
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return verify_results(
-            absolute(results), None if key is None else read_seal(key), sample=sample, scenarios=given,
+            absolute(results), read_seal(key), sample=sample, scenarios=given,
             estimators=requests(estimators) if estimators else [], progress=progress,
         )  # fmt: skip
 

@@ -387,7 +387,7 @@ def campaign(
     parts: list[tuple[Scenarios, Estimators, int]] = [(scenarios, estimators, runs or RUNS)]
     if profile is not None:
         parts = [(scenarios or p.scenarios, estimators or p.estimators, runs or p.runs) for p in load(profile).parts]
-    folder, summaries, seal = absolute(output), [], None if sealed is None else read_seal(sealed)
+    folder, summaries, seal = absolute(output), [], read_seal(sealed)
     tracks: dict[str, str] = {}
     began = time.monotonic()
     for wanted, those, count in parts:

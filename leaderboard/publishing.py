@@ -213,7 +213,7 @@ def verify_bundle(
     from simnav.leaderboard.submission.verifying import verify_bundle as verify
 
     return verify(
-        absolute(bundle), None if key is None else read_seal(key), sample=sample, present=present,
+        absolute(bundle), read_seal(key), sample=sample, present=present,
         tolerance=TOLERANCE if tolerance is None else tolerance, progress=progress,
     )  # fmt: skip
 

@@ -33,7 +33,7 @@ from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.resolution import resolve, variant_of
-from simnav.leaderboard.campaign.seal import Seal, unreadable
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
 from simnav.leaderboard.results import store, trials
@@ -152,7 +152,7 @@ def run_campaign(
     scheduler: str | None = None,
     shard: tuple[int, int] = (1, 1),
     confinement: str = "auto",
-    seal: Seal | None = None,
+    seal: Seal = PUBLIC,
     minutes: float | None = None,
 ) -> Summary:
     """Run estimators on scenarios and seeds, and store the results.
@@ -182,8 +182,8 @@ def run_campaign(
     shard : pair of int
         Which of how many parts of the runs to do, from 1. All parts together are the campaign; `simnav.merge` puts
         their folders together.
-    seal : Seal, optional
-        Derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
+    seal : Seal
+        May derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
 
     Returns
     -------
@@ -240,14 +240,12 @@ def run_campaign(
     if alone:  # the process that looks at estimators of others runs them, too, and loads all kernels
         _compile(report)
     try:
-        entrants = [resolve(request, chosen, unreadable(path, seal), alone) for request in estimators]
+        entrants = [resolve(request, chosen, seal.unreadable(path), alone) for request in estimators]
     except ServerError as error:
         raise CampaignError(str(error)) from None
-    if seal is None:  # the seeds of a sealed campaign are drawn from 2**63
+    if not seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
         require_unseen(entrants, scenarios, seeds)
-    recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
-    if seal is not None:
-        recordings = {name: seal.recording(known) for name, known in recordings.items()}
+    recordings = {s.id: seal.recording(recording_digest(s, simulator)) for s in scenarios}
     variants = {
         s.id: {e.label: variant_of(e, recordings[s.id]) for e in entrants} for s in scenarios
     }  # scenario -> label -> variant

@@ -14,12 +14,12 @@ import numpy as np
 from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError, sentence
 from simnav.scenario import load
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
@@ -78,7 +78,7 @@ class Verification:
 
 def verify_results(
     folder: Path,
-    seal: Seal | None = None,
+    seal: Seal = PUBLIC,
     *,
     sample: int = 10,
     scenarios: Sequence[Scenario] = (),
@@ -89,8 +89,7 @@ def verify_results(
     found = store.load(folder, series=False)
     if not found:
         raise RequestError(f"there are no results in {folder}")
-    wanted = seal.hash if seal is not None else ""
-    mine = [r for r in found if r.provenance.seal == wanted]
+    mine = [r for r in found if r.provenance.seal == seal.hash]
     tried = [r for r in mine if r.status == "ok"]
     chosen = random.SystemRandom().sample(tried, min(sample, len(tried)))
     known = {s.id: s for s in scenarios}
@@ -120,7 +119,7 @@ def verify_results(
                 close.append(f"{what}: {listed(comparison.close)}")
         report(len(chosen), len(chosen))
     return Verification(
-        str(folder), len(found), wanted, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
+        str(folder), len(found), seal.hash, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
         tuple(without), tuple(unknown),
     )  # fmt: skip
 
@@ -128,7 +127,7 @@ def verify_results(
 def _repeat(
     result: Result,
     folder: Path,
-    seal: Seal | None,
+    seal: Seal,
     known: Mapping[str, Scenario],
     requests: Mapping[str, EstimatorRequest],
 ) -> Result:

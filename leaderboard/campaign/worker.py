@@ -18,7 +18,7 @@ from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
-from simnav.leaderboard.campaign.seal import Seal, unreadable
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
@@ -62,7 +62,7 @@ class Unit:
         Least time between two covariances that are kept [s].
     confinement : str
         ``process``, ``bubblewrap`` or ``none``.
-    seal : Seal, optional
+    seal : Seal
         From which the seed is derived; `seed` is then the number of the run.
     """
 
@@ -78,7 +78,7 @@ class Unit:
     keep_trials: bool = False
     covariance_interval: float = 0.0
     confinement: str = "process"
-    seal: Seal | None = None
+    seal: Seal = PUBLIC
 
     @property
     def weight(self) -> float:
@@ -104,7 +104,7 @@ class Unit:
             scoring="{}",  # nothing is scored yet
             scenario_digest=self.scenario.content_hash(),
             estimator_digest=entrant.source,
-            provenance=here(confinement, self.seal.hash if self.seal is not None else ""),
+            provenance=here(confinement, self.seal.hash),
         )
 
 
@@ -128,7 +128,7 @@ def _prepare_worker(unit: Unit) -> None:
     global _prepared
     first, _prepared = not _prepared, True
     if unit.confinement != "none":  # it loads its kernels while the first recording is made
-        prepare(unit.confinement, unreadable(unit.folder, unit.seal))
+        prepare(unit.confinement, unit.seal.unreadable(unit.folder))
     if first:
         _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
 
@@ -168,7 +168,7 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
     try:
-        seed = unit.seed if unit.seal is None else unit.seal.seed(unit.scenario.id, unit.seed)
+        seed = unit.seal.seed(unit.scenario.id, unit.seed)
         recording = record_within(unit.scenario, seed, max(unit.limits.timeout, time_limit(unit.scenario)))
     except NoRecordingError as error:
         reason = f"no recording: {error}"
@@ -189,8 +189,8 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
 
     from simnav.scoring import score, series
 
-    hidden, sealed = unreadable(unit.folder, unit.seal), unit.seal is not None
-    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=sealed)
+    hidden = unit.seal.unreadable(unit.folder)
+    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
     trial = made.trial
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.verification import listed
 from simnav.leaderboard.profiles import load as load_profile
 from simnav.leaderboard.profiles import profiles
@@ -29,7 +30,6 @@ from simnav.scenario import load as load_scenario
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["TOLERANCE", "SealedRuns", "SubmissionReport", "runs_of", "verify_bundle"]
@@ -135,7 +135,7 @@ class SubmissionReport:
 
 def verify_bundle(
     path: Path,
-    seal: Seal | None = None,
+    seal: Seal = PUBLIC,
     *,
     sample: int = 10,
     present: bool = False,
@@ -154,7 +154,7 @@ def verify_bundle(
         results = _results(bundle)
         findings = [*_incomplete(bundle, results), *_strange(bundle, results)]
         chosen = _sample(results, sample)
-        wanted = [*_wanted(chosen), *(_sealed(bundle, results, sample) if seal is not None else ())]
+        wanted = [*_wanted(chosen), *(_sealed(bundle, results, sample) if seal.secret else ())]
         provenance = distinct(r.provenance for r in results)
         python = Path(sys.executable)
         if not present:
@@ -162,8 +162,7 @@ def verify_bundle(
             python = clean_python(home / "env", vars(provenance[0]) if provenance else {})
             install_requirements(python, bundle.contents.requires, home / "packages")
         asked = Asked(
-            str(home / "runs"), bundle.requests(home / "packages"), wanted,
-            seal.key.hex() if seal is not None else "", confinement,
+            str(home / "runs"), bundle.requests(home / "packages"), wanted, seal.key.hex(), confinement,
         )  # fmt: skip
         again, where = _repeated(python, asked, home, not present, report)
     known = {(r.scenario, r.estimator, r.seed): r for r in chosen}
@@ -338,7 +337,7 @@ def _versions(where: Provenance) -> str:
 def _compared_scores(before: Result, again: Again) -> dict[str, tuple[float, float]]:
     """The scores that both have, wall times aside; a score of a plug-in may be known in one place only."""
     return {
-        name: (value, float.fromhex(again.scores[name]))
+        name: (value, again.scores[name])
         for name, value in before.scores.items()
         if name in again.scores and not name.startswith("update_")
     }
@@ -389,7 +388,7 @@ def _compared(results: Sequence[Result], again: Sequence[Again]) -> tuple[Sealed
     for scenario, label in sorted({(a.scenario, a.label) for a in again}):
         public = [_error(r.status, r.scores) for r in results if (r.scenario, r.estimator) == (scenario, label)]
         mine = [a for a in again if (a.scenario, a.label) == (scenario, label)]
-        sealed = [_error(a.status, {n: float.fromhex(v) for n, v in a.scores.items()}) for a in mine]
+        sealed = [_error(a.status, a.scores) for a in mine]
         failed = sum(a.status != "ok" for a in mine)
         ratio, p_value = _ratio(public, sealed), _rank_test(public, sealed)
         found.append(SealedRuns(label, scenario, len(public), len(sealed), failed, ratio, p_value))
