@@ -178,7 +178,7 @@ def _fork(
         _, status, usage = os.wait4(child, 0)
     peak = max(0, usage.ru_maxrss * RSS_UNIT - start) if start >= 0 else 0
     if verdict or len(received) < wanted:
-        return None, verdict, death_of(status), peak
+        return None, verdict, death_of(os.waitstatus_to_exitcode(status)), peak
     return bytes(received[_HEADER.size :]), "", "", peak
 
 
@@ -239,8 +239,7 @@ def _spawn(
                 process.join(1.0)
             process.kill()
             process.join()
-    code = process.exitcode or 0
-    return message, "", signal.Signals(-code).name if code < 0 else f"exit code {code}", 0
+    return message, "", death_of(process.exitcode or 0), 0
 
 
 def _spawned(connection: Any, function: Callable[..., Any], args: tuple[Any, ...], timeout: float, memory: int) -> None:

@@ -218,8 +218,8 @@ def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]
 def file_of(name: str) -> str:
     """The file in which an estimator of this name is; empty for a registered name.
 
-    >>> file_of("filters/my.py:MyFilter"), file_of("ekf")
-    ('filters/my.py', '')
+    >>> file_of("my.py:MyFilter"), file_of("my.pyfiles/first.py"), file_of("ekf")
+    ('my.py', 'my.pyfiles/first.py', '')
     """
     found = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
     return found[1] if found else ""

@@ -266,7 +266,7 @@ class _Walk:
 
     def file(self, path: Path, start: Path) -> None:
         """Take a file of others; ``start`` is the folder that its name is relative to."""
-        name = f"file {_relative(path, start)}"
+        name = f"file {Path(os.path.relpath(path, start)).as_posix()}"
         if name not in self.found:
             try:
                 self._add(name, path, "", start)
@@ -326,7 +326,3 @@ def _place(module: str) -> Path | None:
         return path / "__init__.py"
     path = path.with_name(f"{path.name}.py")
     return path if parts and path.is_file() else None
-
-
-def _relative(path: Path, start: Path) -> str:
-    return Path(os.path.relpath(path, start)).as_posix()

@@ -45,7 +45,7 @@ _UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
 _DEGREES = math.degrees(1.0)
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
-#: Column -> attribute: what made a result, and is its own.
+#: Column -> attribute: digests of scenario, estimator and simulator, and limits.
 _ORIGIN = {
     "scenario_digest": "scenario_digest",
     "estimator_digest": "estimator_digest",
@@ -112,7 +112,7 @@ def _run(result: Result) -> dict[str, Any]:
     scores = ((name, float(result.scores.get(name, math.nan))) for name in SCORES)
     return {
         **{name: plain(getattr(result, name)) for name in (*_FACTS, *_COSTS)},
-        **_origin(result),
+        **{column: getattr(result, name) for column, name in _ORIGIN.items()},
         "provenance": result.provenance.id,
         "scores": {name: value if math.isfinite(value) else None for name, value in scores},
     }
@@ -205,11 +205,6 @@ def table(results: Sequence[Result]) -> pa.Table:
     for name in _provenance(Provenance()):
         columns[name] = pa.array([o[name] for o in origins], kinds.get(name, text)).take(number)
     return pa.table(columns)
-
-
-def _origin(result: Result) -> dict[str, Any]:
-    """Digests of scenario, estimator and simulator, and limits."""
-    return {column: getattr(result, name) for column, name in _ORIGIN.items()}
 
 
 def _provenance(provenance: Provenance) -> dict[str, Any]:

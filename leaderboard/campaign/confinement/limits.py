@@ -198,9 +198,8 @@ def out_of_memory_kills() -> int:
     return 0
 
 
-def death_of(status: int) -> str:
-    """How a process ended, in words, from what ``waitpid`` gave."""
-    code = os.waitstatus_to_exitcode(status)
+def death_of(code: int) -> str:
+    """How a process ended, in words, from its exit code: that of a signal is negative."""
     if code >= 0:
         return f"exit code {code}"
     try:

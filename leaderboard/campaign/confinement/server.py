@@ -143,7 +143,7 @@ def _fork(
         while True:
             pid, status, usage = os.wait4(child, os.WNOHANG)
             if pid == child:
-                ended = death_of(status)
+                ended = death_of(os.waitstatus_to_exitcode(status))
                 break
             if time.monotonic() >= deadline:
                 os.kill(child, signal.SIGKILL)
