@@ -7,10 +7,11 @@ import operator
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes, sentence
 from simnav.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ def scenarios_of(
     """
     from simnav.scenario import headers, names
 
+    note = note or partial(warnings.warn, stacklevel=2)
     single = isinstance(given, (str, os.PathLike, Scenario))
     if not single and given is not None and not isinstance(given, Iterable):
         raise RequestError(f"{given!r} is no scenario; a name or the path of a TOML file is wanted")
@@ -90,7 +92,7 @@ def scenarios_of(
             except (ValueError, OSError) as error:
                 if asked and not optional:
                     raise RequestError(sentence(error)) from error
-                _note(note, f"{chosen.name} is left out: {sentence(error)}")
+                note(f"{chosen.name} is left out: {sentence(error)}")
                 continue
         found.append(chosen)
     if not found:
@@ -113,7 +115,7 @@ def results_of(
         Only these scores. Default: all.
     """
     from simnav.leaderboard.results.provenance import benchmark_of
-    from simnav.leaderboard.results.store import StoreError, load
+    from simnav.leaderboard.results.store import load
 
     path = absolute(folder)
     with mistakes(StoreError):
@@ -122,13 +124,6 @@ def results_of(
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
     benchmark_of(r.provenance for r in results)
     return results
-
-
-def _note(note: Callable[[str], None] | None, text: str) -> None:
-    if note is not None:
-        note(text)
-    else:
-        warnings.warn(text, stacklevel=3)
 
 
 def absolute(path: str | os.PathLike[str]) -> Path:

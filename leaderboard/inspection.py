@@ -9,11 +9,11 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.request import EstimatorLike, requests
+from simnav.leaderboard.campaign.request import Estimators, requests
 from simnav.leaderboard.given import ScenarioLike, Scenarios, absolute, results_of, scenario_of, scenarios_of, whole
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["bound", "cite", "merge", "rank", "reproduce", "rescore", "verify"]
-
-Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
 
 
 def rank(
@@ -63,8 +61,10 @@ def rank(
     if score is not None:
         require_lower(score, "a ranking is by errors")
     wanted = RANKED_SCORES | ({score} if score else set())
-    folder = results is None or isinstance(results, (str, os.PathLike))
-    given = results_of(results, scores=wanted) if folder else list(results)
+    if results is None or isinstance(results, (str, os.PathLike)):
+        given = results_of(results, scores=wanted)
+    else:
+        given = list(results)
     if not all(isinstance(r, Result) for r in given):
         raise RequestError("a folder of results is wanted, or results; 'simnav.merge' puts several folders together")
     require_score(score, given)
@@ -104,26 +104,27 @@ def rescore(
     """
     from simnav.leaderboard.campaign.rescoring import rescore_results
     from simnav.leaderboard.campaign.seal import read_seal
-    from simnav.leaderboard.results.store import StoreError
 
     names = scores.split(",") if isinstance(scores, str) else [str(s) for s in scores]
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return rescore_results(
             absolute(results), [n.strip() for n in names if n.strip()], given, progress,
-            seal=None if key is None else read_seal(key),
+            seal=read_seal(key),
         )  # fmt: skip
 
 
 def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str]) -> list[Result]:
     """Put the results of several folders into one, e.g. of the shards of a campaign.
 
+    A run that several of them hold counts once. The copy of a file that is damaged is set aside, with a warning.
+
     Parameters
     ----------
     folders : iterable of path
         One or several. They stay as they are. A bundle of `simnav.submit` stands for its results; verify it first.
     output : path
-        New, or a folder of results, which are kept.
+        A new or empty folder, or one of results, which are kept.
 
     Returns
     -------
@@ -134,10 +135,9 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     ------
     RequestError
         If the folders belong to different versions of the benchmark, or if a scenario, the simulator or an estimator
-        differs between them.
+        differs between them. Then the output is as it was.
     """
     from simnav.leaderboard.results.gathering import gather
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.submission.bundle import open_bundle
 
     with tempfile.TemporaryDirectory(prefix="simnav-merge-") as scratch, mistakes(StoreError):
@@ -233,13 +233,12 @@ def verify(
     """
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.campaign.verification import verify_results
-    from simnav.leaderboard.results.store import StoreError
 
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return verify_results(
-            absolute(results), None if key is None else read_seal(key), sample=whole("sample", sample, 1),
-            scenarios=given, estimators=requests(estimators) if estimators else [], progress=progress,
+            absolute(results), read_seal(key), sample=whole("sample", sample, 1), scenarios=given,
+            estimators=requests(estimators) if estimators else [], progress=progress,
         )  # fmt: skip
 
 
@@ -295,7 +294,6 @@ def reproduce(
     from simnav.leaderboard.papers import sequential
     from simnav.leaderboard.papers import stored as shipped
     from simnav.leaderboard.papers.reproduction import reproduce
-    from simnav.leaderboard.results.store import StoreError
 
     if stored and (until_decided or runs is not None):
         raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")

@@ -16,11 +16,11 @@ import contextlib
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, requests, together
+from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
 from simnav.leaderboard.given import (
     ScenarioLike,
@@ -34,7 +34,7 @@ from simnav.leaderboard.given import (
     whole,
 )
 from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, verify
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -77,7 +77,6 @@ __all__ = [
     "whole",
 ]
 
-Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
 CampaignProgress: TypeAlias = "Callable[[Progress], None] | None"
 
 
@@ -358,10 +357,11 @@ def campaign(
     seed, parameters, workers, time_limit, memory_limit, progress
         As for `evaluate`.
     retry : bool
-        Run failures again that are in the folder. A run that a shorter time limit or a smaller memory limit than
-        today's ended is run again in any case.
+        Run failures again that are in the folder (errors, timeouts, out of memory, diverged, invalid output). A run
+        that could not be recorded, or that a shorter time limit or a smaller memory limit than today's ended, is run
+        again in any case.
     keep_trials : bool
-        Keep what the estimators gave, for `rescore`: about 190 bytes an epoch and run.
+        Keep the estimates, covariances, diagnostics and flags, for `rescore`: about 190 bytes an epoch and run.
     covariance_interval : float
         Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
         the covariance as they are.
@@ -397,7 +397,7 @@ def campaign(
              p.runs if runs is None else runs)
             for p in load(profile).parts
         ]  # fmt: skip
-    folder, summaries, seal = absolute(output), [], None if sealed is None else read_seal(sealed)
+    folder, summaries, seal = absolute(output), [], read_seal(sealed)
     tracks: dict[str, str] = {}
     end = None if minutes is None else time.monotonic() + 60.0 * positive("minutes", minutes)
     for wanted, those, count in parts:
@@ -556,7 +556,7 @@ def _run(
     time_limit: float | None, memory_limit: float, progress: CampaignProgress, **options: Any,
 ) -> Summary:  # fmt: skip
     from simnav.leaderboard.campaign.campaign import run_campaign
-    from simnav.leaderboard.results.store import StoreError, create
+    from simnav.leaderboard.results.store import create
 
     count, memory = whole("workers", workers, 1), positive("memory_limit", memory_limit, 16.0)
     limit = None if time_limit is None else positive("time_limit", time_limit)

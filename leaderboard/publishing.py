@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.given import absolute, results_of, whole
 from simnav.leaderboard.inspection import rank
 from simnav.leaderboard.interface import CampaignProgress, campaign
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.standard.carrying import Carried
     from simnav.leaderboard.standard.currency import Outdated
     from simnav.leaderboard.standard.publication import Published
+    from simnav.leaderboard.submission.bundle import Row
     from simnav.leaderboard.submission.verifying import SubmissionReport
 
 __all__ = [
@@ -179,8 +181,7 @@ def submit(
     from simnav.leaderboard.profiles import load
     from simnav.leaderboard.results.packing import pack
     from simnav.leaderboard.results.provenance import BENCHMARK
-    from simnav.leaderboard.results.store import StoreError
-    from simnav.leaderboard.submission.bundle import SUFFIX, Row, write_bundle
+    from simnav.leaderboard.submission.bundle import SUFFIX, write_bundle
     from simnav.leaderboard.submission.source import source_of
     from simnav.leaderboard.submission.verifying import runs_of
 
@@ -206,11 +207,7 @@ def submit(
             found = pack(folder, Path(scratch) / "results", [r.label for r in source.requests])
         ran = {r.scenario for r in found}
         runs = {s: n for s, n in runs_of(str(profile)).items() if s in ran}
-        points = {r.label: _point(r.name) for r in source.requests}
-        rows = [
-            Row(label=r.label, name=_within(r.name), point=points[r.label], parameters=dict(r.parameters))
-            for r in source.requests
-        ]
+        rows = [_row(r) for r in source.requests]
         digest = write_bundle(
             target, title=source.title, benchmark=BENCHMARK, profile=name, runs=runs, main=source.main, estimators=rows,
             requires=source.requires, source=source.files, results=Path(scratch) / "results",
@@ -225,15 +222,18 @@ def submit(
     return Submission(target, digest, tuple(r.label for r in rows), name, len(found), failed, tuple(remarks))
 
 
-def _point(name: str) -> str:
+def _row(request: EstimatorRequest) -> Row:
+    """What a bundle says of an estimator: the file without its folder, or the entry point of its package."""
     from simnav.estimator.registry import point_of
+    from simnav.leaderboard.submission.bundle import Row
 
-    return "" if ".py" in name else point_of(name)
-
-
-def _within(name: str) -> str:
-    """The name of an estimator without the folder of its file."""
-    return os.path.basename(name) if ".py" in name else name
+    packaged = not file_of(request.name)
+    return Row(
+        label=request.label,
+        name=request.name if packaged else os.path.basename(request.name),
+        point=point_of(request.name) if packaged else "",
+        parameters=dict(request.parameters),
+    )
 
 
 def verify_bundle(
@@ -252,7 +252,8 @@ def verify_bundle(
     bundle : path
         That `submit` wrote.
     key : path, optional
-        File of a secret key: the estimators also run on seeds that are derived from it.
+        File of a secret key. The estimators also run on seeds that are derived from it, which the submission cannot
+        know, and should be no worse there.
     sample : int
         Runs that are repeated at most.
     present : bool
@@ -269,14 +270,14 @@ def verify_bundle(
     Raises
     ------
     RequestError
-        If the file is no bundle, was changed, or cannot be run here.
+        If the file is no bundle, was changed, or cannot be run here, as without a new environment.
     """
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.submission.verifying import TOLERANCE
     from simnav.leaderboard.submission.verifying import verify_bundle as verify
 
     return verify(
-        absolute(bundle), None if key is None else read_seal(key), sample=sample, present=present,
+        absolute(bundle), read_seal(key), sample=sample, present=present,
         tolerance=TOLERANCE if tolerance is None else tolerance, progress=progress,
     )  # fmt: skip
 
@@ -315,7 +316,6 @@ def run_standard(
         Its summary says how many runs are left.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.publication import begin
 
     folder = absolute(results)
@@ -341,15 +341,21 @@ def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
     RequestError
         If there are no results.
     """
-    from simnav.leaderboard import standard
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.currency import outdated
 
-    folder = standard.RESULTS if results is None else absolute(results)
-    if not standard.shipped(folder):
-        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    folder = _standard_results(results)
     with mistakes(StoreError):
         return outdated(folder)
+
+
+def _standard_results(given: str | os.PathLike[str] | None) -> Path:
+    """The folder of a standard result that is there: what was given, or what comes with simnav."""
+    from simnav.leaderboard import standard
+
+    folder = standard.RESULTS if given is None else absolute(given)
+    if not standard.shipped(folder):
+        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    return folder
 
 
 def carry_standard(
@@ -365,9 +371,13 @@ def carry_standard(
     Parameters
     ----------
     runs : int
-        How many runs of each scenario and estimator that are out of date are repeated.
-    shipped, record : path, optional
-        Folder of the packed results, and file that says what was carried over; default: those that come with simnav.
+        How many runs of each scenario and estimator that are out of date are repeated, drawn at random from those that
+        are stored; all where there are fewer.
+    shipped : path, optional
+        Folder of the packed results, which is replaced as a whole; default: that which comes with simnav.
+    record : path, optional
+        CSV file to which a line is added: date, commit, what was carried over, and how many runs were repeated;
+        default: that which comes with simnav.
     workers : int
         Processes.
     progress : callable, optional
@@ -380,15 +390,12 @@ def carry_standard(
     Raises
     ------
     RequestError
-        If there are no results, or the code differs from its commit.
+        If ``runs`` is below 1, there are no results, or the code differs from its commit, which the record would name.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.standard.carrying import carry
 
-    folder = standard.RESULTS if shipped is None else absolute(shipped)
-    if not standard.shipped(folder):
-        raise RequestError(f"there is no standard result in {folder}; 'simnav standard run' makes one")
+    folder = _standard_results(shipped)
     with mistakes(StoreError):
         return carry(
             folder, standard.CARRIED if record is None else absolute(record), runs=runs, workers=workers,
@@ -410,22 +417,25 @@ def publish_standard(
 ) -> Published:
     """Make what comes with simnav from the results of `run_standard`: packed results, history, README, and a site.
 
+    Results that the profile does not name, as those of submissions, are published as long as they are not out of date.
+
     Parameters
     ----------
     results : path
-        Folder of the results. If it is not there, the results that come with simnav are taken.
+        Folder of the results, which may be the one that is written. If it is not there, the results that come with
+        simnav are taken.
     profile : str or path
         That the results should hold as a whole.
     shipped, history : path, optional
         Folder of the packed results, and file of the editions; default: those that come with simnav.
     readme : path, optional
-        Whose tables are written; default: none.
+        Whose tables are written, between the marks of `simnav.leaderboard.standard.readme`; default: none.
     site : path, optional
         Folder of a site that is drawn; default: none.
     workers : int
         Processes that draw.
     preliminary : bool
-        Also if runs are missing; the tables say so, and there is no edition.
+        Also if runs are missing. The tables then say how many are there, and there is no edition.
     progress : callable, optional
         Called with how many of how many pages are done.
 
@@ -437,7 +447,6 @@ def publish_standard(
     from simnav.leaderboard import standard
     from simnav.leaderboard.papers.page import find
     from simnav.leaderboard.profiles import load
-    from simnav.leaderboard.results.store import StoreError
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.editions import pages_of
     from simnav.leaderboard.standard.history import read

@@ -24,19 +24,16 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
-from simnav.leaderboard.campaign.confinement.session import ServerError
+from simnav.leaderboard.campaign.confinement.session import Limits, ServerError
 from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.fingerprint import (
-    recording_digest,
-    simulator_version,
-)
+from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
 from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
-from simnav.leaderboard.campaign.plan import Plan, in_part
+from simnav.leaderboard.campaign.plan import Plan
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.resolution import resolve, variant_of
-from simnav.leaderboard.campaign.seal import Seal
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
 from simnav.leaderboard.results import store, trials
@@ -155,7 +152,7 @@ def run_campaign(
     scheduler: str | None = None,
     shard: tuple[int, int] = (1, 1),
     confinement: str = "auto",
-    seal: Seal | None = None,
+    seal: Seal = PUBLIC,
     minutes: float | None = None,
 ) -> Summary:
     """Run estimators on scenarios and seeds, and store the results.
@@ -169,20 +166,12 @@ def run_campaign(
         What is run: every estimator on every scenario with every seed.
     folder : path
         Of the results; made if it is not there.
-    workers : int
-        Processes.
+    workers, retry, keep_trials, covariance_interval, confinement, minutes
+        As for `simnav.leaderboard.interface.campaign`.
     timeout : float, optional
         Wall-clock time that an estimator may take for a run [s]; default: `time_limit`.
     memory : int
         Memory that an estimator may take beyond the recording [bytes].
-    retry : bool
-        Run failures again (errors, timeouts, out of memory, diverged, invalid output). Without it, only those runs are
-        that could not be recorded, or that a shorter time limit or a smaller memory limit than today's ended.
-    keep_trials : bool
-        Keep the estimates, covariances, diagnostics and flags, so that any score can be computed later
-        (`simnav.leaderboard.campaign.rescoring`): about 190 bytes an epoch.
-    covariance_interval : float
-        Least time between two covariances that are kept [s]; 0 keeps all.
     progress : callable, optional
         Called with a `Progress` now and then.
     backend : {"loky", "dask"}
@@ -193,13 +182,8 @@ def run_campaign(
     shard : pair of int
         Which of how many parts of the runs to do, from 1. All parts together are the campaign; `simnav.merge` puts
         their folders together.
-    confinement : {"auto", "bubblewrap", "process", "none"}
-        How estimators are kept apart from the recording, see docs/explanation/security.md; ``auto`` is the strongest
-        that works.
-    seal : Seal, optional
-        Derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
-    minutes : float, optional
-        Time after which no further run is started. The same campaign, started again, continues.
+    seal : Seal
+        May derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
 
     Returns
     -------
@@ -254,19 +238,16 @@ def run_campaign(
     path = store.create(Path(folder).resolve())
     endings = store.keys(path)
     simulator = simulator_version()
-    hidden = [path] if seal is None or seal.file is None else [path, seal.file]
     alone = workers == 1 and backend == "loky"
     if alone:  # the process that looks at estimators of others runs them, too, and loads all kernels
         _compile(report)
     try:
-        entrants = [resolve(request, chosen, hidden, alone) for request in estimators]
+        entrants = [resolve(request, chosen, seal.unreadable(path), alone) for request in estimators]
     except ServerError as error:
         raise CampaignError(str(error)) from None
-    if seal is None:  # the seeds of a sealed campaign are drawn from 2**63
+    if not seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
         require_unseen(entrants, scenarios, seeds)
-    recordings = {s.id: recording_digest(s, simulator) for s in scenarios}
-    if seal is not None:
-        recordings = {name: seal.recording(known) for name, known in recordings.items()}
+    recordings = {s.id: seal.recording(recording_digest(s, simulator)) for s in scenarios}
     variants = {
         s.id: {e.label: variant_of(e, recordings[s.id]) for e in entrants} for s in scenarios
     }  # scenario -> label -> variant
@@ -274,41 +255,31 @@ def run_campaign(
     store.select(path, current)
 
     scores, scoring = own_scores(), scoring_code()
-    owners = {v: s for s in scenarios for v in variants[s.id].values()}  # scenario of each variant
-    wanted = frozenset(seeds) if not isinstance(seeds, range) else seeds
-
-    def asked(key: str) -> bool:
-        """Whether a result is one of this campaign."""
-        name, _, seed = key.rpartition("-")
-        if name not in owners or not seed.isdecimal() or int(seed) not in wanted:
-            return False
-        return shard == (1, 1) or in_part(seeds.index(int(seed)), scenarios.index(owners[name]), shard)
-
+    plan = Plan(scenarios, entrants, seeds, variants, shard=shard)
     stale = {
         key
-        for key in filter(asked, endings)
+        for key in filter(plan.asks, endings)
         if scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
     }
     if stale:  # a score was edited: the trials that were kept have all that it needs
         rescore_results(path, scenarios=scenarios, keys=stale, seal=seal)
         endings = store.keys(path)
 
-    def limit(scenario: Scenario) -> float:
-        return time_limit(scenario) if timeout is None else timeout
+    def limits(scenario: Scenario) -> Limits:
+        return Limits(time_limit(scenario) if timeout is None else timeout, memory)
 
-    mine = list(filter(asked, endings))
+    mine = set(filter(plan.asks, endings))
     again = {
         key
         for key in mine
-        if _again(endings[key], limit(owners[key.rpartition("-")[0]]), memory, retry)
-        or scoring_differs(endings[key].scoring, scoring)
+        if _again(endings[key], limits(plan.scenario_of(key)), retry) or scoring_differs(endings[key].scoring, scoring)
     }
-    plan = Plan(scenarios, entrants, seeds, variants, set(mine) - again, shard)
+    plan = replace(plan, there=mine - again)
 
     def unit(scenario: Scenario, seed: int, missing: tuple[tuple[Entrant, str], ...]) -> Unit:
         return Unit(
-            scenario, seed, missing, recordings[scenario.id], simulator, path, limit(scenario), memory,
-            scores, scoring, keep_trials, covariance_interval, chosen, seal,
+            scenario, seed, missing, recordings[scenario.id], simulator, path, limits(scenario), scores, scoring,
+            keep_trials, covariance_interval, chosen, seal,
         )  # fmt: skip
 
     total, skipped = plan.total, len(plan.there)
@@ -345,14 +316,14 @@ def run_campaign(
     return Summary(path, total, skipped, dict(statuses), time.monotonic() - started)
 
 
-def _again(ending: store.Ending, time_limit: float, memory_limit: int, retry: bool) -> bool:
-    """Whether a run that is stored should be run again, under these limits [s, bytes]."""
+def _again(ending: store.Ending, limits: Limits, retry: bool) -> bool:
+    """Whether a run that is stored should be run again, under these limits."""
     if ending.status == "no-recording":
         return True
     if retry and ending.status not in ("ok", "unsuitable"):
         return True
-    return (ending.status == "timeout" and ending.time_limit < time_limit) or (
-        ending.status == "out-of-memory" and ending.memory_limit < memory_limit
+    return (ending.status == "timeout" and ending.time_limit < limits.timeout) or (
+        ending.status == "out-of-memory" and ending.memory_limit < limits.memory
     )
 
 

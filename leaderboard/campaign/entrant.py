@@ -21,12 +21,8 @@ class Entrant:
 
     Attributes
     ----------
-    name : str
-        Registered name or absolute path.
-    parameters : mapping
-        Parameters of its constructor that are set, by name.
-    label : str
-        What results call it.
+    name, parameters, label, search
+        As of `EstimatorRequest`; a file is named by its absolute path.
     reference : bool
         One of simnav's own references: it is told the truth.
     source : str
@@ -35,8 +31,6 @@ class Entrant:
         The class itself, where no other process can import it.
     point : str
         Entry point of another package that registers it; empty where there is none.
-    search : tuple of str
-        Folders in which the estimator's process looks for packages first.
     learned_from : tuple of pairs of int
         As of `simnav.estimator.Estimator`.
     """

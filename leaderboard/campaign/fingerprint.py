@@ -20,7 +20,7 @@ from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.session_class import is_session, source_of
-from simnav.leaderboard.campaign.sources import digest, files_digest, followed, is_installed
+from simnav.leaderboard.campaign.sources import code_digest, digest, files_digest, followed, is_installed
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -46,10 +46,6 @@ _LOGS = "simnav.log"
 _ABSENT = "absent"
 
 
-def _code_digest(code: Mapping[str, str]) -> str:
-    return digest(*(part for item in code.items() for part in item))
-
-
 def _package_code(folder: Path) -> str:
     """Digest of all files of a package, but for what Python makes of them, and of what it imports of simnav."""
     found = []
@@ -58,7 +54,7 @@ def _package_code(folder: Path) -> str:
         found += [Path(place, n) for n in names if not n.startswith(".") and not n.endswith((".pyc", "~"))]
     files = files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
     code = followed(files=sorted(p for p in found if p.suffix == ".py"))
-    return digest(files, _code_digest({name: c for name, c in code.items() if _in_simnav(name)}))
+    return digest(files, code_digest({name: c for name, c in code.items() if _in_simnav(name)}))
 
 
 def _installed_code(package: str) -> str:
@@ -71,14 +67,14 @@ def _installed_code(package: str) -> str:
     if origin is None:
         return digest(package, "no file")
     path = Path(origin)
-    return _package_code(path.parent) if path.name == "__init__.py" else _code_digest(followed(files=[path]))
+    return _package_code(path.parent) if path.name == "__init__.py" else code_digest(followed(files=[path]))
 
 
 def simulator_version() -> str:
     """Version of simnav with a digest of the code that makes recordings; what reads log files is not in it."""
     from importlib.metadata import version
 
-    return f"{version('simnav')}+{_code_digest(followed(SIMULATOR, without=[_LOGS]))[:12]}"
+    return f"{version('simnav')}+{code_digest(followed(SIMULATOR, without=[_LOGS]))[:12]}"
 
 
 def recording_digest(scenario: Scenario, simulator: str) -> str:
@@ -109,7 +105,7 @@ def _plugin_digests(scenario: Scenario) -> list[str]:
         if is_installed(path):
             found.append(_installed_code(module.partition(".")[0]))
         else:
-            found.append(_code_digest(followed(files=[path], without=[_LOGS, "simnav.estimators"])))
+            found.append(code_digest(followed(files=[path], without=[_LOGS, "simnav.estimators"])))
     return found
 
 
@@ -126,7 +122,7 @@ def _log_digest(scenario: Scenario) -> str:
                 files.append((f"{recording}/{file.path}", path))
     except (ValueError, OSError):  # every run says so
         return _ABSENT
-    return digest(files_digest(files), _code_digest(followed([f"{_LOGS}.source"])))
+    return digest(files_digest(files), code_digest(followed([f"{_LOGS}.source"])))
 
 
 def has_recordings(scenario: Scenario) -> bool:
@@ -158,7 +154,7 @@ def estimator_source(cls: type[Estimator]) -> str:
         loaded = sys.modules.get(module)
         file = getattr(loaded, "__file__", None)
         if file is not None and "." not in module and not hasattr(loaded, "__path__"):
-            parts.append(_code_digest(followed(files=[Path(file).resolve()])))
+            parts.append(code_digest(followed(files=[Path(file).resolve()])))
         elif module in {base.__module__ for base in cls.__mro__}:
             parts.append(_installed_code(package))
     for base in cls.__mro__:
@@ -167,7 +163,7 @@ def estimator_source(cls: type[Estimator]) -> str:
             parts += [digest(text), *filter(None, map(_used_digest, modules))]
             ours.update(filter(_in_simnav, modules))
     parts += [content for _, content in named_files(p.default for p in parameters_of(cls))]
-    return digest(_code_digest(followed(sorted(ours))), *dict.fromkeys(parts))
+    return digest(code_digest(followed(sorted(ours))), *dict.fromkeys(parts))
 
 
 def _homes(item: Any, depth: int = 3) -> Iterator[str]:
@@ -204,7 +200,7 @@ def _used_digest(module: str) -> str:
     if file is None or _in_simnav(module):
         return ""
     path = Path(file).resolve()
-    return "" if is_installed(path) else _code_digest(followed(files=[path]))
+    return "" if is_installed(path) else code_digest(followed(files=[path]))
 
 
 def _in_simnav(module: str) -> bool:

@@ -10,15 +10,12 @@ has neither; there only time is limited.
 from __future__ import annotations
 
 import contextlib
-import faulthandler
-import math
 import multiprocessing
 import os
 import pickle
 import select
 import signal
 import struct
-import subprocess
 import sys
 import time
 import warnings
@@ -26,15 +23,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from simnav.leaderboard.campaign.confinement.limits import die_with_parent, out_of_memory_kills
+from simnav.leaderboard.campaign.confinement.limits import (
+    RSS_UNIT,
+    WATCH,
+    begin_alone,
+    death_of,
+    lift_memory_limit,
+    limit,
+    out_of_memory_kills,
+    resident,
+    why_it_died,
+)
+from simnav.leaderboard.results.errors import named
 
 __all__ = ["Outcome", "isolate"]
 
-_LINUX: bool = sys.platform == "linux"
 _HEADER = struct.Struct(">QQ")  # resident memory at the start, length of the message
-_POLL = 0.02 if _LINUX else 0.5  # between two looks at the memory of the process [s]
 _MEGABYTE = 1 << 20
-_RSS_UNIT = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +102,11 @@ def isolate(
         return Outcome(verdict, reason, None, seconds, peak)
     if message is None:
         by_kernel = death == "SIGKILL" and out_of_memory_kills() > kills
-        if by_kernel or (death.startswith("SIG") and death != "SIGKILL" and peak > 0.9 * memory):
-            return Outcome("out-of-memory", f"killed ({death}) for want of memory", None, seconds, peak)
-        return Outcome("error", f"the process died ({death}) without an answer", None, seconds, peak)
+        return Outcome(*why_it_died(death, peak, memory, by_kernel=by_kernel), None, seconds, peak)
     try:
         status, value, peak = pickle.loads(message)
     except Exception as error:
-        return Outcome("error", f"the answer cannot be read ({_describe(error)})", None, seconds, peak)
+        return Outcome("error", f"the answer cannot be read ({named(error)})", None, seconds, peak)
     if status == "ok":
         return Outcome("ok", "", value, seconds, peak)
     reason = f"more than {_readable(memory)} of memory was wanted" if status == "out-of-memory" else value
@@ -114,28 +117,20 @@ def _readable(memory: int) -> str:
     return f"{memory / _MEGABYTE:.0f} MiB"
 
 
-def _describe(error: BaseException) -> str:
-    try:
-        text = str(error)
-    except Exception:
-        text = ""
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
-
-
-def _answer(function: Callable[..., Any], args: tuple[Any, ...], lift: Callable[[], None], start: int) -> bytes:
+def _answer(function: Callable[..., Any], args: tuple[Any, ...], start: int) -> bytes:
     """Call, in the child, and pickle (status, value or reason, peak memory)."""
     try:
         status, value = "ok", function(*args)
     except MemoryError:
         status, value = "out-of-memory", None
     except BaseException as error:  # SystemExit and KeyboardInterrupt, too: it is not the user who asks
-        status, value = "error", _describe(error)
-    lift()
+        status, value = "error", named(error)
+    lift_memory_limit()
     peak = max(0, _peak_resident() - start)
     try:
         return pickle.dumps((status, value, peak), protocol=pickle.HIGHEST_PROTOCOL)
     except BaseException as error:
-        return pickle.dumps(("error", f"what it returned cannot be pickled ({_describe(error)})", peak))
+        return pickle.dumps(("error", f"what it returned cannot be pickled ({named(error)})", peak))
 
 
 # --- fork -----------------------------------------------------------------------------------------
@@ -165,7 +160,7 @@ def _fork(
             if left <= 0:
                 verdict = "timeout"
                 break
-            if select.select([read], [], [], min(left, _POLL))[0]:
+            if select.select([read], [], [], min(left, WATCH))[0]:
                 piece = os.read(read, _MEGABYTE)
                 if not piece:
                     break
@@ -174,16 +169,16 @@ def _fork(
                     start = int.from_bytes(received[:8])
                 if len(received) >= _HEADER.size:
                     wanted = _HEADER.size + _HEADER.unpack_from(received)[1]
-            elif start >= 0 and _resident(child) - start > memory:
+            elif start >= 0 and resident(child) - start > memory:
                 verdict = "out-of-memory"
                 break
     finally:
         os.close(read)
         _kill(child)
         _, status, usage = os.wait4(child, 0)
-    peak = max(0, usage.ru_maxrss * _RSS_UNIT - start) if start >= 0 else 0
+    peak = max(0, usage.ru_maxrss * RSS_UNIT - start) if start >= 0 else 0
     if verdict or len(received) < wanted:
-        return None, verdict, _death(status), peak
+        return None, verdict, death_of(os.waitstatus_to_exitcode(status)), peak
     return bytes(received[_HEADER.size :]), "", "", peak
 
 
@@ -195,71 +190,19 @@ def _kill(child: int) -> None:
         os.kill(child, signal.SIGKILL)
 
 
-def _death(status: int) -> str:
-    code = os.waitstatus_to_exitcode(status)
-    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
-
-
 def _serve(
     write: int, parent: int, function: Callable[..., Any], args: tuple[Any, ...], timeout: float, memory: int
 ) -> None:
     """The child's whole life."""
-    os.setsid()  # Ctrl-C in the terminal is not for us, and we are killed with all that we start
-    die_with_parent(parent)
-    signal.set_wakeup_fd(-1)
-    faulthandler.disable()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
-        signal.signal(number, signal.SIG_DFL)
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for descriptor in (0, 1, 2):
-        os.dup2(nothing, descriptor)
-    sys.stdin = open(os.devnull)  # noqa: SIM115
-    sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
-    start = _resident(os.getpid())
+    begin_alone(parent)
+    start = resident(os.getpid())
     os.write(write, start.to_bytes(8))
-    lift = _limit(timeout, memory)
-    message = _answer(function, args, lift, start)
+    limit(timeout, memory, final=False)
+    message = _answer(function, args, start)
     view = memoryview(len(message).to_bytes(8) + message)
     while view:
         view = view[os.write(write, view) :]
     os._exit(0)
-
-
-def _limit(timeout: float, memory: int) -> Callable[[], None]:
-    """Set the limits of this process; return what lifts that of memory again."""
-    import resource
-
-    def lower(which: int, value: int) -> None:
-        hard = resource.getrlimit(which)[1]
-        with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(which, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
-
-    lower(resource.RLIMIT_CORE, 0)
-    lower(resource.RLIMIT_CPU, math.ceil(4.0 * timeout) + 60)  # only if everyone who could kill us is dead
-    before = resource.getrlimit(resource.RLIMIT_DATA)
-    if _LINUX:
-        with open("/proc/self/statm") as file:
-            data = int(file.read().split()[5]) * resource.getpagesize()
-        lower(resource.RLIMIT_DATA, data + memory)
-
-    def lift() -> None:
-        with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(resource.RLIMIT_DATA, before)
-
-    return lift
-
-
-def _resident(process: int) -> int:
-    """Resident memory of a process [bytes]; 0 if it cannot be told."""
-    try:
-        with open(f"/proc/{process}/statm") as file:
-            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError, IndexError):
-        pass
-    if _LINUX or os.name != "posix":
-        return 0
-    done = subprocess.run(["ps", "-o", "rss=", "-p", str(process)], capture_output=True, text=True, check=False)
-    return int(done.stdout.strip() or 0) * 1024
 
 
 def _peak_resident() -> int:
@@ -268,7 +211,7 @@ def _peak_resident() -> int:
         import resource
     except ImportError:
         return 0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _RSS_UNIT
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * RSS_UNIT
 
 
 # --- spawn ----------------------------------------------------------------------------------------
@@ -296,13 +239,13 @@ def _spawn(
                 process.join(1.0)
             process.kill()
             process.join()
-    code = process.exitcode or 0
-    return message, "", signal.Signals(-code).name if code < 0 else f"exit code {code}", 0
+    return message, "", death_of(process.exitcode or 0), 0
 
 
 def _spawned(connection: Any, function: Callable[..., Any], args: tuple[Any, ...], timeout: float, memory: int) -> None:
     sys.stdin = open(os.devnull)  # noqa: SIM115
     sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
     start = _peak_resident()
-    lift = _limit(timeout, memory) if os.name == "posix" else lambda: None
-    connection.send_bytes(_answer(function, args, lift, start))
+    if os.name == "posix":
+        limit(timeout, memory, final=False)
+    connection.send_bytes(_answer(function, args, start))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from simnav.estimator import Estimator, EstimatorError, find
-from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
@@ -48,7 +48,7 @@ def beside_oracles(
 
 def _smooths(request: EstimatorRequest) -> bool:
     """Whether a registered estimator gives a smoothed trajectory; one of a file is not imported for this."""
-    if ".py" in request.name:
+    if file_of(request.name):
         return False
     try:
         cls = request.cls or find(request.name)

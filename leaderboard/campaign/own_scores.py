@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from simnav.leaderboard.campaign.session_class import carry, is_session, receive
-from simnav.leaderboard.campaign.sources import digest, followed
+from simnav.leaderboard.campaign.sources import code_digest, followed
 from simnav.plugins import is_file_module, load_plugin, place_of
 
-__all__ = ["OwnScores", "own_scores", "same_code", "scoring_code", "scoring_differs"]
+__all__ = ["OwnScores", "changed_code", "own_scores", "same_code", "scoring_code", "scoring_differs"]
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,7 @@ def scoring_code() -> str:
     from simnav.scoring import SCORES
 
     homes = {score.__module__ for score in SCORES.values() if score.__module__.startswith("simnav.")}
-    found = {home: digest(*(part for item in followed([home]).items() for part in item)) for home in sorted(homes)}
-    return json.dumps(found)
+    return json.dumps({home: code_digest(followed([home])) for home in sorted(homes)})
 
 
 def scoring_differs(before: str, now: str) -> bool:
@@ -76,12 +75,19 @@ def scoring_differs(before: str, now: str) -> bool:
     >>> scoring_differs('{"a": "1"}', '{"a": "1", "b": "1"}'), scoring_differs('{"a": "1"}', '{"a": "2"}')
     (False, True)
     """
-    if before == now:
-        return False
-    if not before:  # not known
-        return True
-    old, new = json.loads(before), json.loads(now)
-    return any(new.get(home) != code for home, code in old.items())
+    return before != now and bool(changed_code(before, now))
+
+
+def changed_code(before: str, now: str) -> frozenset[str]:
+    """The modules whose scores a result has, and that have changed since; ``all`` where it is not known.
+
+    >>> sorted(changed_code('{"a": "1", "b": "1"}', '{"b": "2", "c": "1"}')), sorted(changed_code("", "{}"))
+    (['a', 'b'], ['all'])
+    """
+    if not before:
+        return frozenset({"all"})
+    new = json.loads(now)
+    return frozenset(home for home, code in json.loads(before).items() if new.get(home) != code)
 
 
 def same_code(before: str, now: str) -> frozenset[str]:

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, find, make, names, register
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 __all__ = [
     "EstimatorLike",
     "EstimatorRequest",
+    "Estimators",
     "comes_with_simnav",
     "enlist",
+    "file_of",
     "kebab",
     "request",
     "requests",
@@ -76,6 +76,8 @@ class EstimatorRequest:
 EstimatorLike: TypeAlias = (
     "str | Path | type[Estimator] | EstimatorRequest | tuple[str | Path | type[Estimator], Mapping[str, Any]]"
 )
+#: One or several; a text may name several, separated by commas.
+Estimators: TypeAlias = "EstimatorLike | Iterable[EstimatorLike] | None"
 
 
 def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -> EstimatorRequest:
@@ -108,8 +110,7 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
     if isinstance(given, EstimatorRequest):
         if not parameters:
             return given
-        return EstimatorRequest(given.name, {**parameters, **given.parameters}, cls=given.cls, point=given.point,
-                                search=given.search)  # fmt: skip
+        return replace(given, parameters={**parameters, **given.parameters}, label="")
     if isinstance(given, type):
         with mistakes():
             name = enlist(given)
@@ -125,9 +126,7 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
     return EstimatorRequest(name, {**(parameters or {}), **own})
 
 
-def requests(
-    given: EstimatorLike | Iterable[EstimatorLike] | None, parameters: Mapping[str, Any] | None = None
-) -> list[EstimatorRequest]:
+def requests(given: Estimators, parameters: Mapping[str, Any] | None = None) -> list[EstimatorRequest]:
     """All that were asked for, each label once; all registered ones where none was.
 
     Parameters
@@ -153,7 +152,7 @@ def requests(
             mine = common if len(items) == 1 or not common else _known(item, common)
             unused -= set(mine)
             found = request(item, mine)
-            if ".py" not in found.name and not found.point and comes_with_simnav(found.cls or find(found.name)):
+            if not file_of(found.name) and not found.point and comes_with_simnav(found.cls or find(found.name)):
                 found.make()  # so that a mistake shows now; the code of others runs in a process of its own
             _has_a_name_of_its_own(found)
         made.append(found)
@@ -183,7 +182,7 @@ def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
 
 def _source(found: EstimatorRequest) -> str:
     """The name, or the file with its whole path."""
-    return os.path.realpath(found.name) if ".py" in found.name else found.name
+    return os.path.realpath(found.name) if file_of(found.name) else found.name
 
 
 def _has_a_name_of_its_own(found: EstimatorRequest) -> None:
@@ -207,7 +206,7 @@ def _mapping(parameters: Any) -> dict[str, Any]:
     return dict(parameters or {})
 
 
-def _items(given: EstimatorLike | Iterable[EstimatorLike]) -> list[EstimatorLike]:
+def _items(given: Estimators) -> list[EstimatorLike]:
     """One by one; what is separated by commas is taken apart."""
     if isinstance(given, Mapping):
         raise RequestError("a mapping names no estimators; give a list of pairs, like [('sw-fgo', {'window': 10})]")
@@ -216,21 +215,14 @@ def _items(given: EstimatorLike | Iterable[EstimatorLike]) -> list[EstimatorLike
     )
     if not single and not isinstance(given, Iterable):
         raise _no_estimator(given)
-    items: Sequence[Any] = [given] if single else list(given)  # type: ignore[arg-type]
+    items: Iterable[Any] = [given] if single else given  # type: ignore[assignment]
     found: list[EstimatorLike] = []
-    texts: list[str] = []
-    for item in items:
-        if isinstance(item, (str, Path)):
-            texts.append(str(item))
+    for texts, group in itertools.groupby(items, lambda item: isinstance(item, (str, Path))):
+        if texts:
+            found += [EstimatorRequest(name, values) for name, values in split_estimators(map(str, group))]
         else:
-            found += _split(texts)
-            found.append(item)
-            texts = []
-    return found + _split(texts)
-
-
-def _split(texts: list[str]) -> list[EstimatorLike]:
-    return [EstimatorRequest(name, values) for name, values in split_estimators(texts)]
+            found += group
+    return found
 
 
 def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -239,6 +231,16 @@ def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]
 
     known = {p.name for p in describe(request(item).name).parameters}
     return {k: v for k, v in parameters.items() if k in known}
+
+
+def file_of(name: str) -> str:
+    """The file in which an estimator of this name is; empty for a registered name.
+
+    >>> file_of("my.py:MyFilter"), file_of("my.pyfiles/first.py"), file_of("ekf")
+    ('my.py', 'my.pyfiles/first.py', '')
+    """
+    found = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
+    return found[1] if found else ""
 
 
 def comes_with_simnav(cls: type) -> bool:

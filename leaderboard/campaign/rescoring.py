@@ -6,17 +6,18 @@ import os
 import time
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code, scoring_differs
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
+from simnav.leaderboard.campaign.single_run import record
 from simnav.leaderboard.results import store, trials
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
@@ -52,14 +53,8 @@ class Rescored:
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav rescore --json`` prints."""
-        return {
-            "results": str(self.folder),
-            "scores": list(self.scores),
-            "rescored": self.rescored,
-            "complete": self.complete,
-            "without_trial": self.without_trial,
-            "seconds": self.seconds,
-        }
+        facts = asdict(self)
+        return {"results": str(facts.pop("folder")), **facts, "scores": list(self.scores)}
 
 
 def rescore_results(
@@ -68,26 +63,17 @@ def rescore_results(
     scenarios: Iterable[Scenario] = (),
     progress: Callable[..., None] | None = None,
     keys: Collection[str] | None = None,
-    seal: Seal | None = None,
+    seal: Seal = PUBLIC,
 ) -> Rescored:
-    """Compute scores of the current results of a folder, from the trials that were kept.
-
-    A trial is kept in single precision. What the campaign computed from all digits therefore stays, unless it is asked
-    for by name.
+    """Compute scores of the current results of a folder; see `simnav.leaderboard.inspection.rescore`.
 
     Parameters
     ----------
-    folder : path
-        Folder of the results.
-    names : iterable of str
-        Of scores; default: those that a result lacks, and those of simnav whose code has changed since.
-    scenarios : iterable of Scenario
-        Those that are not in the catalogue.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
+    folder, names, scenarios, progress
+        As there.
     keys : collection of str, optional
         Of the results; default: all that have a trial.
-    seal : Seal, optional
+    seal : Seal
         Of results with sealed seeds; then only these are scored.
 
     Returns
@@ -104,7 +90,6 @@ def rescore_results(
         If the folder or a trial in it cannot be used.
     """
     from simnav.scoring import SCORES, score
-    from simnav.source import record
     from simnav.spec import closest
 
     started = time.monotonic()
@@ -140,8 +125,7 @@ def rescore_results(
     for done, ((scenario, seed), found) in enumerate(sorted(by_run.items(), key=lambda item: item[0])):
         if progress is not None:
             progress(done, len(by_run), note=f"{scenario}, seed {seed}")
-        with mistakes(ValueError, FileNotFoundError):
-            recording = record(known[scenario], seed if seal is None else seal.seed(scenario, seed))
+        recording = record(known[scenario], seal.seed(scenario, seed))
         for result, chosen in found:
             trial, thinned = trials.read(path, result.key, recording)
             now = [n for n in chosen if not (thinned and SCORES[n].uses_covariance and n in result.scores)]
@@ -166,13 +150,12 @@ def _store(path: Path, kept: list[Result], changed: Mapping[str, Mapping[str, fl
         store.rescore(path, scores, whole)
 
 
-def _sealed_alike(kept: list[Result], seal: Seal | None) -> list[Result]:
+def _sealed_alike(kept: list[Result], seal: Seal) -> list[Result]:
     """The results of a key, or those with public seeds; all of the others cannot be recorded again."""
-    wanted = "" if seal is None else seal.hash
-    mine = [r for r in kept if r.provenance.seal == wanted]
+    mine = [r for r in kept if r.provenance.seal == seal.hash]
     if mine:
         return mine
-    if seal is None:
+    if not seal.secret:
         raise RequestError("the seeds of these results are sealed; give the key, with --key KEYFILE")
     hashes = sorted({r.provenance.seal for r in kept} - {""})
     raise RequestError(
@@ -182,9 +165,7 @@ def _sealed_alike(kept: list[Result], seal: Seal | None) -> list[Result]:
     )
 
 
-def _scenarios(
-    examples: Mapping[str, Result], given: Iterable[Scenario], seal: Seal | None = None
-) -> dict[str, Scenario]:
+def _scenarios(examples: Mapping[str, Result], given: Iterable[Scenario], seal: Seal) -> dict[str, Scenario]:
     """The scenarios of results, by id, as they were when the results were computed."""
     from simnav.scenario import load
 
@@ -197,8 +178,7 @@ def _scenarios(
                 raise RequestError(
                     f"scenario {scenario} is not in the catalogue; give its file with --scenario"
                 ) from error
-        known = recording_digest(found[scenario], simulator)
-        if (known if seal is None else seal.recording(known)) != result.recording:
+        if seal.recording(recording_digest(found[scenario], simulator)) != result.recording:
             raise RequestError(
                 f"the recordings of {scenario} cannot be made again, for the scenario or the simulator has changed "
                 "since; run the campaign again"

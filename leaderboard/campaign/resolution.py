@@ -18,7 +18,7 @@ from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, variant
 from simnav.leaderboard.campaign.isolation import isolate
-from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav
+from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
 from simnav.leaderboard.campaign.session_class import carry, is_session
 from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -32,17 +32,18 @@ _MEMORY = 2 << 30  # likewise [bytes]
 def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path], alone: bool) -> Entrant:
     """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
     name, source = request.name, ""
-    file = re.fullmatch(r"(.*\.py)(:\w+)?", name, flags=re.DOTALL)
+    file = file_of(name)
     parameters = {key: _absolute(value) for key, value in request.parameters.items()}
     if file:
-        name = f"{Path(file[1]).resolve()}{file[2] or ''}"
+        name = f"{Path(file).resolve()}{name.removeprefix(file)}"
         entrant = Entrant(name, parameters, request.label, False, "")
     elif request.point:
         if confinement == "none":
             raise RequestError(f"estimator {request.name!r}: a package that is not trusted is not run unconfined")
         entrant = Entrant(name, parameters, request.label, False, "", point=request.point, search=request.search)
     else:
-        _import_estimators()
+        with contextlib.suppress(ImportError):  # ours, once here, so that forked processes need not do it
+            importlib.import_module("simnav.estimators")
         with mistakes(EstimatorError):
             cls = request.cls or find(name)
         entrant = Entrant(name, parameters, request.label, False, "", point=point_of(cls.name))
@@ -90,14 +91,7 @@ def _describe(entrant: Entrant) -> dict[str, Any]:
     """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
     made = entrant.make()
     cls = type(made)
-    facts = {"reference": cls.reference, "source": estimator_source(cls), "failure": ""}
-    return {**facts, "learned_from": declared_ranges(made)}
-
-
-def _import_estimators() -> None:
-    """Our own estimators, imported once here, so that forked processes need not do it."""
-    with contextlib.suppress(ImportError):
-        importlib.import_module("simnav.estimators")
+    return {"reference": cls.reference, "source": estimator_source(cls), "learned_from": declared_ranges(made)}
 
 
 def variant_of(entrant: Entrant, recording: str) -> str:

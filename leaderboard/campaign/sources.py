@@ -24,7 +24,7 @@ from types import MappingProxyType
 import simnav
 from simnav.plugins import code_text
 
-__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "followed", "is_installed"]
+__all__ = ["LIBRARY", "code_digest", "code_of", "digest", "files_digest", "followed", "is_installed"]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
 LIBRARY = Path(simnav.__file__).parent
@@ -258,6 +258,11 @@ def followed(
     return dict(sorted(walk.found.items()))
 
 
+def code_digest(code: Mapping[str, str]) -> str:
+    """Digest of all that `followed` gave."""
+    return digest(*(part for item in code.items() for part in item))
+
+
 class _Walk:
     """Modules that were found, and those whose imports are still to be followed."""
 
@@ -279,7 +284,7 @@ class _Walk:
 
     def file(self, path: Path, start: Path) -> None:
         """Take a file of others; ``start`` is the folder that its name is relative to."""
-        name = f"file {_relative(path, start)}"
+        name = f"file {Path(os.path.relpath(path, start)).as_posix()}"
         if name not in self.found:
             try:
                 self._add(name, path, "", start)
@@ -353,7 +358,3 @@ def _place(module: str) -> Path | None:
         return path / "__init__.py"
     path = path.with_name(f"{path.name}.py")
     return path if parts and path.is_file() else None
-
-
-def _relative(path: Path, start: Path) -> str:
-    return Path(os.path.relpath(path, start)).as_posix()

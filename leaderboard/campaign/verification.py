@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError, sentence
 from simnav.scenario import load
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
-__all__ = ["CLOSE", "Comparison", "Verification", "compared", "listed", "verify_results"]
+__all__ = ["CLOSE", "Comparison", "Verification", "compared", "listed", "request_of", "verify_results"]
 
 #: Relative difference of a score that was computed from a trial in single precision.
 CLOSE = 1e-6
@@ -78,37 +78,18 @@ class Verification:
 
 def verify_results(
     folder: Path,
-    seal: Seal | None = None,
+    seal: Seal = PUBLIC,
     *,
     sample: int = 10,
     scenarios: Sequence[Scenario] = (),
     estimators: Sequence[EstimatorRequest] = (),
     progress: Callable[..., None] | None = None,
 ) -> Verification:
-    """Check the seal of all results, and repeat a sample drawn at random.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the results.
-    seal : Seal, optional
-        Of the published key; none for public seeds.
-    sample : int
-        How many runs are repeated at most.
-    scenarios, estimators : sequence
-        That are not in the catalogue or not registered.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
-
-    Returns
-    -------
-    Verification
-    """
+    """Check the seal of all results, and repeat a sample of them; see `simnav.leaderboard.inspection.verify`."""
     found = store.load(folder, series=False)
     if not found:
         raise RequestError(f"there are no results in {folder}")
-    wanted = seal.hash if seal is not None else ""
-    mine = [r for r in found if r.provenance.seal == wanted]
+    mine = [r for r in found if r.provenance.seal == seal.hash]
     tried = [r for r in mine if r.status == "ok"]
     chosen = random.SystemRandom().sample(tried, min(sample, len(tried)))
     known = {s.id: s for s in scenarios}
@@ -138,7 +119,7 @@ def verify_results(
                 close.append(f"{what}: {listed(comparison.close)}")
         report(len(chosen), len(chosen))
     return Verification(
-        str(folder), len(found), wanted, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
+        str(folder), len(found), seal.hash, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
         tuple(without), tuple(unknown),
     )  # fmt: skip
 
@@ -146,20 +127,23 @@ def verify_results(
 def _repeat(
     result: Result,
     folder: Path,
-    seal: Seal | None,
+    seal: Seal,
     known: Mapping[str, Scenario],
     requests: Mapping[str, EstimatorRequest],
 ) -> Result:
     scenario = known.get(result.scenario) or load(result.scenario)
-    request = requests.get(result.estimator)
-    if request is None:
-        request = EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
+    request = requests.get(result.estimator) or request_of(result)
     run_campaign(
         [scenario], [request], [result.seed], folder, workers=1, timeout=result.time_limit or None,
-        memory=result.memory_limit or 2 << 30, seal=seal,
+        memory=result.memory_limit or MEMORY, seal=seal,
     )  # fmt: skip
     mine = (result.scenario, result.estimator, result.seed)
     return next(r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)
+
+
+def request_of(result: Result) -> EstimatorRequest:
+    """The registered estimator of a result, with its parameters and its label."""
+    return EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
 
 
 class Comparison(NamedTuple):

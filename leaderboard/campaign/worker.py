@@ -13,13 +13,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.attempts import try_estimator
-from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare
+from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare, try_estimator
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
-from simnav.leaderboard.campaign.seal import Seal
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
@@ -51,10 +50,8 @@ class Unit:
         As in `Result`.
     folder : Path
         Folder of the results.
-    timeout : float
-        Of an estimator [s].
-    memory : int
-        Of an estimator [bytes].
+    limits : Limits
+        Of an estimator.
     scores : OwnScores
         Scores of others that workers must be sent.
     scoring : str
@@ -65,7 +62,7 @@ class Unit:
         Least time between two covariances that are kept [s].
     confinement : str
         ``process``, ``bubblewrap`` or ``none``.
-    seal : Seal, optional
+    seal : Seal
         From which the seed is derived; `seed` is then the number of the run.
     """
 
@@ -75,20 +72,13 @@ class Unit:
     recording: str
     simulator: str
     folder: Path
-    timeout: float
-    memory: int
+    limits: Limits
     scores: OwnScores = field(default_factory=OwnScores)
     scoring: str = ""
     keep_trials: bool = False
     covariance_interval: float = 0.0
     confinement: str = "process"
-    seal: Seal | None = None
-
-    @property
-    def hidden(self) -> tuple[Path, ...]:
-        """What estimators must not read: other results, the trials that are kept, and a secret key."""
-        key = None if self.seal is None else self.seal.file
-        return (self.folder,) if key is None else (self.folder, key)
+    seal: Seal = PUBLIC
 
     @property
     def weight(self) -> float:
@@ -109,12 +99,12 @@ class Unit:
             key=key,
             recording=self.recording,
             simnav=self.simulator,
-            time_limit=self.timeout,
-            memory_limit=self.memory,
+            time_limit=self.limits.timeout,
+            memory_limit=self.limits.memory,
             scoring="{}",  # nothing is scored yet
             scenario_digest=self.scenario.content_hash(),
             estimator_digest=entrant.source,
-            provenance=here(confinement, self.seal.hash if self.seal is not None else ""),
+            provenance=here(confinement, self.seal.hash),
         )
 
 
@@ -137,8 +127,8 @@ def _prepare_worker(unit: Unit) -> None:
     """Start the server of estimators, and load the kernels of this process once."""
     global _prepared
     first, _prepared = not _prepared, True
-    if unit.confinement != "none":
-        prepare(unit.confinement, unit.hidden)  # loads its kernels while the first recording is made
+    if unit.confinement != "none":  # it loads its kernels while the first recording is made
+        prepare(unit.confinement, unit.seal.unreadable(unit.folder))
     if first:
         _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
 
@@ -178,8 +168,8 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     statuses: Counter[str] = Counter()
     recording: Recording | None = None
     try:
-        seed = unit.seed if unit.seal is None else unit.seal.seed(unit.scenario.id, unit.seed)
-        recording = record_within(unit.scenario, seed, max(unit.timeout, time_limit(unit.scenario)))
+        seed = unit.seal.seed(unit.scenario.id, unit.seed)
+        recording = record_within(unit.scenario, seed, max(unit.limits.timeout, time_limit(unit.scenario)))
     except NoRecordingError as error:
         reason = f"no recording: {error}"
         for entrant, key in unit.entrants:
@@ -199,10 +189,8 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
 
     from simnav.scoring import score, series
 
-    limits = Limits(unit.timeout, unit.memory)
-    made = try_estimator(
-        entrant, recording, limits, unit.confinement, unit.hidden, sealed=unit.seal is not None
-    )  # fmt: skip
+    hidden = unit.seal.unreadable(unit.folder)
+    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
     trial = made.trial
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),

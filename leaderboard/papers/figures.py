@@ -193,8 +193,7 @@ class _Sketch:
 
     def _trial(self, scenario: str, method: str) -> Trial | None:
         """A method's run of the first seed, in a process of its own; None where it is not there or gives nothing."""
-        from simnav.leaderboard.campaign.attempts import try_estimator
-        from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+        from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement, try_estimator
         from simnav.leaderboard.campaign.confinement.session import Limits
         from simnav.leaderboard.campaign.resolution import resolve
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-__all__ = ["RequestError", "mistakes", "printable", "sentence", "shortened"]
+__all__ = ["RequestError", "StoreError", "mistakes", "named", "printable", "sentence", "shortened"]
 
 _MOST = 1000  # characters of a message
 
 
 class RequestError(ValueError):
     """A request cannot be carried out; the message is one sentence that says what would be right."""
+
+
+class StoreError(RuntimeError):
+    """A results folder that cannot be used; the message is one sentence."""
 
 
 @contextlib.contextmanager
@@ -37,6 +41,15 @@ def sentence(error: BaseException) -> str:
     else:
         text = str(error)
     return shortened(printable(" ".join(text.split()))) or type(error).__name__
+
+
+def named(error: BaseException) -> str:
+    """The class of an exception, and its message where it has one that can be had."""
+    try:
+        text = str(error)
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def printable(text: str) -> str:

@@ -9,10 +9,12 @@ of ``provenance``, in CSV and Parquet columns of its own.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +45,7 @@ _UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
 _DEGREES = math.degrees(1.0)
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
-#: Column -> attribute: what made a result, and is its own.
+#: Column -> attribute: digests of scenario, estimator and simulator, and limits.
 _ORIGIN = {
     "scenario_digest": "scenario_digest",
     "estimator_digest": "estimator_digest",
@@ -51,8 +53,6 @@ _ORIGIN = {
     "time_limit_s": "time_limit",
     "memory_limit_bytes": "memory_limit",
 }
-_PROVENANCE = ("benchmark", "commit", "dirty", "simnav", "python", "numpy", "numba", "gtsam", "system", "cpu", "cores",
-               "confinement", "seal", "date")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _run(result: Result) -> dict[str, Any]:
     scores = ((name, float(result.scores.get(name, math.nan))) for name in SCORES)
     return {
         **{name: plain(getattr(result, name)) for name in (*_FACTS, *_COSTS)},
-        **_origin(result),
+        **{column: getattr(result, name) for column, name in _ORIGIN.items()},
         "provenance": result.provenance.id,
         "scores": {name: value if math.isfinite(value) else None for name, value in scores},
     }
@@ -127,7 +127,7 @@ def write_json(document: Document, path: Path) -> list[Path]:
     head = json.dumps(document._head(), indent=1, allow_nan=False, ensure_ascii=False)
     results = document.results if len(document.results) <= MOST_IN_JSON else ()
     lines = (json.dumps(_run(r), allow_nan=False, ensure_ascii=False, separators=(",", ":")) for r in results)
-    with whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+    with whole(path) as part, open(part, "w", encoding="utf-8") as file:
         file.write(head[: head.rindex("}")].rstrip() + ',\n "results": [')
         for k, line in enumerate(lines):
             file.write((",\n  " if k else "\n  ") + line)
@@ -140,17 +140,7 @@ def write_csv(document: Document, path: Path) -> list[Path]:
     """A row a run; a score that does not apply is an empty cell."""
     from pyarrow import csv
 
-    with whole(path) as partial:
-        writer = None
-        try:
-            for chunk in document.tables():
-                rows = _with_units(chunk)
-                writer = writer or csv.CSVWriter(partial, rows.schema)
-                writer.write_table(rows)
-        finally:
-            if writer is not None:
-                writer.close()
-    return [path]
+    return _write_tables(path, map(_with_units, document.tables()), csv.CSVWriter)
 
 
 def _with_units(rows: pa.Table) -> pa.Table:
@@ -177,15 +167,15 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
     """The same rows as Parquet, a column a score, in SI units and radians."""
     import pyarrow.parquet as pq
 
-    with whole(path) as partial:
-        writer = None
-        try:
-            for chunk in document.tables():
-                writer = writer or pq.ParquetWriter(partial, chunk.schema, compression="zstd")
-                writer.write_table(chunk)
-        finally:
-            if writer is not None:
-                writer.close()
+    return _write_tables(path, document.tables(), partial(pq.ParquetWriter, compression="zstd"))
+
+
+def _write_tables(path: Path, tables: Iterator[pa.Table], writer: Callable[[Path, pa.Schema], Any]) -> list[Path]:
+    """Write one table after the other, at least one, with a writer of pyarrow."""
+    first = next(tables)
+    with whole(path) as part, writer(part, first.schema) as file:
+        for table in itertools.chain([first], tables):
+            file.write_table(table)
     return [path]
 
 
@@ -217,11 +207,7 @@ def table(results: Sequence[Result]) -> pa.Table:
     return pa.table(columns)
 
 
-def _origin(result: Result) -> dict[str, Any]:
-    """Digests of scenario, estimator and simulator, and limits."""
-    return {column: getattr(result, name) for column, name in _ORIGIN.items()}
-
-
 def _provenance(provenance: Provenance) -> dict[str, Any]:
     """Columns of a provenance, with its id."""
-    return {"provenance": provenance.id} | {name: getattr(provenance, name) for name in _PROVENANCE}
+    facts = provenance.to_dict()
+    return {"provenance": facts.pop("id"), **facts}

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import csv
+import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-__all__ = ["whole", "write_whole"]
+__all__ = ["csv_text", "whole", "write_whole"]
 
 
 @contextlib.contextmanager
@@ -38,3 +40,14 @@ def write_whole(path: Path, content: str | bytes) -> Path:
     with whole(path) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
     return path
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    r"""Rows of values as a text of CSV.
+
+    >>> csv_text([("row", "score"), ("ekf", 1.5)])
+    'row,score\nekf,1.5\n'
+    """
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

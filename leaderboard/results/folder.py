@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
+from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import FORMAT, READABLE, batches
 
@@ -35,7 +36,6 @@ __all__ = [
     "LOOSE",
     "PROVENANCE",
     "DamagedError",
-    "StoreError",
     "StoreWarning",
     "atomic",
     "contents",
@@ -61,10 +61,6 @@ _STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
 T = TypeVar("T")
-
-
-class StoreError(RuntimeError):
-    """A results folder that cannot be used; the message is one sentence."""
 
 
 class StoreWarning(UserWarning):

@@ -10,36 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.folder import COMPACTED, LOOSE, DamagedError, tables_of
 from simnav.leaderboard.results.provenance import BENCHMARK
-from simnav.leaderboard.results.store import StoreError
 
 __all__ = ["gather"]
 
 
 def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[str]]) -> Path:
-    """Put the results of several folders into one, as of the parts of one campaign.
-
-    The folders stay as they are. A run that several of them hold counts once. The copy of a file that is damaged is set
-    aside, with a warning.
-
-    Parameters
-    ----------
-    output : path
-        A new or empty folder, or one of results, which are kept.
-    folders : iterable of path
-        Folders of results, as campaigns wrote them.
-
-    Returns
-    -------
-    Path
-        Of the output.
+    """Put the results of several folders into one, and return its path; see `simnav.leaderboard.inspection.merge`.
 
     Raises
     ------
     StoreError
-        If a folder cannot be used, if the folders belong to different versions of the benchmark, or if a scenario, the
-        simulator or an estimator differs between them. Then the output is as it was.
+        If a folder cannot be used, or the results do not go together. Then the output is as it was.
     """
     paths, target = [Path(folder) for folder in folders], Path(output)
     markers = [(path, store.described(path)) for path in (target, *paths)]

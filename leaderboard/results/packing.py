@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -131,7 +131,7 @@ def _file_name(label: str) -> str:
     >>> _file_name("ekf"), _file_name("ekf(gate=3)")
     ('ekf', 'ekf-gate-3-499a09')
     """
-    plain: Any = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")[:60]
+    plain = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")[:60]
     if plain == label:
         return label
     return f"{plain}-{hashlib.blake2b(label.encode(), digest_size=3).hexdigest()}"

@@ -280,17 +280,13 @@ def rows(
     series : callable, optional
         Gives the series of a row of the table, where the column is missing.
     """
-    columns: dict[str, list[Any]] = {}
-    for name in table.column_names:
-        if name in ("scores", "series"):
-            continue
-        convert = _CONVERTED.get(name)
-        if name == "provenance":
-            columns[name] = _shared(table.column(name), lambda t: provenances.get(t) or Provenance(identity=t))
-        elif convert is not None:
-            columns[name] = _shared(table.column(name), convert)
-        else:
-            columns[name] = listed(table.column(name))
+    converted: dict[str, Callable[[str], Any]] = {
+        "parameters": json.loads,
+        "draws": json.loads,
+        "provenance": lambda identity: provenances.get(identity) or Provenance(identity=identity),
+    }
+    plain = [name for name in table.column_names if name not in _HEAVY]
+    columns = {name: listed(table.column(name), converted.get(name)) for name in plain}
     columns["scores"] = _scores(table.column("scores"), scores)
     if "series" in table.column_names:
         found = SeriesColumn(table.column("series"))
@@ -302,16 +298,10 @@ def rows(
         yield Result(**dict(zip(names, values, strict=True)))
 
 
-_CONVERTED: dict[str, Callable[[str], Any]] = {"parameters": json.loads, "draws": json.loads}
-
-
-def listed(column: pa.ChunkedArray) -> list[Any]:
-    """The values of a column; equal texts are one object."""
-    return _shared(column, None) if column.type == "string" else list(column.to_pylist())
-
-
-def _shared(column: pa.ChunkedArray, convert: Callable[[str], Any] | None) -> list[Any]:
-    """The values of a column of texts, each text made and converted once."""
+def listed(column: pa.ChunkedArray, convert: Callable[[str], Any] | None = None) -> list[Any]:
+    """The values of a column; equal texts are one object, converted once."""
+    if column.type != "string":
+        return list(column.to_pylist())
     encoded = column.combine_chunks().dictionary_encode()
     texts = encoded.dictionary.to_pylist()
     values = texts if convert is None else [convert(t) for t in texts]

@@ -22,13 +22,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.folder import (
     COMPACTED,
     FILES,
     LOOSE,
     PROVENANCE,
     DamagedError,
-    StoreError,
     StoreWarning,
     atomic,
     contents,
@@ -150,8 +150,8 @@ def keys(folder: str | os.PathLike[str]) -> dict[str, Ending]:
         # campaign of many results would wait; what is damaged elsewhere in it is found when it is loaded.
         for _, tables in contents(path, ["key", *Ending._fields], schema().names):
             for table in tables:
-                statuses, limits, memories, codes = (listed(table.column(name)) for name in Ending._fields)
-                for key, *ending in zip(listed(table.column("key")), statuses, limits, memories, codes, strict=True):
+                columns = [listed(table.column(name)) for name in ("key", *Ending._fields)]
+                for key, *ending in zip(*columns, strict=True):
                     found.setdefault(key, Ending(*ending))
         return found
 

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.results.store import StoreError, atomic
+from simnav.leaderboard.results.errors import StoreError
+from simnav.leaderboard.results.folder import atomic
 from simnav.trial import Trial
 from simnav.types import Array, NavigationStates
 

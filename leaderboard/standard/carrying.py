@@ -11,23 +11,20 @@ that computed it. What was repeated is recorded in a CSV file, one line for each
 
 from __future__ import annotations
 
-import csv
-import io
 import random
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
-from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.verification import compared, listed
+from simnav.leaderboard.campaign.verification import compared, listed, request_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
@@ -91,27 +88,7 @@ def carry(
     workers: int = 2,
     progress: Callable[[Progress], None] | None = None,
 ) -> Carried:
-    """Repeat runs of results that are out of date, and give those the keys of today whose scores are the same.
-
-    Parameters
-    ----------
-    folder : Path
-        Packed results; replaced as a whole.
-    record : Path
-        CSV file to which a line is added: date, commit, what was carried over, and how many runs were repeated.
-    runs : int
-        How many runs of each scenario and estimator are repeated, drawn at random from those that are stored; all where
-        there are fewer.
-    workers : int
-        Processes.
-    progress : callable, optional
-        As for `simnav.leaderboard.campaign.campaign.run_campaign`.
-
-    Raises
-    ------
-    RequestError
-        If ``runs`` is below 1, or the code differs from the commit that the record would name.
-    """
+    """Repeat runs of results that are out of date; see `simnav.leaderboard.publishing.carry_standard`."""
     if runs < 1:
         raise RequestError(f"runs = {runs}: at least one run of each scenario and estimator has to be repeated")
     provenance = here()
@@ -128,7 +105,7 @@ def carry(
     with tempfile.TemporaryDirectory(prefix="simnav-carry-") as name:
         for k, (rows, seeds) in enumerate(_campaigns(stale, runs)):
             scenarios = list({s: stale[s, label][0] for s, label in rows}.values())
-            requests = list({label: _request(of[s, label][0]) for s, label in rows}.values())
+            requests = list({label: request_of(of[s, label][0]) for s, label in rows}.values())
             place = Path(name) / str(k)
             run_campaign(scenarios, requests, seeds, place, workers=workers, progress=progress)
             again = {(r.scenario, r.estimator, r.seed): r for r in store.load(place, series=False)}
@@ -194,10 +171,6 @@ def _campaigns(stale: Mapping[_Row, tuple[Scenario, list[int]]], runs: int) -> l
     return found
 
 
-def _request(result: Result) -> EstimatorRequest:
-    return EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
-
-
 def _difference(stored: Result, fresh: Result) -> str:
     """What is not the same; empty where all scores are, to the last digit that is stored."""
     if stored.status != fresh.status:
@@ -213,9 +186,6 @@ def _rekeyed(result: Result, fresh: Result) -> Result:
 
 def _add(path: Path, line: _Line) -> None:
     """Add a line to the record; it begins with the names of its columns."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    if not path.exists():
-        writer.writerow(f.name for f in fields(_Line))
-    writer.writerow(asdict(line).values())
-    write_whole(path, (path.read_text(encoding="utf-8") if path.exists() else "") + text.getvalue())
+    facts = asdict(line)
+    before = path.read_text(encoding="utf-8") if path.exists() else csv_text([facts.keys()])
+    write_whole(path, before + csv_text([facts.values()]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import warnings
 from collections.abc import Collection, Iterable
@@ -18,7 +17,7 @@ from simnav.leaderboard.campaign.fingerprint import (
     simulator_version,
     variant,
 )
-from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
+from simnav.leaderboard.campaign.own_scores import changed_code, scoring_code
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.provenance import BENCHMARK
@@ -106,9 +105,8 @@ def outdated(folder: str | os.PathLike[str], without: Collection[tuple[str, str]
     found: dict[Change, set[str]] = {"row": set(), "scenario": set(), "gone": set()}
     for (scenario, label), change in changes(results).items():
         found[change].add(label if change == "row" else scenario)
-    now, scores = scoring_code(), set[str]()
-    for text in {r.scoring for r in results if r.scores or r.scoring != "{}"}:
-        scores |= _changed(text, now)
+    now, codes = scoring_code(), {r.scoring for r in results if r.scores or r.scoring != "{}"}
+    scores = {home for code in codes for home in changed_code(code, now)}
     rows, scenarios, gone = (tuple(sorted(found[change])) for change in ("row", "scenario", "gone"))
     return Outdated(rows, scenarios, tuple(sorted(scores)), gone)
 
@@ -156,10 +154,3 @@ def _source(name: str) -> str:
     except EstimatorError:
         return ""
     return estimator_source(cls) if comes_with_simnav(cls) else ""
-
-
-def _changed(before: str, now: str) -> set[str]:
-    if not scoring_differs(before, now):
-        return set()
-    old, new = json.loads(before or "{}"), json.loads(now)
-    return {home for home, code in old.items() if new.get(home) != code} or {"all"}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 from simnav.leaderboard.ranking.tables import number
 from simnav.leaderboard.ranking.tracks import title
 from simnav.leaderboard.results.citation import TITLE, Citation
-from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.site.content import SiteFacts
 from simnav.leaderboard.site.pages import environment
 from simnav.leaderboard.standard.history import Line, editions
@@ -91,7 +89,7 @@ class EditionPage:
         place = folder / f"edition-{self.number}"
         place.mkdir(exist_ok=True)
         for name, caption, rows in self.tables:
-            write_whole(place / f"{name}.csv", _csv(rows))
+            write_whole(place / f"{name}.csv", csv_text([_COLUMNS, *rows]))
             write_whole(place / f"{name}.tex", _latex(f"{TITLE}. {self.title}. {caption}.", rows))
         page = environment().get_template("edition.html")
         write_whole(folder / self.page, page.render(edition=self, columns=_COLUMNS, page=self.page, site=site))
@@ -106,13 +104,6 @@ def pages_of(lines: Sequence[Line]) -> list[EditionPage]:
 def _cells(line: Line) -> tuple[str, ...]:
     interval = f"{number(line.low)} – {number(line.high)}" if line.low == line.low else ""
     return (line.ranks or "–", line.row, number(line.score), interval, str(line.runs), str(line.failed), line.code)
-
-
-def _csv(rows: Sequence[Sequence[str]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([_COLUMNS, *rows])
-    return text.getvalue()
 
 
 def _latex(caption: str, rows: Sequence[Sequence[str]]) -> str:

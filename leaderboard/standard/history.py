@@ -7,15 +7,15 @@ quoted can be found. The column ``code`` is the version of a row: the digest of 
 from __future__ import annotations
 
 import csv
-import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
 
@@ -65,6 +65,8 @@ class Line:
 
 
 _NAMES = [f.name for f in fields(Line)]
+_OF_TYPE: dict[Any, Callable[[str], Any]] = {"int": int, "str": str, "float": lambda cell: float(cell or "nan")}
+_READ = [_OF_TYPE[f.type] for f in fields(Line)]  # by column
 
 
 def lines_of(ranking: Ranking, results: Sequence[Result], edition: int) -> list[Line]:
@@ -112,9 +114,7 @@ def read(path: Path) -> list[Line]:
             try:
                 if len(row) != len(_NAMES):
                     raise ValueError(f"{len(row)} values where {len(_NAMES)} are wanted")
-                found.append(
-                    Line(int(row[0]), *row[1:8], *(float(v) if v else math.nan for v in row[8:11]), *map(int, row[11:]))  # type: ignore[arg-type]
-                )
+                found.append(Line(*(read_cell(cell) for read_cell, cell in zip(_READ, row, strict=True))))
             except ValueError as error:
                 raise RequestError(f"{path}, line {number}: {error}") from None
     return found
@@ -127,7 +127,7 @@ def append(path: Path, ranking: Ranking, results: Sequence[Result]) -> int:
     lines = lines_of(ranking, results, last + 1)
     if _facts(lines) == _facts(line for line in before if line.edition == last):
         return last
-    write_whole(path, _text([*before, *lines]))
+    write_whole(path, csv_text([_NAMES, *map(_cells, [*before, *lines])]))
     return last + 1
 
 
@@ -148,11 +148,3 @@ def _cells(line: Line) -> list[str]:
     values = [getattr(line, name) for name in _NAMES]
     return ["" if isinstance(v, float) and math.isnan(v) else f"{v:.5g}" if isinstance(v, float) else str(v)
             for v in values]  # fmt: skip
-
-
-def _text(lines: Iterable[Line]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_NAMES)
-    writer.writerows(_cells(line) for line in lines)
-    return text.getvalue()

@@ -106,28 +106,7 @@ def _of_simnav(label: str) -> bool:
 def publish(
     working: Path, profile: Profile, folder: Path, history: Path, readme: Path | None, *, preliminary: bool = False
 ) -> Published:
-    """Pack the results of a profile, add an edition to the history, and write the tables of the README.
-
-    Results that the profile does not name, as those of submissions, are published as long as they are not out of date.
-
-    Parameters
-    ----------
-    working : Path
-        Folder of the results; it may be the one that is written.
-    profile : Profile
-        That they should hold as a whole.
-    folder, history : Path
-        Packed results and file of the history.
-    readme : Path or None
-        With the marks of `simnav.leaderboard.standard.readme`.
-    preliminary : bool
-        Also if runs are missing. The tables then say how many are there, and the history gets no edition.
-
-    Raises
-    ------
-    RequestError
-        If runs of the profile are missing, or some were made with other code than today's. Then nothing is written.
-    """
+    """Pack results, add an edition, and write tables; see `simnav.leaderboard.publishing.publish_standard`."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", store.StoreWarning)
         found = store.load(working, series=False)

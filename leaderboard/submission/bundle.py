@@ -19,8 +19,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.files import whole
 from simnav.leaderboard.submission.archive import digest_of, opened, unpack, write_archive
 
 __all__ = ["SUFFIX", "Bundle", "Contents", "File", "Row", "open_bundle", "write_bundle"]
@@ -203,14 +204,11 @@ def write_bundle(
         estimators=tuple(estimators), requires=tuple(requires), files=facts,
     )  # fmt: skip
     files[_MANIFEST] = (json.dumps(contents.model_dump(), indent=1, sort_keys=True) + "\n").encode()
-    part = path.with_name(f".{path.name}.part")
     try:
-        write_archive(part, files)
-        part.replace(path)
+        with whole(path) as part:
+            write_archive(part, files)
     except OSError as error:
         raise RequestError(f"{path} cannot be written: {error.strerror or error}") from None
-    finally:
-        part.unlink(missing_ok=True)
     return digest_of(path)
 
 
@@ -273,7 +271,7 @@ def _check_rows(contents: Contents, what: str, files: Mapping[str, Path]) -> Non
     for row in contents.estimators:
         if is_own(row.label) or (row.point and is_own(row.name)):
             raise RequestError(f"{what}: {row.label} is a name of one of simnav's own estimators; choose another one")
-        file = row.name.partition(".py")[0] + ".py"
+        file = file_of(row.name)
         if contents.main.endswith(".whl"):
             if not row.point:
                 raise RequestError(f"{what}: {row.label}: the entry point of the package is missing")

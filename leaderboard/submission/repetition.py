@@ -17,7 +17,7 @@ from typing import Any
 
 from simnav.leaderboard.campaign.campaign import MEMORY, Progress, run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.seal import Seal
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import sentence
 from simnav.leaderboard.results.provenance import here
@@ -78,8 +78,7 @@ class Asked:
 
     def text(self) -> str:
         """As one line."""
-        rows = [{"name": e.name, "parameters": dict(e.parameters), "label": e.label, "point": e.point,
-                 "search": list(e.search)} for e in self.estimators]  # fmt: skip
+        rows = [{**vars(e), "cls": None} for e in self.estimators]
         return json.dumps({**vars(self), "estimators": rows, "runs": [asdict(w) for w in self.runs]})
 
     @classmethod
@@ -102,8 +101,8 @@ class Again:
         As in `simnav.leaderboard.results.result.Result`; ``not-run`` where it could not be tried.
     key, recording : str
         Likewise.
-    scores : mapping of str to str
-        Each as `float.hex` writes it, so that all bits and NaN travel.
+    scores : mapping of str to float
+        All their bits travel, and NaN.
     """
 
     scenario: str
@@ -114,13 +113,13 @@ class Again:
     reason: str
     key: str = ""
     recording: str = ""
-    scores: Mapping[str, str] = field(default_factory=dict)
+    scores: Mapping[str, float] = field(default_factory=dict)
 
 
 def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
     """Repeat the runs; returns them, and the provenance of this environment."""
     requests = {e.label: e for e in asked.estimators}
-    seal = Seal(bytes.fromhex(asked.key)) if asked.key else None
+    seal = Seal(bytes.fromhex(asked.key))
     found: dict[tuple[bool, str, str, int], Again] = {}
     total, done = sum(len(w.seeds) for w in asked.runs), 0
     for sealed in (False, True):  # in one folder, because the estimators' processes are made for one
@@ -130,7 +129,7 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
             try:
                 run_campaign(
                     [load(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder, workers=1,
-                    timeout=wanted.time_limit or None, confinement=asked.confinement, seal=seal if sealed else None,
+                    timeout=wanted.time_limit or None, confinement=asked.confinement, seal=seal if sealed else PUBLIC,
                     memory=wanted.memory_limit or MEMORY, progress=partial(_noted, progress, done, total, what),
                 )  # fmt: skip
             except Exception as error:
@@ -143,7 +142,7 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
             if bool(r.provenance.seal) == sealed:
                 found[sealed, r.scenario, r.estimator, r.seed] = Again(
                     r.scenario, r.estimator, r.seed, sealed, r.status, r.reason, r.key, r.recording,
-                    {name: float(value).hex() for name, value in r.scores.items()},
+                    dict(r.scores),
                 )  # fmt: skip
     return {"runs": [asdict(a) for a in found.values()], "provenance": here().to_dict()}
 

@@ -17,7 +17,7 @@ from typing import Any
 from simnav.estimator import find, names
 from simnav.estimator.registry import GROUP, point_of
 from simnav.leaderboard.campaign.fingerprint import named_files
-from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, request
+from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of, request
 from simnav.leaderboard.campaign.sources import code_of, followed
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.submission.archive import write_archive
@@ -86,7 +86,7 @@ def source_of(given: str, parameters: Mapping[str, Any], scratch: Path, requires
                 "the estimator, and let a default of its constructor name it relative to __file__"
             )
     first = asked[0]
-    if ".py" in first.name:
+    if file_of(first.name):
         return _file(first, requires)
     with mistakes():
         cls = find(first.name)
@@ -117,7 +117,7 @@ def _normal(name: str) -> str:
 
 
 def _file(asked: EstimatorRequest, requires: tuple[str, ...]) -> Source:
-    path = Path(asked.name.partition(".py")[0] + ".py").expanduser().resolve()
+    path = Path(file_of(asked.name)).expanduser().resolve()
     if not path.is_file():
         raise RequestError(f"there is no file {path}")
     folder, files = path.parent, dict[Path, None]()

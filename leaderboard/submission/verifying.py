@@ -10,12 +10,13 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
+from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.verification import listed
 from simnav.leaderboard.profiles import load as load_profile
 from simnav.leaderboard.profiles import profiles
@@ -29,7 +30,6 @@ from simnav.scenario import load as load_scenario
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["TOLERANCE", "SealedRuns", "SubmissionReport", "runs_of", "verify_bundle"]
@@ -135,35 +135,14 @@ class SubmissionReport:
 
 def verify_bundle(
     path: Path,
-    seal: Seal | None = None,
+    seal: Seal = PUBLIC,
     *,
     sample: int = 10,
     present: bool = False,
     tolerance: float = TOLERANCE,
     progress: Callable[..., None] | None = None,
 ) -> SubmissionReport:
-    """Check a submission, and repeat some of its runs.
-
-    Parameters
-    ----------
-    path : Path
-        The bundle.
-    seal : Seal, optional
-        A key whose seeds the submission cannot know. The estimators are run on them, and should be no worse there.
-    sample : int
-        Runs that are repeated at most.
-    present : bool
-        Repeat in the present environment. By default a new one is made.
-    tolerance : float
-        Largest relative difference of a score that counts as the same.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
-
-    Raises
-    ------
-    RequestError
-        If the file is no bundle or was changed, or if no environment can be made: one sentence.
-    """
+    """Check a submission, and repeat some of its runs; see `simnav.leaderboard.publishing.verify_bundle`."""
     report = progress or (lambda *_, **__: None)
     with mistakes(ValueError):
         confinement = chosen_confinement("auto")
@@ -175,7 +154,7 @@ def verify_bundle(
         results = _results(bundle)
         findings = [*_incomplete(bundle, results), *_strange(bundle, results)]
         chosen = _sample(results, sample)
-        wanted = [*_wanted(chosen), *(_sealed(bundle, results, sample) if seal is not None else ())]
+        wanted = [*_wanted(chosen), *(_sealed(bundle, results, sample) if seal.secret else ())]
         provenance = distinct(r.provenance for r in results)
         python = Path(sys.executable)
         if not present:
@@ -183,8 +162,7 @@ def verify_bundle(
             python = clean_python(home / "env", vars(provenance[0]) if provenance else {})
             install_requirements(python, bundle.contents.requires, home / "packages")
         asked = Asked(
-            str(home / "runs"), bundle.requests(home / "packages"), wanted,
-            seal.key.hex() if seal is not None else "", confinement,
+            str(home / "runs"), bundle.requests(home / "packages"), wanted, seal.key.hex(), confinement,
         )  # fmt: skip
         again, where = _repeated(python, asked, home, not present, report)
     known = {(r.scenario, r.estimator, r.seed): r for r in chosen}
@@ -192,9 +170,12 @@ def verify_bundle(
     for run in (a for a in again if not a.sealed):
         before = known[run.scenario, run.label, run.seed]
         said = _difference(before, run, tolerance, where)
-        identical += said == "" and _same_bits(before, run)
-        close += said == "" and not _same_bits(before, run)
-        different += [f"{run.label} on {run.scenario}, seed {run.seed}: {said}"] if said else []
+        if said:
+            different.append(f"{run.label} on {run.scenario}, seed {run.seed}: {said}")
+        elif _same_bits(before, run):
+            identical += 1
+        else:
+            close += 1
         unknown |= dict.fromkeys(n for n in before.scores if run.scores and n not in run.scores)
     missing = len(chosen) - identical - close - len(different)
     if missing > 0:
@@ -356,7 +337,7 @@ def _versions(where: Provenance) -> str:
 def _compared_scores(before: Result, again: Again) -> dict[str, tuple[float, float]]:
     """The scores that both have, wall times aside; a score of a plug-in may be known in one place only."""
     return {
-        name: (value, float.fromhex(again.scores[name]))
+        name: (value, again.scores[name])
         for name, value in before.scores.items()
         if name in again.scores and not name.startswith("update_")
     }
@@ -407,18 +388,15 @@ def _compared(results: Sequence[Result], again: Sequence[Again]) -> tuple[Sealed
     for scenario, label in sorted({(a.scenario, a.label) for a in again}):
         public = [_error(r.status, r.scores) for r in results if (r.scenario, r.estimator) == (scenario, label)]
         mine = [a for a in again if (a.scenario, a.label) == (scenario, label)]
-        sealed = [_error(a.status, {n: float.fromhex(v) for n, v in a.scores.items()}) for a in mine]
+        sealed = [_error(a.status, a.scores) for a in mine]
         failed = sum(a.status != "ok" for a in mine)
-        found.append((label, scenario, public, sealed, failed, _rank_test(public, sealed)))
-    order = sorted(range(len(found)), key=lambda k: found[k][5])
-    adjusted, largest = dict[int, float](), 0.0
-    for place, k in enumerate(order):  # Holm (1979)
-        largest = max(largest, min(1.0, (len(order) - place) * found[k][5]))
-        adjusted[k] = largest
-    return tuple(
-        SealedRuns(label, scenario, len(public), len(sealed), failed, _ratio(public, sealed), adjusted[k])
-        for k, (label, scenario, public, sealed, failed, _) in enumerate(found)
-    )
+        ratio, p_value = _ratio(public, sealed), _rank_test(public, sealed)
+        found.append(SealedRuns(label, scenario, len(public), len(sealed), failed, ratio, p_value))
+    largest, adjusted = 0.0, dict[SealedRuns, float]()
+    for place, one in enumerate(sorted(found, key=lambda s: s.p_value)):  # Holm (1979)
+        largest = max(largest, min(1.0, (len(found) - place) * one.p_value))
+        adjusted[one] = largest
+    return tuple(replace(s, p_value=adjusted[s]) for s in found)
 
 
 def _error(status: str, scores: Mapping[str, float]) -> float:

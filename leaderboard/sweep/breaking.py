@@ -110,12 +110,6 @@ def breaking_point(
     low, high, n = math.nan, math.nan, len(y)
     if n >= 3:
         draws = np.random.default_rng(0).integers(0, n, (_RESAMPLES, n))
-        low, high = _percentiles(np.array([found(y[rows])[0] for rows in draws]))
+        values = [found(y[rows])[0] for rows in draws]
+        low, high = np.quantile(values, (0.025, 0.975), method="nearest").tolist()  # some may be infinite
     return BreakingPoint(estimator, criterion, threshold, Interval(value, low, high, n), at)
-
-
-def _percentiles(values: Array) -> tuple[float, float]:
-    """The 95 % interval of values of which some may be infinite."""
-    ordered = np.sort(values)
-    low, high = (int(q * (len(ordered) - 1) + 0.5) for q in (0.025, 0.975))
-    return float(ordered[low]), float(ordered[high])

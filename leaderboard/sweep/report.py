@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from simnav.leaderboard.figures.sweep_figure import Line, Map, error_against_dia
 from simnav.leaderboard.ranking.statistics import Interval, median
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.sweep.breaking import BreakingPoint, breaking_point
+from simnav.leaderboard.sweep.settings import clean_value
 from simnav.scenario import Dial
 from simnav.scoring import SCORES
 
@@ -114,8 +115,8 @@ class Sweep:
         With two dials there is one for each value of the second. Only seeds that were run at every value count.
         """
         found = []
-        dial, values = self.dials[0], self.values[0]
-        clean = values.index(dial.range[0] if dial.clean is None else dial.clean)
+        values = self.values[0]
+        clean = values.index(clean_value(self.dials[0]))
         for e in self.estimators:
             for at in self.values[1] if len(self.dials) == 2 else (None,):
                 rest = () if at is None else (at,)
@@ -129,10 +130,6 @@ class Sweep:
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav sweep --json`` prints, but for the figure; infinite figures are null there."""
         score = SCORES[self.score]
-
-        def figures(i: Interval) -> dict[str, Any]:
-            return {"value": i.value, "low": i.low, "high": i.high, "runs": i.runs}
-
         return {
             "scenario": self.scenario,
             "score": {"name": self.score, "title": score.title, "unit": score.unit},
@@ -142,12 +139,12 @@ class Sweep:
                 for d, v in zip(self.dials, self.values, strict=True)
             ],
             "points": [
-                {"estimator": p.estimator, "values": list(p.values), "failed": p.failed, "error": figures(p.error)}
+                {"estimator": p.estimator, "values": list(p.values), "failed": p.failed, "error": asdict(p.error)}
                 for p in self.points
             ],
             "breaking_points": [
                 {"estimator": b.estimator, "criterion": b.criterion, "threshold": b.threshold, "at": b.at,
-                 "value": figures(b.value)}
+                 "value": asdict(b.value)}
                 for b in self.breaking_points
             ],
             "results": str(self.summary.folder),

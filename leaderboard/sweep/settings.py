@@ -13,8 +13,10 @@ import numpy as np
 from simnav.leaderboard.ranking.ranking import require_lower
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.scenario import Dial, Scenario
+from simnav.spec import closest
 
-__all__ = ["DEFAULT_VALUES", "Setting", "checked_score", "chosen_dials", "parse_dial", "parse_dials", "settings"]
+__all__ = ["DEFAULT_VALUES", "Setting", "checked_score", "chosen_dials", "clean_value", "parse_dial",
+           "parse_dials", "settings"]  # fmt: skip
 
 #: Values of a dial where none are given.
 DEFAULT_VALUES = 7
@@ -125,10 +127,11 @@ def _chosen(scenario: Scenario, name: str, values: list[float]) -> tuple[Dial, l
     else:
         there = closest(name, list(known)) if known else "; it has none, but a key of its file does as well"
         raise RequestError(f"there is no dial {name!r} in {scenario.id}{there}")
-    return dial, sorted({*values, _clean(dial)})
+    return dial, sorted({*values, clean_value(dial)})
 
 
-def _clean(dial: Dial) -> float:
+def clean_value(dial: Dial) -> float:
+    """The value at which a dial disturbs nothing: the lowest one, unless the dial says which."""
     return dial.range[0] if dial.clean is None else dial.clean
 
 

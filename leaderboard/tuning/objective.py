@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -68,7 +68,7 @@ class Figures:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {"objective": self.objective, "ratio": dict(self.ratio), "lost": self.lost, "failed": self.failed}
+        return asdict(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -24,7 +25,7 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.tuning.objective import CLEAN, LARGEST, PRICE, Figures, Voyages, only_training
-from simnav.leaderboard.tuning.space import Range, Scale, space_of
+from simnav.leaderboard.tuning.space import Range, space_of
 from simnav.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -260,35 +261,26 @@ def tune_row(
         only_training(family)
     space, present = space_of(request, vary)
     seeds, later = range(seed, seed + runs), range(seed + runs, seed + runs + unseen)
-    found, chosen, before, after = _chosen(
-        request, Voyages(families, seeds, progress), space, present, evaluations, method, search_seed, progress
-    )
+    voyages = Voyages(families, seeds, progress)
+    objective = partial(_objective, request, voyages)
+    found = search(objective, space, present, evaluations, method, search_seed, progress)
+    chosen = min(found, key=lambda e: e.objective).parameters
+    before, after = voyages.figures(request, present), voyages.figures(request, chosen)
+    if not after.objective < before.objective:
+        chosen, after = present, before
+    del objective, voyages  # they take much memory, and so will the next ones
     fresh = Voyages(families, later, progress)
     return Tuning(
         request.label, space, {f.id: f.content_hash() for f in families}, (seeds[0], seeds[-1]), (later[0], later[-1]),
-        method, search_seed, present, chosen, before, after, fresh.figures(request, present),
+        method, search_seed, present, dict(chosen), before, after, fresh.figures(request, present),
         fresh.figures(request, chosen), found, here().commit, here().date,
     )  # fmt: skip
 
 
-def _chosen(
-    request: EstimatorRequest, voyages: Voyages, space: Sequence[Range], present: Mapping[str, float],
-    evaluations: int, method: Method, search_seed: int, progress: Callable[..., None] | None,
-) -> tuple[tuple[Evaluation, ...], dict[str, float], Figures, Figures]:  # fmt: skip
-    """The search, the parameters that it chose, and what the row is worth before and after on the same voyages."""
-
-    def objective(values: Mapping[str, float]) -> float:
-        return voyages.figures(request, values).objective
-
-    found = search(objective, space, present, evaluations, method, search_seed, progress)
-    best = min(found, key=lambda e: e.objective)
-    before, after = voyages.figures(request, present), voyages.figures(request, best.parameters)
-    if after.objective < before.objective:
-        return found, dict(best.parameters), before, after
-    return found, dict(present), before, before
+def _objective(request: EstimatorRequest, voyages: Voyages, values: Mapping[str, float]) -> float:
+    return voyages.figures(request, values).objective
 
 
 def ranges_of(document: Mapping[str, Any]) -> tuple[Range, ...]:
     """The ranges of a file."""
-    scales: dict[str, Scale] = {"linear": "linear", "log": "log", "integer": "integer"}
-    return tuple(Range(r["name"], r["low"], r["high"], scales[r["scale"]]) for r in document["ranges"])
+    return tuple(Range(**r) for r in document["ranges"])

@@ -1,4 +1,4 @@
-"""One estimator on one recording, in an estimator process."""
+"""One estimator on one recording, where it belongs: in an estimator process, or where it may know the truth."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ import numpy as np
 
 from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.leaderboard.campaign.confinement.cores import own_core
-from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, StoppedError
-from simnav.trial import FailureError, Trial, run_session
+from simnav.leaderboard.campaign.confinement.estimator_process import seed_generators
+from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, NoAnswerError, StoppedError
+from simnav.leaderboard.campaign.isolation import isolate
+from simnav.trial import FailureError, Trial, run_session, run_trial
 from simnav.trial.log import TrialLog
 from simnav.trial.wire import InvalidOutputError
 
@@ -34,6 +36,7 @@ __all__ = [
     "describe",
     "prepare",
     "seed_words",
+    "try_estimator",
 ]
 
 #: What can be asked for; ``auto`` is the strongest that works here.
@@ -87,11 +90,14 @@ def chosen_confinement(asked: str = "auto") -> str:
         if asked in ("bubblewrap", "process"):
             raise ValueError(f"confinement = {asked!r} needs a POSIX system")
         return "none"
-    why_not = bubblewrap.available() if asked in ("auto", "bubblewrap") else ""
-    if asked == "bubblewrap" and why_not:
+    if asked in ("process", "none"):
+        return asked
+    why_not = bubblewrap.available()
+    if not why_not:
+        return "bubblewrap"
+    if asked == "bubblewrap":
         raise ValueError(f"confinement = 'bubblewrap': {why_not}")
-    return "bubblewrap" if asked == "bubblewrap" or (asked == "auto" and not why_not) else (
-        "process" if asked == "auto" else asked)  # fmt: skip
+    return "process"
 
 
 def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, sealed: bool = False) -> EstimatorServer:
@@ -99,14 +105,8 @@ def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, se
 
     Parameters
     ----------
-    confinement : {"process", "bubblewrap"}
-        A process of its own, or that in a sandbox of bubblewrap.
-    hidden : sequence of Path
-        What estimators must not read.
-    loaded : bool
-        With kernels; False will do for looking at estimators.
-    sealed : bool
-        Of a sealed campaign.
+    confinement, hidden, loaded, sealed
+        As of `EstimatorServer`. To look at estimators needs no kernels.
     """
     global _server, _owner
     if _server is not None and _owner != os.getpid():
@@ -164,9 +164,7 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
             trial = run_session(session, recording, log)
             session.end()
         status, reason = trial.status, trial.reason
-    except StoppedError as error:
-        status, reason, trial = error.status, error.reason, None
-    except FailureError as error:  # of the constructor
+    except (StoppedError, FailureError) as error:  # of the constructor, or the process is no more there
         status, reason, trial = error.status, error.reason, None
     except InvalidOutputError as error:
         status, reason, trial = "invalid-output", str(error), None
@@ -176,14 +174,61 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
     return Attempt(status, reason, trial, seconds, session.peak_memory if session else 0, server.confinement)
 
 
+def try_estimator(
+    entrant: Entrant,
+    recording: Recording,
+    limits: Limits,
+    confinement: str,
+    hidden: Sequence[Path] = (),
+    *,
+    sealed: bool = False,
+) -> Attempt:
+    """Run an estimator over a recording; nothing that it does raises here.
+
+    Parameters
+    ----------
+    entrant : Entrant
+        One of simnav's own references runs in a fork of this process, which has the recording; so does anyone under the
+        confinement ``none``.
+    recording : Recording
+        The run, with its truth and labels.
+    limits : Limits
+        Time and memory that it may take.
+    confinement : {"bubblewrap", "process", "none"}
+        What separates it from the recording.
+    hidden, sealed
+        As of `EstimatorServer`.
+
+    Raises
+    ------
+    ServerError
+        If estimator processes cannot be started.
+    """
+    if confinement == "none" or entrant.reference:
+        outcome = isolate(_in_a_fork, entrant, recording, timeout=limits.timeout, memory=limits.memory)
+        trial: Trial | None = outcome.value if outcome.status == "ok" else None
+        status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
+        return Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
+    try:
+        return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+    except NoAnswerError:  # the estimator was not there yet, so this is not a result of it
+        close_server()
+        return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+
+
+def _in_a_fork(entrant: Entrant, recording: Recording) -> Trial:
+    """In the isolated process: make the estimator and run it."""
+    seed_generators(seed_words(recording, entrant))
+    return run_trial(entrant.make(), recording)
+
+
 def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[str, Any]:
     """Look at an estimator where it can do no harm.
 
     Returns
     -------
     dict
-        ``reference``, ``source`` (a digest), ``failure`` of its constructor (a sentence, or empty), and
-        ``learned_from`` as it was told, not checked.
+        ``reference``, ``source`` (a digest), and ``learned_from`` as it was told, not checked.
 
     Raises
     ------
@@ -198,8 +243,9 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
             session.end()
     except (StoppedError, FailureError, InvalidOutputError) as error:
         raise ValueError(str(error)) from None
-    source, failure = facts.get("source"), facts.get("failure")
-    if not isinstance(source, str) or not isinstance(failure, str) or len(source) > 200:
+    source = facts.get("source")
+    if not isinstance(source, str) or len(source) > 200:
         raise ValueError("it says nothing of itself that can be read")
-    known = {"reference": facts.get("reference") is True, "source": source, "failure": failure[:1000]}
-    return {**known, "learned_from": facts.get("learned_from", [])}
+    return {
+        "reference": facts.get("reference") is True, "source": source, "learned_from": facts.get("learned_from", []),
+    }  # fmt: skip

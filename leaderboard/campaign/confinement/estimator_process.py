@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import pickle
 import random
@@ -12,19 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
-from simnav.kinds import INSTRUMENTS
+from simnav.leaderboard.campaign.confinement.kinds import load_kinds
 from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, read_message, write_all
 from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.campaign.training_runs import declared_ranges
-from simnav.plugins import load_plugin
+from simnav.leaderboard.results.errors import named
 from simnav.trial import describe_failure
 from simnav.trial.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
 from simnav.types import NavigationStates
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.confinement.kinds import Home
+    from simnav.leaderboard.campaign.entrant import Entrant
 
-__all__ = ["LIBRARIES", "live"]
+__all__ = ["LIBRARIES", "live", "seed_generators"]
 
 #: What estimators import late; a server that has it already starts the next one sooner.
 LIBRARIES = frozenset({
@@ -75,46 +74,38 @@ class _Session:
     def make(self, body: bytes) -> bytes:
         """Import and construct the estimator; of a file or a session that is the first time that its code runs."""
         try:
-            entrant, path, words = pickle.loads(body)
-            sys.path[:] = [*entrant.search, *path]
-            _seed(words)
-            self._estimator = entrant.make()
+            self._estimator = _entrant(body).make()
             cls = type(self._estimator)
             facts = {"name": cls.name or cls.__name__, "needs": self._estimator.needs}
         except MemoryError:
             return _failure("out-of-memory", "more memory was wanted")
         except BaseException as error:  # SystemExit and KeyboardInterrupt, too: it is not the user who asks
-            return _failure("error", _described(error))
+            return _failure("error", named(error))
         return answer(Up.DONE, json.dumps(facts, default=repr).encode())
 
     def describe(self, body: bytes) -> bytes:
-        """What the estimator is, and why it cannot be made: by a wrong request, or in its constructor."""
+        """What the estimator is; a failure where it cannot be found, or what was asked for does not fit."""
         try:
-            entrant, path, words = pickle.loads(body)
-            sys.path[:] = [*entrant.search, *path]
-            _seed(words)
+            entrant = _entrant(body)
             cls = entrant.find()
-            facts: dict[str, Any] = {"reference": bool(cls.reference), "source": estimator_source(cls), "failure": ""}
+            facts = {"reference": bool(cls.reference), "source": estimator_source(cls), "learned_from": []}
             try:
                 facts["learned_from"] = declared_ranges(entrant.make())
-            except EstimatorError as error:
-                if error.__cause__ is None or entrant.parameters:  # what was asked for does not fit
-                    raise
-                facts["failure"] = str(error)
-            except Exception as error:
-                facts["failure"] = _described(error)
+            except Exception as error:  # of its constructor: each run will say so
+                if isinstance(error, EstimatorError) and (error.__cause__ is None or entrant.parameters):
+                    raise  # what was asked for does not fit
         except BaseException as error:
-            return _failure("error", _described(error))
+            return _failure("error", named(error))
         return answer(Up.DONE, json.dumps(facts).encode())
 
     def reset(self, body: bytes) -> bytes:
         try:
             start, instruments, streams, homes = pickle.loads(body)
         except BaseException as error:
-            return _failure("error", _described(error))
+            return _failure("error", named(error))
         self._decode = PacketDecoder(streams)
         try:
-            _load_kinds(homes)
+            load_kinds(homes)
             self._estimator.reset(start, instruments)
         except BaseException as error:
             return self._raised(error)
@@ -162,26 +153,15 @@ def _failure(status: str, reason: str) -> bytes:
     return answer(Up.FAILURE, json.dumps([status, reason[:2000]]).encode())
 
 
-def _described(error: BaseException) -> str:
-    try:
-        text = " ".join(str(error).split())
-    except Exception:
-        text = ""
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+def _entrant(body: bytes) -> Entrant:
+    """Which estimator it is about; this process then finds modules, and draws numbers, as it should."""
+    entrant, path, words = pickle.loads(body)
+    sys.path[:] = [*entrant.search, *path]
+    seed_generators(words)
+    return entrant  # type: ignore[no-any-return]
 
 
-def _seed(words: list[int]) -> None:
+def seed_generators(words: list[int]) -> None:
     """Whoever draws from a global generator gets the same numbers in every campaign, and learns nothing from them."""
     random.seed(sum(word << 32 * k for k, word in enumerate(words)))
     np.random.seed(words)  # noqa: NPY002
-
-
-def _load_kinds(homes: list[Home]) -> None:
-    """Import what registers the kinds of the instruments: modules, files of plug-ins, classes of a session."""
-    for kind, module, file, code in homes:
-        if code:
-            INSTRUMENTS.add(kind, pickle.loads(code))
-        elif file:
-            load_plugin(file)
-        else:
-            importlib.import_module(module)

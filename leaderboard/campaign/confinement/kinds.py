@@ -1,18 +1,21 @@
-"""Where the kinds of instruments come from, so that another process can know them, too."""
+"""Kinds of instruments that do not come with simnav: where they come from, and known in another process, too."""
 
 from __future__ import annotations
 
+import importlib
+import pickle
 import sys
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from simnav.kinds import INSTRUMENTS
 from simnav.leaderboard.campaign.session_class import carry, is_session
-from simnav.plugins import is_file_module
+from simnav.plugins import is_file_module, load_plugin
 
 if TYPE_CHECKING:
     from simnav.types import Instruments
 
-__all__ = ["Home", "homes_of_kinds"]
+__all__ = ["Home", "homes_of_kinds", "load_kinds"]
 
 #: Name of the kind, module that registers it, its file where it is a single one, the class where none can be imported.
 Home = tuple[str, str, str, bytes]
@@ -31,3 +34,14 @@ def homes_of_kinds(instruments: Instruments) -> list[Home]:
         else:
             found.append((kind, module, "", carry(cls) if is_session(module) else b""))
     return found
+
+
+def load_kinds(homes: Iterable[Home]) -> None:
+    """Import what registers the kinds: modules, files of plug-ins, classes of a session."""
+    for kind, module, file, code in homes:
+        if code:
+            INSTRUMENTS.add(kind, pickle.loads(code))
+        elif file:
+            load_plugin(file)
+        else:
+            importlib.import_module(module)

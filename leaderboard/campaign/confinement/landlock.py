@@ -16,10 +16,11 @@ import struct
 import sys
 from collections.abc import Iterable
 
+from simnav.leaderboard.campaign.confinement.limits import PR_SET_NO_NEW_PRIVS, prctl
+
 __all__ = ["Unreadable", "available", "restrict", "signals_are_scoped"]
 
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # system calls, the same on all architectures
-_PR_SET_NO_NEW_PRIVS = 38
 _PATH_BENEATH = 1
 
 _WRITE_FILE, _READ_FILE, _TRUNCATE = 1 << 1, 1 << 2, 1 << 14
@@ -148,10 +149,9 @@ def _allow(ruleset: int, path: str | os.PathLike[str], rights: int) -> None:
 
 
 def _enforce(ruleset: int) -> bool:
-    libc = _libc()
-    if libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
+    if not prctl(PR_SET_NO_NEW_PRIVS, 1):
         return False
-    return bool(libc.syscall(_RESTRICT_SELF, ruleset, ctypes.c_uint32(0)) == 0)
+    return bool(_libc().syscall(_RESTRICT_SELF, ruleset, ctypes.c_uint32(0)) == 0)
 
 
 @functools.cache

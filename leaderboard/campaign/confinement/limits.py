@@ -1,35 +1,66 @@
-"""Limits of a process of its own, and what is known of it: memory, descendants, how it ended."""
+"""A process of its own: how it begins, its limits, and what is known of it: memory, descendants, how it ended."""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import faulthandler
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
 
 __all__ = [
+    "PR_SET_NO_NEW_PRIVS",
+    "RSS_UNIT",
+    "WATCH",
     "become_reaper",
+    "begin_alone",
     "death_of",
-    "die_with_parent",
     "keep_freed_memory",
     "kill_descendants",
+    "lift_memory_limit",
     "limit",
     "out_of_memory_kills",
+    "prctl",
     "resident",
     "use_huge_pages",
+    "why_it_died",
 ]
 
-_LINUX = sys.platform == "linux"
+_LINUX: bool = sys.platform == "linux"
+#: Between two looks at the resident memory of a process [s].
+WATCH = 0.02 if _LINUX else 0.5
+#: Of ``ru_maxrss`` [bytes].
+RSS_UNIT = 1 if sys.platform == "darwin" else 1024
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
+#: Of `prctl`: no program that is started has more rights. Without it no rights can be given up.
+PR_SET_NO_NEW_PRIVS = 38
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _PATIENCE = 5.0  # s, for which descendants are killed at most
 _MADV_COLLAPSE, _HUGE = 25, 2 << 20  # of madvise(2); bytes of a huge page where a page has 4 KiB
 
 
-def limit(seconds: float, memory: int) -> None:
+def begin_alone(parent: int) -> None:
+    """Begin the life of a forked process: gone with its parent, with signals and streams of its own."""
+    os.setsid()  # Ctrl-C in the terminal is not for it, and it can be killed with all that it starts
+    _die_with_parent(parent)
+    signal.set_wakeup_fd(-1)
+    faulthandler.disable()
+    for which in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
+        signal.signal(which, signal.SIG_DFL)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        os.dup2(nothing, descriptor)
+    if nothing > 2:
+        os.close(nothing)
+    sys.stdin = open(os.devnull)  # noqa: SIM115
+    sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+
+
+def limit(seconds: float, memory: int, *, final: bool = True) -> None:
     """Limit this process: no core files, CPU time (if everyone who could kill it is dead), private memory.
 
     Parameters
@@ -38,6 +69,8 @@ def limit(seconds: float, memory: int) -> None:
         Wall-clock limit of which the CPU time allows four times as much, and a minute [s].
     memory : int
         That it may take beyond what it has now [bytes].
+    final : bool
+        The process cannot raise the limits again.
     """
     import resource
 
@@ -45,7 +78,7 @@ def limit(seconds: float, memory: int) -> None:
         hard = resource.getrlimit(which)[1]
         wanted = value if hard == resource.RLIM_INFINITY else min(value, hard)
         with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(which, (wanted, wanted))
+            resource.setrlimit(which, (wanted, wanted if final else hard))
 
     lower(resource.RLIMIT_CORE, 0)
     lower(resource.RLIMIT_CPU, int(4.0 * seconds) + 61)
@@ -55,13 +88,28 @@ def limit(seconds: float, memory: int) -> None:
         lower(resource.RLIMIT_DATA, data + memory)
 
 
-def die_with_parent(parent: int) -> None:
+def lift_memory_limit() -> None:
+    """Lift the limit of private memory of this process, unless it is final."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))
+
+
+def _die_with_parent(parent: int) -> None:
     """A process that is killed takes this one with it (Linux; elsewhere the limit of CPU time ends it)."""
-    if _LINUX:
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+
+
+def prctl(option: int, value: int) -> bool:
+    """Set an attribute of this process, see prctl(2); whether that worked (Linux)."""
+    if _LINUX:
+        with contextlib.suppress(OSError, AttributeError):
+            return bool(ctypes.CDLL(None).prctl(option, value, 0, 0, 0) == 0)
+    return False
 
 
 def keep_freed_memory() -> None:
@@ -97,9 +145,7 @@ def use_huge_pages() -> None:
 
 def become_reaper() -> None:
     """Descendants whose parents are gone become children of this process (Linux)."""
-    if _LINUX:
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    prctl(_PR_SET_CHILD_SUBREAPER, 1)
 
 
 def kill_descendants() -> None:
@@ -138,7 +184,11 @@ def resident(process: int) -> int:
         with open(f"/proc/{process}/statm") as file:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
+        pass
+    if _LINUX or os.name != "posix":
         return 0
+    done = subprocess.run(["ps", "-o", "rss=", "-p", str(process)], capture_output=True, text=True, check=False)
+    return int(done.stdout.strip() or 0) * 1024
 
 
 def out_of_memory_kills() -> int:
@@ -151,12 +201,31 @@ def out_of_memory_kills() -> int:
     return 0
 
 
-def death_of(status: int) -> str:
-    """How a process ended, in words, from what ``waitpid`` gave."""
-    code = os.waitstatus_to_exitcode(status)
+def death_of(code: int) -> str:
+    """How a process ended, in words, from its exit code: that of a signal is negative."""
     if code >= 0:
         return f"exit code {code}"
     try:
         return signal.Signals(-code).name
     except ValueError:
         return f"signal {-code}"
+
+
+def why_it_died(death: str, peak: int, memory: int, *, by_kernel: bool) -> tuple[str, str]:
+    """Status and reason of a process that ended without an answer.
+
+    Parameters
+    ----------
+    death : str
+        How it ended (`death_of`).
+    peak : int
+        Memory that it had taken at most [bytes].
+    memory : int
+        Limit of its memory [bytes].
+    by_kernel : bool
+        Whether the kernel killed it for want of memory.
+    """
+    starved = death.startswith("SIG") and death != "SIGKILL" and peak > 0.9 * memory
+    if by_kernel or starved:
+        return "out-of-memory", f"killed ({death}) for want of memory"
+    return "error", f"the process died ({death}) without an answer"

@@ -14,9 +14,10 @@ import platform
 import struct
 import sys
 
+from simnav.leaderboard.campaign.confinement.limits import PR_SET_NO_NEW_PRIVS, prctl
+
 __all__ = ["DENIED", "available", "deny"]
 
-_PR_SET_NO_NEW_PRIVS = 38
 _CALL = {"x86_64": 317, "aarch64": 277}  # seccomp(2)
 _SET_MODE_FILTER, _SPECULATION_ALLOWED = 1, 4  # older kernels would slow the process down without the latter
 _LOAD, _EQUAL, _AT_LEAST, _RETURN = 0x20, 0x15, 0x35, 0x06  # instructions of the classic packet filter
@@ -60,8 +61,7 @@ def deny() -> bool:
     program += struct.pack("=HBBI", _RETURN, 0, 0, _ALLOW) + refuse
     text = ctypes.create_string_buffer(program, len(program))
     given = ctypes.create_string_buffer(struct.pack("@HP", len(program) // 8, ctypes.addressof(text)))
-    libc = ctypes.CDLL(None)
-    if libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
+    if not prctl(PR_SET_NO_NEW_PRIVS, 1):
         return False
     where = ctypes.c_void_p(ctypes.addressof(given))
-    return bool(libc.syscall(_CALL[machine], _SET_MODE_FILTER, _SPECULATION_ALLOWED, where) == 0)
+    return bool(ctypes.CDLL(None).syscall(_CALL[machine], _SET_MODE_FILTER, _SPECULATION_ALLOWED, where) == 0)

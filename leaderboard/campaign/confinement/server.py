@@ -9,7 +9,6 @@ left of it, and is gone when the worker is.
 from __future__ import annotations
 
 import contextlib
-import faulthandler
 import fcntl
 import gc
 import importlib
@@ -31,9 +30,11 @@ from simnav.leaderboard.campaign.confinement import seccomp
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES, live
 from simnav.leaderboard.campaign.confinement.landlock import Unreadable, restrict
 from simnav.leaderboard.campaign.confinement.limits import (
+    RSS_UNIT,
+    WATCH,
     become_reaper,
+    begin_alone,
     death_of,
-    die_with_parent,
     keep_freed_memory,
     kill_descendants,
     limit,
@@ -47,7 +48,6 @@ __all__ = ["COPY_FROM", "main"]
 #: Environment variable: folder of compiled kernels that are copied before they are loaded, for it cannot be written to.
 COPY_FROM = "SIMNAV_KERNELS_FROM"
 
-_WATCH = 0.02  # between two looks at the memory of the process [s]
 _GRACE = 1.0  # for a process that has closed its pipe to end [s]
 _LONGEST = 1 << 16  # of a request [bytes]
 
@@ -129,10 +129,10 @@ def _fork(
             os._exit(70)
     for descriptor in descriptors:
         os.close(descriptor)
-    start, verdict, ended, peak = resident(child), "", None, 0
+    start, verdict, ended = resident(child), "", None
     control.sendall(json.dumps({"forked": child}).encode())
     try:
-        while not select.select([control], [], [], _WATCH)[0]:
+        while not select.select([control], [], [], WATCH)[0]:
             if ended is None and not verdict and resident(child) - start > asked["memory"]:
                 verdict = "out-of-memory"
                 os.kill(child, signal.SIGKILL)  # the worker sees its pipe closed
@@ -143,14 +143,14 @@ def _fork(
         while True:
             pid, status, usage = os.wait4(child, os.WNOHANG)
             if pid == child:
-                ended, peak = death_of(status), usage.ru_maxrss * 1024 - start
+                ended = death_of(os.waitstatus_to_exitcode(status))
                 break
             if time.monotonic() >= deadline:
                 os.kill(child, signal.SIGKILL)
-                _, status, usage = os.wait4(child, 0)
-                peak = usage.ru_maxrss * 1024 - start
+                _, _, usage = os.wait4(child, 0)
                 break
             time.sleep(0.001)
+        peak = usage.ru_maxrss * RSS_UNIT - start
         killed = ended == "SIGKILL" and out_of_memory_kills() > before
         facts = {"ended": ended, "peak": max(0, peak), "verdict": verdict or ("killed" if killed else "")}
     finally:
@@ -165,21 +165,14 @@ def _become_estimator(
     parent: int, asked: dict[str, Any], descriptors: list[int], temporary: Path, unreadable: Unreadable
 ) -> None:
     """The forked process until it ends."""
-    os.setsid()  # Ctrl-C in the terminal is not for it
-    die_with_parent(parent)
-    faulthandler.disable()
     if asked["landlock"]:
         unreadable.enforce()
-    for which in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
-        signal.signal(which, signal.SIG_DFL)
-    nothing = os.open(os.devnull, os.O_RDWR)
     moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, 16) for descriptor in descriptors]
-    for number, descriptor in enumerate((nothing, nothing, nothing, *moved)):
-        os.dup2(descriptor, number)
     down, up = 3, 4
+    for number, descriptor in zip((down, up), moved, strict=True):
+        os.dup2(descriptor, number)
     os.closerange(5, _most_descriptors())
-    sys.stdin = open(os.devnull)  # noqa: SIM115
-    sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    begin_alone(parent)
     if asked.get("core") is not None and hasattr(os, "sched_setaffinity"):
         with contextlib.suppress(OSError):
             os.sched_setaffinity(0, {asked["core"]})

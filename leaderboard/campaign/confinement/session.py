@@ -23,7 +23,9 @@ import numpy as np
 from simnav.leaderboard.campaign.confinement import bubblewrap, landlock
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES
 from simnav.leaderboard.campaign.confinement.kinds import homes_of_kinds
+from simnav.leaderboard.campaign.confinement.limits import why_it_died
 from simnav.leaderboard.campaign.confinement.messages import LARGEST, Down, Up, command
+from simnav.leaderboard.campaign.request import file_of
 from simnav.trial import FailureError, LostError
 from simnav.trial.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
 from simnav.types import NavigationStates
@@ -237,7 +239,7 @@ class EstimatorServer:
         self.wait_until_ready()
         down, write = os.pipe()
         read, up = os.pipe()
-        file = entrant.name.partition(".py")[0] + ".py" if ".py" in entrant.name else ""
+        file = file_of(entrant.name)
         asked = {
             "timeout": limits.timeout,
             "memory": limits.memory,
@@ -284,13 +286,10 @@ class EstimatorServer:
             return StoppedError("error", "it ended the process that had started it")
         session.peak_memory = max(0, int(facts.get("peak", 0)))
         ended, verdict = str(facts.get("ended") or "it closed its pipe"), facts.get("verdict")
-        mebibytes = session.limits.memory >> 20
+        memory = session.limits.memory
         if verdict == "out-of-memory":
-            return StoppedError("out-of-memory", f"stopped when it had taken more than {mebibytes} MiB of memory")
-        starved = ended.startswith("SIG") and ended != "SIGKILL" and session.peak_memory > 0.9 * session.limits.memory
-        if verdict == "killed" or starved:
-            return StoppedError("out-of-memory", f"killed ({ended}) for want of memory")
-        return StoppedError("error", f"the process died ({ended}) without an answer")
+            return StoppedError("out-of-memory", f"stopped when it had taken more than {memory >> 20} MiB of memory")
+        return StoppedError(*why_it_died(ended, session.peak_memory, memory, by_kernel=verdict == "killed"))
 
 
 class _GoneError(LostError):
@@ -382,7 +381,7 @@ class RemoteSession:
                 if sent != len(packet) or not ready(_STALL):
                     self._silent = True
                     log.settle()
-                    self._send_rest(packet[sent:])
+                    self._send(packet[sent:])
                     self._wait(self._readable)
                     self._silent = False
                 reply = read(self._read, _PIECE)
@@ -444,16 +443,6 @@ class RemoteSession:
         raise InvalidOutputError("the answer is not in the form of an estimate")
 
     def _send(self, message: bytes) -> None:
-        try:
-            sent = os.write(self._write, message)
-        except BlockingIOError:
-            sent = 0
-        except OSError:
-            raise self._gone() from None
-        if sent != len(message):
-            self._send_rest(message[sent:])
-
-    def _send_rest(self, message: bytes) -> None:
         rest = memoryview(message)
         while rest:
             self._wait(self._writable)

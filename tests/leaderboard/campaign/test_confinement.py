@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from simnav.estimator import make
-from simnav.leaderboard.campaign import attempts
+from simnav.leaderboard.campaign.confinement import attempt as attempt_module
 from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, seccomp
 from simnav.leaderboard.campaign.confinement.attempt import (
     Attempt,
@@ -239,15 +239,15 @@ def test_who_has_not_been_started_has_not_failed(
             server.close()
         return server
 
-    monkeypatch.setattr(attempts, "prepare", losing)
+    monkeypatch.setattr(attempt_module, "prepare", losing)
     close_server()
     try:
         if losses == 1:
-            found = attempts.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+            found = attempt_module.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
             assert (found.status, found.reason) == ("ok", "")
         else:
             with pytest.raises(NoAnswerError, match="did not answer"):
-                attempts.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+                attempt_module.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
     finally:
         close_server()
     assert len(lost) == losses
