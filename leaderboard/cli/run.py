@@ -49,18 +49,17 @@ def command(
             report = interface.run(chosen, estimator, seed=seed, parameters=parameters(set_), progress=progress)
         drawn = None
         if plot is not None and any(len(e.trial) for e in report.estimators):
-            from simnav.leaderboard.figures.style import save
+            from simnav.leaderboard.figures.style import save_as
 
-            drawn = save(report.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
+            drawn = save_as(report.plot(), absolute(plot))
         diagrams = {} if stanford is None else report.stanford(alert_limit)
         shown = None
         if stanford is not None and diagrams:
             from simnav.leaderboard.figures.stanford import stanford_diagrams
-            from simnav.leaderboard.figures.style import save
+            from simnav.leaderboard.figures.style import save_as
 
             title = f"{report.recording.scenario}, seed {seed}: alert limit {alert_limit:g} m"
-            drawing = stanford_diagrams(diagrams, title=title)
-            shown = save(drawing, absolute(stanford), formats=(stanford.suffix[1:],))[0]
+            shown = save_as(stanford_diagrams(diagrams, title=title), absolute(stanford))
         elif stanford is not None:
             out.note("simnav: no Stanford diagram: no estimator gave a covariance or a protection level")
         document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}

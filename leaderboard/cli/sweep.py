@@ -135,8 +135,8 @@ def _breaking(sweep: Sweep) -> Fitted:
 
 
 def _draw(sweep: Sweep, path: Path) -> Path:
-    from simnav.leaderboard.figures.style import save
+    from simnav.leaderboard.figures.style import save_as
 
     with mistakes(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        return save(sweep.plot(), path, formats=(path.suffix.lstrip(".").lower(),))[0]
+        return save_as(sweep.plot(), path)

@@ -66,9 +66,9 @@ def command(
         written = None if output is None else found.write(absolute(output))
         drawn = None
         if plot is not None:
-            from simnav.leaderboard.figures.style import save
+            from simnav.leaderboard.figures.style import save_as
 
-            drawn = save(found.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
+            drawn = save_as(found.plot(), absolute(plot))
         out.document(found.to_dict() | {"file": None if written is None else str(written)})
         out.print(_table(found))
         chosen = ", ".join(f"{name} {found.present[name]:g} -> {value:g}" for name, value in found.chosen.items())
