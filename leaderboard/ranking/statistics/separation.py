@@ -28,6 +28,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simnav.leaderboard.ranking.statistics.intervals import codes
+
 __all__ = ["Separation", "separate", "smallest_p_value", "tiers"]
 
 Array = NDArray[np.float64]
@@ -117,8 +119,8 @@ def separate(
     """
     x: Array = np.asarray(values, dtype=np.float64)
     u, n = x.shape
-    _, stratum = np.unique(np.zeros(u) if strata is None else _codes(strata), return_inverse=True)
-    _, cluster = np.unique(np.arange(u) if clusters is None else _codes(clusters), return_inverse=True)
+    stratum = codes([0] * u if strata is None else strata)
+    cluster = codes(range(u) if clusters is None else clusters)
     count = int(cluster.max()) + 1 if u else 0
     first, second = np.triu_indices(n, 1)
     if not count or not len(first):
@@ -132,11 +134,6 @@ def separate(
     sign[first, second], sign[second, first] = np.sign(observed), -np.sign(observed)
     best = _confidence_set(n, observed, drawn, first, second, alpha)
     return _conclude(p, sign, best, count, alpha)
-
-
-def _codes(items: Sequence[Hashable]) -> NDArray[np.int64]:
-    known: dict[Hashable, int] = {}
-    return np.array([known.setdefault(item, len(known)) for item in items], dtype=np.int64)
 
 
 @lru_cache(maxsize=8)
