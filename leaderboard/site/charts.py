@@ -8,14 +8,12 @@ colours of the theme, which the page or `simnav.leaderboard.site.print_figures` 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from simnav.leaderboard.site.rounding import shorts
-
 __all__ = [
+    "NO_BOUND",
+    "NO_FAULTS",
     "Chart",
     "accuracy_and_cost",
     "columns",
@@ -25,7 +23,9 @@ __all__ = [
     "over_time",
     "ratios_by_group",
     "spread",
+    "spread_data",
     "stanford",
+    "timed",
     "timeline",
     "track",
 ]
@@ -75,12 +75,29 @@ class Chart:
 
     def to_dict(self) -> dict[str, Any]:
         """For the page."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return dict(vars(self))
 
 
-def columns(**values: Iterable[Any]) -> dict[str, list[Any]]:
-    """Columns of a data set: arrays become short lists."""
-    return {name: shorts(v) if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
+def columns(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
+    """A data set as columns, from its rows.
+
+    >>> columns(("row", "value"), [("ekf", 1.0), ("ukf", 2.0)])
+    {'row': ['ekf', 'ukf'], 'value': [1.0, 2.0]}
+    """
+    listed = list(rows)
+    return {name: [row[k] for row in listed] for k, name in enumerate(names)}
+
+
+#: Data of `over_time` where there are no faults, or no bound.
+NO_FAULTS: Mapping[str, list[Any]] = columns(("start", "end", "name"), ())
+NO_BOUND: Mapping[str, list[Any]] = columns(("time", "bound"), ())
+
+
+def timed(
+    curves: Mapping[str, Any], faults: Mapping[str, Any] = NO_FAULTS, bound: Mapping[str, Any] = NO_BOUND
+) -> dict[str, Any]:
+    """The data of `over_time`."""
+    return {"curves": curves, "faults": faults, "bound": bound}
 
 
 def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
@@ -93,10 +110,29 @@ def _roomy(axis: Spec, pixels: int = 14) -> Spec:
     return {**axis, "scale": {**axis["scale"], "padding": pixels}}
 
 
-def _row(name: str = "row") -> Spec:
+def _row() -> Spec:
     return {
-        "color": {"field": name, "type": "nominal", "scale": "$colours", "legend": None},
-        "strokeDash": {"field": name, "type": "nominal", "scale": "$dashes", "legend": None},
+        "color": {"field": "row", "type": "nominal", "scale": "$colours", "legend": None},
+        "strokeDash": {"field": "row", "type": "nominal", "scale": "$dashes", "legend": None},
+    }
+
+
+def _lines(curves: Spec, encoding: Spec) -> Spec:
+    """A line a row, which zooms."""
+    return {
+        **curves,
+        "params": [_ZOOM],
+        "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
+        "encoding": {**encoding, **_row()},
+    }
+
+
+def _bands(curves: Spec, x: Spec, y: Spec) -> Spec:
+    """A band a row, from ``low`` to ``high``."""
+    return {
+        **curves,
+        "mark": {"type": "area", "opacity": 0.13},
+        "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
     }
 
 
@@ -142,8 +178,8 @@ def over_time(
     Parameters
     ----------
     data : mapping
-        ``curves``: curves by row over ``time`` with ``middle`` (and ``low``, ``high``); ``faults``: columns ``start``,
-        ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
+        As of `timed`. ``curves``: curves by row over ``time`` with ``middle`` (and ``low``, ``high``); ``faults``:
+        columns ``start``, ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
     """
     x = _axis("time", "Time [s]")
     y = _axis("middle", f"{title} [{unit}]", log=log)
@@ -159,36 +195,18 @@ def over_time(
                 "tooltip": _tip(name="Fault", start="From [s]", end="To [s]"),
             },
         },
-    ]
-    if spread:
-        layers.append(
-            {
-                **curves,
-                "mark": {"type": "area", "opacity": 0.13},
-                "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
-            }
-        )
-    layers.append(
-        {
-            **curves,
-            "params": [_ZOOM],
-            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-            "encoding": {"x": x, "y": y, **_row()},
-        }
-    )
-    layers.append(
+        *([_bands(curves, x, y)] if spread else []),
+        _lines(curves, {"x": x, "y": y}),
         {
             "data": {"name": "bound"},
             "mark": {"type": "line", "clip": True, "color": "$ink", "strokeDash": [3, 3], "strokeWidth": 1.4},
             "encoding": {"x": x, "y": {**y, "field": "bound"}},
-        }
-    )
-    layers.append(
+        },
         _hover(
             {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
             _tip(row="Estimator", time="Time [s]", middle=f"{title} [{unit}]"),
-        )
-    )
+        ),
+    ]
     return Chart(
         name, f"{title} over time", f"{caption} {_ZOOM_HELP}", {"height": 300, "layer": layers}, data, byrow=True
     )
@@ -199,12 +217,7 @@ def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], capt
     x, y = _axis("error", f"{title} [{unit}]", log=True), _axis("share", "Share of the epochs [%]")
     curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.error > 0"}]}
     layers: list[Spec] = [
-        {
-            **curves,
-            "params": [_ZOOM],
-            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-            "encoding": {"x": x, "y": y, "order": {"field": "share"}, **_row()},
-        },
+        _lines(curves, {"x": x, "y": y, "order": {"field": "share"}}),
         {
             "data": {"values": [{"level": 50}, {"level": 95}]},
             "mark": {"type": "rule", "color": "$grey", "strokeDash": [2, 2]},
@@ -381,17 +394,8 @@ def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str)
     curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.middle > 0"}]}
     sure = {"data": {"name": "curves"}, "transform": [{"filter": "datum.low > 0"}]}
     layers: list[Spec] = [
-        {
-            **sure,
-            "mark": {"type": "area", "opacity": 0.13},
-            "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
-        },
-        {
-            **curves,
-            "params": [_ZOOM],
-            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-            "encoding": {"x": x, "y": y, **_row()},
-        },
+        _bands(sure, x, y),
+        _lines(curves, {"x": x, "y": y}),
         {
             **curves,
             "mark": {"type": "point", "filled": True, "size": 35},
@@ -454,6 +458,14 @@ def spread(
         },
     ]
     return Chart(name, title, caption, {"height": {"step": 17}, "layer": layers}, data)
+
+
+def spread_data(runs: Iterable[Sequence[Any]], middles: Iterable[Sequence[Any]]) -> dict[str, dict[str, list[Any]]]:
+    """The data of `spread`: from (row, value, run) of every run, and (row, value, low, high) of each row."""
+    return {
+        "runs": columns(("row", "value", "run"), runs),
+        "middles": columns(("row", "value", "low", "high"), middles),
+    }
 
 
 def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> Chart:
