@@ -190,7 +190,7 @@ class Figure:
     number : str
         ``Figure 4``; empty for one that the paper does not have.
     what : str
-        Its title.
+        What it shows.
     draw : str
         How (see `Draw`).
     scenario : str
@@ -212,6 +212,16 @@ class Figure:
     methods: tuple[str, ...]
     series: Mapping[str, str] = field(default_factory=dict)
     part: str = ""
+
+    @property
+    def full_number(self) -> str:
+        """With the letter of its part, where it has one."""
+        return f"{self.number}{self.part}" if len(self.part) == 1 else self.number
+
+    @property
+    def title(self) -> str:
+        """What it shows, with the name of its part, where it has one."""
+        return f"{self.what}, {self.part}" if len(self.part) > 1 else self.what
 
     @property
     def name(self) -> str:

@@ -114,7 +114,7 @@ def sheets(found: Reproduction) -> Iterator[Sheet]:
         for f in rows:
             name = _method(f)
             same = name == before
-            who = ["", ""] if same else [name, _by(f)]
+            who = ["", ""] if same else [name, " / ".join(f.estimators)]
             texts = [*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys)]
             cells.append(SheetRow(texts, f.verdict))
             before = name
@@ -171,10 +171,6 @@ def whereabouts(found: Reproduction, drawn: Sequence[Drawn]) -> list[Whereabouts
 
 def _method(f: Finding) -> str:
     return f"{f.row.method} against {f.row.than}" if isinstance(f.row, Gain) else f.row.method
-
-
-def _by(f: Finding) -> str:
-    return " / ".join(f.estimators)
 
 
 def _title(f: Finding, with_scenario: bool) -> str:
