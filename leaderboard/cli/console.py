@@ -217,11 +217,13 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
         out.note("simnav: interrupted; what was finished is kept")
         raise typer.Exit(INTERRUPTED) from None
     except Exception as error:
+        from simnav.spec import SpecError
+
         if debug:
             import traceback
 
             traceback.print_exc()
-        mistake = isinstance(error, (RequestError, _spec_error()))
+        mistake = isinstance(error, (RequestError, SpecError))
         text = sentence(error)
         module = type(error).__module__
         ours = module.startswith("simnav") and not module.startswith(
@@ -239,9 +241,3 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     out.flush()
     if out.code:
         raise typer.Exit(out.code)
-
-
-def _spec_error() -> type[Exception]:
-    from simnav.spec import SpecError
-
-    return SpecError

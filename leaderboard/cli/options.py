@@ -64,8 +64,6 @@ MemoryLimit = Annotated[
     int, typer.Option("--memory-limit", min=16, help="MiB an estimator may take beyond the recording.")
 ]
 
-_STAGES = {"compile": "compiling kernels", "run": "running"}
-
 
 def parameters(given: Sequence[str] | None) -> dict[str, str]:
     """The values of ``--set``.
@@ -87,11 +85,11 @@ def absolute(path: Path | str) -> Path:
     return Path(path).expanduser().resolve()
 
 
-def campaign_progress(bar: ProgressBar) -> Callable[[Progress], None]:
-    """What shows a campaign's progress on a bar."""
+def campaign_progress(bar: ProgressBar, running: str = "running") -> Callable[[Progress], None]:
+    """What shows a campaign's progress on a bar; ``running`` is its text while estimators run."""
 
     def show(p: Progress) -> None:
-        bar.begin(_STAGES.get(p.stage, p.stage))
+        bar.begin("compiling kernels" if p.stage == "compile" else running)
         bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
 
     return show

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -99,14 +99,12 @@ def run(out: Output, features: str, seeds: int, passes: int, output: Path | None
     command = f"simnav train anfis --features {features} --seeds {seeds}" + (
         f" --passes {passes}" if passes != 200 else ""
     )
-    record: dict[str, Any] = {
+    parameters.record.update({
         "command": command,
         "simulator": simulator_version(),
-        "training_seeds": [first["training"], first["training"] + seeds - 1],
-        "validation_seeds": [first["validation"], first["validation"] + count["validation"] - 1],
+        **{f"{kind}_seeds": [start, start + count[kind] - 1] for kind, start in first.items()},
         "fixes": len(data["training"].outputs),
-    }
-    parameters.record.update(record)
+    })  # fmt: skip
     with mistakes(OSError):
         parameters.save(path)
         figures = training_figures.write(parameters, learned, path)
