@@ -45,6 +45,7 @@ _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
 INK, GREY, GRID, SHADE, PAPER = "#1b2430", "#66707d", "#dfe3e8", "#eceff3", "#fefefe"
 _DARK = {INK: "#e8ebef", GREY: "#9aa5b1", GRID: "#343c46", SHADE: "#262d36", PAPER: "#161b21"}
 TRUTH = INK
+_DPI = 160  # of PNG files
 
 _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -102,11 +103,9 @@ class Style:
     def _of(self, label: str) -> int:
         return self._index.setdefault(label, len(self._index))
 
-    def colour(self, label: str, dark: bool = False) -> str:
-        """Hex colour on a light (or dark) ground."""
-        if label in self._references:
-            return _DARK[GREY] if dark else GREY
-        return PALETTE[self._of(label) % len(PALETTE)][dark]
+    def colour(self, label: str) -> str:
+        """Hex colour on a light ground."""
+        return GREY if label in self._references else PALETTE[self._of(label) % len(PALETTE)][0]
 
     def line(self, label: str) -> Any:
         """Matplotlib line style: changes once the colours are used up."""
@@ -140,7 +139,7 @@ def styled() -> Any:
     return mpl.rc_context(_RC)
 
 
-def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dpi: int = 160) -> list[Path]:
+def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png")) -> list[Path]:
     """Write a figure, atomically, once for each format.
 
     Parameters
@@ -151,8 +150,6 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
         Its suffix is replaced by the format's.
     formats : sequence of str
         Endings of the files, such as ``png``.
-    dpi : int
-        Of pixel formats.
 
     Returns
     -------
@@ -179,7 +176,7 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
             elif kind == "pdf":
                 FigureCanvasPdf(fig).print_pdf(buffer, metadata={"CreationDate": None})  # type: ignore[no-untyped-call]
             else:
-                fig.set_dpi(dpi)
+                fig.set_dpi(_DPI)
                 FigureCanvasAgg(fig).print_png(buffer, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
             content = buffer.getvalue()
             if kind == "svg":

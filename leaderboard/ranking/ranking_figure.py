@@ -16,22 +16,19 @@ if TYPE_CHECKING:
 __all__ = ["ranking_figure"]
 
 
-def ranking_figure(track: TrackRanking, style: Style | None = None, most: int | None = None) -> Figure:
+def ranking_figure(track: TrackRanking, most: int | None = None) -> Figure:
     """Score of every estimator of a track with its interval; what is not ranked is grey, and references are hollow.
 
     Parameters
     ----------
     track : TrackRanking
         The ranking that is drawn.
-    style : Style, optional
-        Colours of the rows.
     most : int, optional
         Ranked rows that are drawn, the best first; what is not ranked is left out then, but for references.
     """
     best = [r for r in track.rows if r.ranked][:most]
     rows = track.rows if most is None else [*best, *(r for r in track.rows if r.reference)]
-    if style is None:
-        style = Style([r.estimator for r in rows], [r.estimator for r in rows if not r.ranked])
+    style = Style([r.estimator for r in rows], [r.estimator for r in rows if not r.ranked])
     points = [
         Dot(r.estimator, r.score, r.low, r.high, hollow=r.reference, note=_note(r))
         for r in rows

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.figures.plots import Array, Band, Track
+from simnav.leaderboard.figures.plots import Array, Band
 from simnav.leaderboard.ranking.statistics import Interval, median
 from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.scoring import SCORES
@@ -19,7 +19,7 @@ from simnav.scoring import SCORES
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result, Series
 
-__all__ = ["Run", "Runs", "at_times", "group", "has_series", "tracks"]
+__all__ = ["Run", "Runs", "at_times", "group", "has_series"]
 
 Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
 _PLACES = {name: k for k, name in enumerate(SCORES)}
@@ -139,10 +139,6 @@ class Runs:
         values = np.asarray(rows, dtype=np.float64)
         return Band(self.estimator, np.arange(values.shape[1], dtype=np.float64), values)
 
-    def at(self, seed: int) -> Result | None:
-        """The run with a seed, if it ended well."""
-        return next((r for r in self.good if r.seed == seed), None)
-
 
 def _run(result: Result) -> Run:
     return result.seed, result.note
@@ -166,23 +162,3 @@ def group(results: Iterable[Result]) -> dict[str, dict[str, Runs]]:
     for r in results:
         lists.setdefault(r.scenario, {}).setdefault(r.estimator, []).append(r)
     return {s: {e: Runs(found) for e, found in by.items()} for s, by in lists.items()}
-
-
-def tracks(runs: Iterable[Runs], seed: int) -> tuple[Track | None, list[Track]]:
-    """Truth and estimates of one seed, from the series; (None, []) where no run of it has a track."""
-    truth: Array | None = None
-    estimates = []
-    for r in runs:
-        result = r.at(seed)
-        if result is None or not has_series(result.series, "truth_north"):
-            continue
-        s = {k: np.asarray(v, dtype=np.float64) for k, v in result.series.items()}
-        known = np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"])
-        this = np.column_stack([s["truth_east"][known], s["truth_north"][known]])
-        if truth is None or len(this) > len(truth):
-            truth = this
-        if has_series(result.series, "estimate_north"):
-            estimates.append(Track(r.estimator, s["estimate_east"], s["estimate_north"]))
-    if truth is None or not len(truth):
-        return None, []
-    return Track("truth", truth[:, 0], truth[:, 1]), estimates

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, true_track
-from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.site.charts import NO_BOUND, columns
 from simnav.leaderboard.site.facts import EVENT, catalogued, datasheets, events
-from simnav.leaderboard.site.library import cache
+from simnav.leaderboard.site.library import cache, write_cache
 from simnav.leaderboard.site.rounding import short, spaced
 
 if TYPE_CHECKING:
@@ -93,7 +92,8 @@ def background_of(identity: str, seeds: Sequence[int]) -> Background:
             return Background(**json.loads(path.read_bytes()))
     made = background(identity, seeds)
     if path is not None:
-        _keep(made, path)
+        write_cache(path, json.dumps(asdict(made), separators=(",", ":")))
+        _forget(path.parent)
     return made
 
 
@@ -223,10 +223,9 @@ def _file(identity: str, seeds: Sequence[int]) -> Path | None:
     return cache() / "site" / f"{digest(recording_digest(scenario, simulator), code, words)}.json"
 
 
-def _keep(made: Background, path: Path) -> None:
-    with contextlib.suppress(OSError):  # a cache that cannot be written costs time only
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, json.dumps(asdict(made), separators=(",", ":")))
-        every = sorted(path.parent.glob("*.json"), key=lambda p: p.stat().st_mtime)
+def _forget(folder: Path) -> None:
+    """Delete the oldest files of the cache, if there are too many."""
+    with contextlib.suppress(OSError):
+        every = sorted(folder.glob("*.json"), key=lambda p: p.stat().st_mtime)
         for old in every[:-_MOST_KEPT]:
             old.unlink(missing_ok=True)

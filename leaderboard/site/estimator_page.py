@@ -52,16 +52,10 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
             if row.estimator != label or not row.runs:
                 continue
             costs.append(row.update_median)
+            place: str = row.standing
             if row.ranked:
-                provisional = ", provisional" if row.provisional else ""
-                found.append(
-                    Fact(
-                        f"{track.title}: rank {row.ranks.replace('-', '–') or row.rank}{provisional}",
-                        tables.number(row.score),
-                    )
-                )
-            else:
-                found.append(Fact(f"{track.title}: {row.standing}", tables.number(row.score)))
+                place = f"rank {row.ranks.replace('-', '–') or row.rank}" + (", provisional" if row.provisional else "")
+            found.append(Fact(f"{track.title}: {place}", tables.number(row.score)))
     known = [c for c in costs if c > 0.0]
     if known:
         found.append(Fact("Time per epoch", tables.duration(sum(known) / len(known))))

@@ -138,9 +138,9 @@ def toml_of(identity: str) -> str:
         return ""
 
 
-def datasheets(scenario: Scenario | None, recording: Recording) -> list[dict[str, str]]:
+def datasheets(scenario: Scenario, recording: Recording) -> list[dict[str, str]]:
     """The instruments of a run: what each measures, how often, and how well, in the units of scenario files."""
-    specs = {} if scenario is None else scenario.instruments
+    specs = scenario.instruments
     found = []
     imu = recording.instruments.imu
     sheets: list[tuple[str, str, Any]] = [

@@ -232,8 +232,7 @@ def _failures(ranking: ScenarioRanking, runs: Mapping[str, Runs]) -> list[dict[s
     for row in ranking.rows:
         for status, count in row.statuses.items():
             if status != "ok":
-                results = [r for r in runs[row.estimator].results if r.ending == status]
-                reason = results[0].reason if results else ""
+                reason = next(r.reason for r in runs[row.estimator].tried if r.ending == status)
                 if status == "inconsistent":
                     reason = "it reports for most of the time that its measurements contradict it; its error counts"
                 found.append({"name": row.estimator, "status": status, "runs": count, "reason": reason})
