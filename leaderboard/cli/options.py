@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 __all__ = [
     "Debug",
     "Estimators",
+    "FilesOrNames",
     "FirstSeed",
     "Json",
     "MemoryLimit",
     "Minutes",
+    "OwnScenarios",
     "ScenarioName",
     "Scenarios",
     "Seed",
@@ -36,6 +38,12 @@ __all__ = [
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+FilesOrNames = Annotated[
+    list[str], typer.Argument(metavar="FILE_OR_NAME...", help="my_filter.py, or a name; one or several.")
+]
+OwnScenarios = Annotated[
+    list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")
+]
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, versioned id, or path of a TOML file.")]
 Scenarios = Annotated[
     list[str] | None,

@@ -10,11 +10,11 @@ import typer
 
 from simnav.leaderboard.cli.console import FAILED, USER, session
 from simnav.leaderboard.cli.options import Debug, Estimators, Json, ScenarioName, Seed, Set, absolute, parameters
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.single_run import RunReport
-    from simnav.leaderboard.ranking.tables import Fitted
 
 __all__ = ["command"]
 
@@ -81,9 +81,8 @@ def command(
             out.code = USER
 
 
-def _table(report: RunReport) -> Fitted:
+def _table(report: RunReport) -> tables.Fitted:
     """Scores of the estimators, the best horizontal RMSE first."""
-    from simnav.leaderboard.ranking import tables
     from simnav.scoring.consistency import ending
 
     def order(k: int) -> tuple[bool, float]:

@@ -9,6 +9,7 @@ import typer
 
 from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.cli.options import Debug, FirstSeed, Json, Set, absolute, parameters
+from simnav.leaderboard.ranking import tables
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -82,8 +83,6 @@ def command(
 
 def _table(found: Tuning) -> Table:
     """Objective and ratios before and after, on the voyages of the search and on unseen ones."""
-    from simnav.leaderboard.ranking import tables
-
     first, last = found.seeds
     begin, end = found.unseen_seeds
     rows = []
