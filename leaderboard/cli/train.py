@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from simnav.estimators.adaptations.anfis_file import Parameters
     from simnav.estimators.training.hybrid_learning import Learned
 
-__all__ = ["register", "run"]
+__all__ = ["app", "run"]
+
+app = typer.Typer(no_args_is_help=True)
 
 #: Passes that the table shows.
 _ROWS = 12
@@ -35,18 +37,12 @@ class _Features(StrEnum):
     RECENT = "recent"
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the application."""
-    train = typer.Typer(no_args_is_help=True, help="Learn the parameters of an estimator anew.")
-    train.callback()(_root)
-    train.command("anfis")(_command)
-    app.add_typer(train, name="train")
-
-
+@app.callback()
 def _root() -> None:
     """Learn the parameters of an estimator anew."""
 
 
+@app.command("anfis")
 def _command(
     features: Annotated[_Features, typer.Option(help="Inputs of the network; see docs/explanation/anfis.md.")] = (
         _Features.INNOVATION

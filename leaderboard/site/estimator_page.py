@@ -145,14 +145,12 @@ def estimator_data(
                 **{c.key: short(c.factor * cell.score(c.key).value) for c in shown},
             }
         )
-    plain_row = estimators.get(PLAIN)
+    other = None if label == PLAIN else estimators.get(PLAIN)
     return {
         "kind": "estimator",
         "label": label,
         "data": entry.data,
-        "plain": None
-        if plain_row is None or label == PLAIN
-        else {"label": PLAIN, "data": plain_row.data, "page": plain_row.page},
+        "plain": None if other is None else {"label": PLAIN, "data": other.data, "page": other.page},
         "losses": None if label == PLAIN else losses(label, PLAIN, ranking, scenarios),
         "table": {
             "name": "main",
