@@ -202,7 +202,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     previous = warnings.showwarning
 
     def warn(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
-        out.note(f"simnav: warning: {shortened(' '.join(str(message).split()))}")
+        out.remark(f"warning: {shortened(' '.join(str(message).split()))}")
 
     try:
         if not debug:
@@ -214,7 +214,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     except BrokenPipeError:
         raise typer.Exit(FAILED) from None
     except KeyboardInterrupt:
-        out.note("simnav: interrupted; what was finished is kept")
+        out.remark("interrupted; what was finished is kept")
         raise typer.Exit(INTERRUPTED) from None
     except Exception as error:
         from simnav.spec import SpecError
@@ -231,7 +231,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
         )  # their messages are sentences
         if not mistake and not ours and not isinstance(error, OSError):
             text = f"{type(error).__name__}: {text}" + ("" if debug else " (--debug shows where)")
-        out.note(f"simnav: {text}")
+        out.remark(text)
         code = USER if mistake else FAILED
         out.document({"error": text, "code": code})
         out.flush()

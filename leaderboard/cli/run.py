@@ -61,7 +61,7 @@ def command(
             title = f"{report.recording.scenario}, seed {seed}: alert limit {alert_limit:g} m"
             shown = save_as(stanford_diagrams(diagrams, title=title), absolute(stanford))
         elif stanford is not None:
-            out.note("simnav: no Stanford diagram: no estimator gave a covariance or a protection level")
+            out.remark("no Stanford diagram: no estimator gave a covariance or a protection level")
         document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
         if stanford is not None:
             integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
@@ -70,7 +70,7 @@ def command(
         out.print(_table(report))
         for e in report.estimators:
             if e.status != "ok":
-                out.note(f"simnav: {e.estimator}: {e.status}: {e.reason}")
+                out.remark(f"{e.estimator}: {e.status}: {e.reason}")
         if drawn is not None:
             out.print(f"figure: {drawn}")
         if shown is not None:

@@ -117,8 +117,7 @@ class Runs:
 
     def unsuitable(self) -> str:
         """Which instrument is lacking, where the scenario does not suit the estimator; otherwise nothing."""
-        lacking = [r.reason or r.status for r in self.results if r.status == "unsuitable"]
-        return min(lacking) if lacking else ""
+        return min((r.reason or r.status for r in self.results if r.status == "unsuitable"), default="")
 
     # -- curves --------------------------------------------------------------------------------------
 

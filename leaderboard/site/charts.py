@@ -110,11 +110,8 @@ def _roomy(axis: Spec, pixels: int = 14) -> Spec:
     return {**axis, "scale": {**axis["scale"], "padding": pixels}}
 
 
-def _row() -> Spec:
-    return {
-        "color": {"field": "row", "type": "nominal", "scale": "$colours", "legend": None},
-        "strokeDash": {"field": "row", "type": "nominal", "scale": "$dashes", "legend": None},
-    }
+_COLOUR = {"field": "row", "type": "nominal", "scale": "$colours", "legend": None}
+_ROW = {"color": _COLOUR, "strokeDash": {**_COLOUR, "scale": "$dashes"}}
 
 
 def _lines(curves: Spec, encoding: Spec) -> Spec:
@@ -123,7 +120,7 @@ def _lines(curves: Spec, encoding: Spec) -> Spec:
         **curves,
         "params": [_ZOOM],
         "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-        "encoding": {**encoding, **_row()},
+        "encoding": {**encoding, **_ROW},
     }
 
 
@@ -132,7 +129,7 @@ def _bands(curves: Spec, x: Spec, y: Spec) -> Spec:
     return {
         **curves,
         "mark": {"type": "area", "opacity": 0.13},
-        "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
+        "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _COLOUR},
     }
 
 
@@ -203,7 +200,7 @@ def over_time(
             "encoding": {"x": x, "y": {**y, "field": "bound"}},
         },
         _hover(
-            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            {**curves, "encoding": {"x": x, "y": y, "color": _COLOUR}},
             _tip(row="Estimator", time="Time [s]", middle=f"{title} [{unit}]"),
         ),
     ]
@@ -224,7 +221,7 @@ def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], capt
             "encoding": {"y": {"field": "level", "type": "quantitative"}},
         },
         _hover(
-            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            {**curves, "encoding": {"x": x, "y": y, "color": _COLOUR}},
             _tip(row="Estimator", error=f"{title} [{unit}]", share="Share of the epochs [%]"),
         ),
     ]
@@ -258,7 +255,7 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
             "data": {"name": "curves"},
             "params": [_ZOOM],
             "mark": {"type": "line", "clip": True, "strokeWidth": 1.4},
-            "encoding": {**_row(), **order},
+            "encoding": {**_ROW, **order},
         },
         {
             "data": {"name": "ends"},
@@ -272,9 +269,7 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
                 "tooltip": _tip(name="Truth"),
             },
         },
-        _hover(
-            {"data": {"name": "curves"}, "encoding": {"color": _row()["color"]}}, _tip(row="Estimator", time="Time [s]")
-        ),
+        _hover({"data": {"name": "curves"}, "encoding": {"color": _COLOUR}}, _tip(row="Estimator", time="Time [s]")),
     ]
     return Chart(
         name,
@@ -402,7 +397,7 @@ def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str)
             "encoding": {
                 "x": x,
                 "y": y,
-                "color": _row()["color"],
+                "color": _COLOUR,
                 "tooltip": _tip(row="Estimator", value=across, middle=up, low="Low", high="High", failed="Failed runs"),
             },
         },
@@ -412,7 +407,7 @@ def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str)
             "encoding": {
                 "x": {**x, "field": "at"},
                 "y": {**y, "field": "threshold"},
-                "color": _row()["color"],
+                "color": _COLOUR,
                 "tooltip": _tip(row="Estimator", at="Breaks at", threshold="Twice its clean error"),
             },
         },
@@ -484,15 +479,13 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
     regions = [{"x": 0.0, "x2": end, "y": limit, "y2": end, "what": "not available"},
                {"x": limit, "x2": end, "y": 0.0, "y2": limit, "what": "hazardously misleading"}]  # fmt: skip
     diagonal = [{"x": 0.0, "y": 0.0}, {"x": end, "y": end}]
+    sides = {"x": x, "x2": {"field": "x2"}, "y": y, "y2": {"field": "y2"}}
     inner = [
         {
             "data": {"values": regions},
             "mark": {"type": "rect", "opacity": 0.18},
             "encoding": {
-                "x": x,
-                "x2": {"field": "x2"},
-                "y": y,
-                "y2": {"field": "y2"},
+                **sides,
                 "color": {"condition": {"test": "datum.y > 0", "value": "$shade"}, "value": "$second"},
                 "tooltip": {"field": "what", "title": "Region"},
             },
@@ -500,10 +493,7 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
         {
             "mark": "rect",
             "encoding": {
-                "x": x,
-                "x2": {"field": "x2"},
-                "y": y,
-                "y2": {"field": "y2"},
+                **sides,
                 "color": {
                     "field": "epochs",
                     "type": "quantitative",
