@@ -145,7 +145,7 @@ def main() -> None:
         if not hasattr(error, "format_message"):
             raise
         text = shortened(" ".join(error.format_message().split()))
-        Output().remark(text or "see simnav --help")
+        Output().note(f"simnav: {text}" if text else "simnav: see simnav --help")
         sys.exit(USER)
     except KeyboardInterrupt:
         sys.exit(130)

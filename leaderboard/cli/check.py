@@ -8,7 +8,6 @@ import typer
 
 from simnav.leaderboard.cli.console import FAILED, session
 from simnav.leaderboard.cli.options import Debug, Json, Set, parameters
-from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
 
 __all__ = ["command"]
@@ -23,6 +22,7 @@ def command(
     """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
+        from simnav.leaderboard.ranking import tables
 
         with mistakes(ValueError):
             report = interface.check(file, **parameters(set_))

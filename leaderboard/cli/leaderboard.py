@@ -58,5 +58,5 @@ def command(
         if correlations:
             out.print(correlation_table(correlations))
         elif against is not None:
-            out.remark(f"no track of {against} has {LEAST} rows in common with one of {results}")
+            out.note(f"simnav: no track of {against} has {LEAST} rows in common with one of {results}")
         out.print(f"site: {index}")
