@@ -166,7 +166,7 @@ class _Scenario:
         self.unsuitable = {n: why for n in sorted(by) if (why := by[n].unsuitable())}
         entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
         if track.name == "post-processing":  # whoever never smooths is not in it
-            entries = {n: r for n, r in entries.items() if any(_finite(x, track.score) for x in r.tried)}
+            entries = {n: r for n, r in entries.items() if np.isfinite(r.scores(track.score)).any()}
         self.reference = reference_of(name, track.score, entries, self.recorded)
         ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
         seeds = sorted({x.seed for r in ranked for x in r.tried})
@@ -225,7 +225,7 @@ class _Scenario:
             cell = self.cells[row["estimator"]]
             found.append(ScenarioRow(
                 **row,
-                median=_median([r.scores.get(self.track.score, math.nan) for r in cell.runs.good]),
+                median=_median(cell.runs.scores(self.track.score)),
                 statuses=cell.runs.statuses,
                 ratios={str(u): math.exp(x) for u, x in zip(*_by_unit(cell), strict=True)},
             ))  # fmt: skip
@@ -241,10 +241,6 @@ _IMPLAUSIBLE = (
     "its errors on {} are below those of an oracle, which knows the noise and every fault, by more than chance"
 )
 _IDENTICAL = "in real time it is {}, to the bit; it is ranked by what it smooths"
-
-
-def _finite(result: Result, name: str) -> bool:
-    return result.status == "ok" and math.isfinite(result.scores.get(name, math.nan))
 
 
 def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
