@@ -41,9 +41,9 @@ class Bar:
 
     label: str
     value: float
-    low: float
-    high: float
-    runs: Sequence[float]
+    low: float = math.nan
+    high: float = math.nan
+    runs: Sequence[float] = ()
     paper: tuple[float, float] = (math.nan, math.nan)
 
 

@@ -14,7 +14,7 @@ from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background
 from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
-from simnav.leaderboard.site.content import Fact
+from simnav.leaderboard.site.content import PLAIN, Fact
 from simnav.leaderboard.site.losses import losses
 from simnav.leaderboard.site.rounding import short, shorts
 from simnav.leaderboard.site.scenario_page import inside_chart, track_from
@@ -25,10 +25,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["PLAIN", "errors_data", "estimator_data", "facts_of", "runs_data", "worst_runs"]
-
-#: The row that every estimator is compared with.
-PLAIN = "ekf"
+__all__ = ["errors_data", "estimator_data", "facts_of", "runs_data", "worst_runs"]
 
 _COLUMNS = (
     Column("name", "Scenario", "The name leads to the page of the scenario.", "name", fixed=True),

@@ -13,6 +13,7 @@ from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background, faulty_parts, fixed_spots, truth_of
 from simnav.leaderboard.site.charts import NO_BOUND, NO_FAULTS, Chart, spread_data, timed
 from simnav.leaderboard.site.columns import SCORES_SHOWN
+from simnav.leaderboard.site.content import PLAIN
 from simnav.leaderboard.site.curves import Curves, Gathered
 from simnav.leaderboard.site.overview import bar_scale, board_columns, board_row
 from simnav.leaderboard.site.rounding import short
@@ -31,7 +32,6 @@ __all__ = ["RUNS_SHOWN", "ScenarioData", "inside_chart", "scenario_data", "seeds
 RUNS_SHOWN = 2
 
 _FIRST = 6  # rows that a chart shows at first
-_PLAIN = "ekf"
 _TICKS = 40  # runs of a row that a chart marks
 
 
@@ -73,8 +73,8 @@ def shown_first(ranking: ScenarioRanking, drawn: Sequence[str]) -> list[str]:
     references = {r.estimator for r in ranking.rows if r.reference}
     ranked = [name for name in drawn if name not in references | again]
     best = ranked[:_FIRST]
-    if _PLAIN in ranked and _PLAIN not in best:
-        best[-1] = _PLAIN
+    if PLAIN in ranked and PLAIN not in best:
+        best[-1] = PLAIN
     return best or list(drawn)[:_FIRST]
 
 
