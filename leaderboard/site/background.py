@@ -31,8 +31,8 @@ __all__ = [
     "Background",
     "background",
     "background_of",
-    "faulty_parts",
-    "fixed_spots",
+    "faulty_points",
+    "fix_points",
     "prepare",
     "track_of",
     "truth_of",
@@ -170,16 +170,16 @@ def track_of(recording: Recording) -> dict[str, Any]:
             for k in inside[:: max(1, len(inside) // 40)]
         ]
     return {
-        "faulty": faulty_parts(faulty), "fixes": fixed_spots(spots), **truth_of(track.east, track.north, time)
+        "faulty": faulty_points(faulty), "fixes": fix_points(spots), **truth_of(track.east, track.north, time)
     }  # fmt: skip
 
 
-def faulty_parts(rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
+def faulty_points(rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
     """Points of a track on which faults act."""
     return columns(("east", "north", "time", "name", "part"), rows)
 
 
-def fixed_spots(rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
+def fix_points(rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
     """Fixes beside a track."""
     return columns(("east", "north", "name"), rows)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, curves
-from simnav.leaderboard.site.background import Background, faulty_parts, fixed_spots, truth_of
+from simnav.leaderboard.site.background import Background, faulty_points, fix_points, truth_of
 from simnav.leaderboard.site.charts import NO_BOUND, NO_FAULTS, Chart, spread_data, timed
 from simnav.leaderboard.site.columns import SCORES_SHOWN
 from simnav.leaderboard.site.content import PLAIN
@@ -449,4 +449,4 @@ def _inside(single: Mapping[str, dict[str, Any]], around: Background, seed: str)
 def track_from(single: Iterable[dict[str, Any]]) -> dict[str, Any]:
     """Truth and frame of a track from the series of a run, where there is no recording."""
     truth: Sequence[Any] = next((one["truth"] for one in single if "truth" in one), ([], [], []))
-    return {"faulty": faulty_parts(()), "fixes": fixed_spots(()), **truth_of(*truth)}
+    return {"faulty": faulty_points(()), "fixes": fix_points(()), **truth_of(*truth)}
