@@ -17,6 +17,7 @@ from simnav.leaderboard.figures.panels import Bar, bars, curves_over_time
 from simnav.leaderboard.figures.plots import Band, Curve, error_cdf, error_over_time, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
 from simnav.leaderboard.figures.style import Style, save
+from simnav.leaderboard.papers.comparison import as_gain
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.papers.paper import Figure, Gain, Range, Value
 from simnav.leaderboard.ranking.runs import Runs
@@ -321,13 +322,11 @@ class _Sketch:
                 if method not in others or ours is None or not ours.good:
                     continue
                 a, b = ({r.seed: value_of(r, score) for r in of.good} for of in (ours, runs))
-                ratio = mean_ratio(a, b)
-                value, low, high = (100.0 * (1.0 - x) for x in (ratio.value, ratio.high, ratio.low))
+                gain = as_gain(mean_ratio(a, b))
+                ours_in_percent = Interval(100.0 * gain.value, 100.0 * gain.low, 100.0 * gain.high, gain.runs)
                 each = [100.0 * (1.0 - a[s] / b[s]) for s in a if s in b and b[s] > 0.0]
                 paper = papers.get(method)
-                panels[label].append(
-                    _bar(method, Interval(value, low, high, ratio.runs), each, None if paper is None else 100.0 * paper)
-                )
+                panels[label].append(_bar(method, ours_in_percent, each, None if paper is None else 100.0 * paper))
         fig, shown, caption = self._compared(entry, panels, zero=True)
         return fig, [first, *shown] if shown else [], caption
 

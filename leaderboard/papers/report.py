@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from simnav.leaderboard.papers.comparison import as_gain
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.measures import measure
 from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Gain, Range
@@ -200,8 +201,9 @@ def _ours(f: Finding) -> str:
         return tables.interval(f.ours.value, f.ours.low, f.ours.high)
     if f.ours.value > 2.0:  # too large for a gain in percent
         return f"worse by a factor of {tables.interval(f.ours.value, f.ours.low, f.ours.high)}"
+    gain = as_gain(f.ours)
     # Rounded here, and added to zero, so that there is no -0.0.
-    value, low, high = (round(1.0 - x, 3) + 0.0 for x in (f.ours.value, f.ours.high, f.ours.low))
+    value, low, high = (round(x, 3) + 0.0 for x in (gain.value, gain.low, gain.high))
     if low != low or high != high:
         return tables.percent(value)
     return f"{tables.percent(value)} [{100.0 * low:.1f}, {100.0 * high:.1f}]"
