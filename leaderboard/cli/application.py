@@ -106,8 +106,8 @@ for _module in (
     tune,
 ):
     app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
-standard.register(app)
-train.register(app)
+app.add_typer(standard.app, name="standard")
+app.add_typer(train.app, name="train")
 
 
 def _leave_out_working_directory() -> None:

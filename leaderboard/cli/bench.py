@@ -7,15 +7,13 @@ from typing import Annotated
 import typer
 
 from simnav.leaderboard.cli.console import FAILED, session
-from simnav.leaderboard.cli.options import Debug, Json, Seed, Set, parameters
+from simnav.leaderboard.cli.options import Debug, FilesOrNames, Json, Seed, Set, parameters
 
 __all__ = ["command"]
 
 
 def command(
-    estimator: Annotated[
-        list[str], typer.Argument(metavar="FILE_OR_NAME...", help="my_filter.py, or a name; one or several.")
-    ],
+    estimator: FilesOrNames,
     scenario: Annotated[str, typer.Option("--scenario", "-s", help="A name or a TOML file.")] = "open-sea",
     against: Annotated[
         list[str] | None, typer.Option(help="Rows beside them, separated by commas. Default: one of each family.")

@@ -9,6 +9,7 @@ import typer
 
 from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.cli.options import Debug, Json, absolute
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
 
 if TYPE_CHECKING:
@@ -48,8 +49,6 @@ def command(
 def _table(report: BoundReport) -> Table:
     """A dozen epochs and the whole run."""
     import numpy as np
-
-    from simnav.leaderboard.ranking import tables
 
     shown = np.unique(np.linspace(0, len(report.time) - 1, _ROWS).astype(int))
     rows = [[f"{report.time[i]:g}", *(tables.number(float(b.horizontal[i])) for b in report.bounds)] for i in shown]

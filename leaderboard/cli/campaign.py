@@ -24,6 +24,7 @@ from simnav.leaderboard.cli.options import (
     campaign_progress,
     parameters,
 )
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 
 __all__ = ["command"]
@@ -93,7 +94,6 @@ def command(
     """Run estimators on scenarios and seeds. Started again, the campaign continues."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
-        from simnav.leaderboard.ranking import tables
         from simnav.leaderboard.ranking.confinement import confinement_line
         from simnav.leaderboard.ranking.failures import failure_table
         from simnav.leaderboard.ranking.ranking_table import ranking_tables

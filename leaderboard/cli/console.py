@@ -202,7 +202,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     previous = warnings.showwarning
 
     def warn(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
-        out.note(f"simnav: warning: {shortened(' '.join(str(message).split()))}")
+        out.remark(f"warning: {shortened(' '.join(str(message).split()))}")
 
     try:
         if not debug:
@@ -214,14 +214,16 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     except BrokenPipeError:
         raise typer.Exit(FAILED) from None
     except KeyboardInterrupt:
-        out.note("simnav: interrupted; what was finished is kept")
+        out.remark("interrupted; what was finished is kept")
         raise typer.Exit(INTERRUPTED) from None
     except Exception as error:
+        from simnav.spec import SpecError
+
         if debug:
             import traceback
 
             traceback.print_exc()
-        mistake = isinstance(error, (RequestError, _spec_error()))
+        mistake = isinstance(error, (RequestError, SpecError))
         text = sentence(error)
         module = type(error).__module__
         ours = module.startswith("simnav") and not module.startswith(
@@ -229,7 +231,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
         )  # their messages are sentences
         if not mistake and not ours and not isinstance(error, OSError):
             text = f"{type(error).__name__}: {text}" + ("" if debug else " (--debug shows where)")
-        out.note(f"simnav: {text}")
+        out.remark(text)
         code = USER if mistake else FAILED
         out.document({"error": text, "code": code})
         out.flush()
@@ -239,9 +241,3 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     out.flush()
     if out.code:
         raise typer.Exit(out.code)
-
-
-def _spec_error() -> type[Exception]:
-    from simnav.spec import SpecError
-
-    return SpecError

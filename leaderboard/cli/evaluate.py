@@ -10,6 +10,7 @@ import typer
 from simnav.leaderboard.cli.console import FAILED, session
 from simnav.leaderboard.cli.options import (
     Debug,
+    FilesOrNames,
     FirstSeed,
     Json,
     MemoryLimit,
@@ -25,9 +26,7 @@ __all__ = ["command"]
 
 
 def command(
-    estimator: Annotated[
-        list[str], typer.Argument(metavar="FILE_OR_NAME...", help="my_filter.py, or a name; one or several.")
-    ],
+    estimator: FilesOrNames,
     scenario: Annotated[list[str], typer.Option("--scenario", "-s", help="Names or TOML files, separated by commas.")],
     runs: Annotated[int, typer.Option("--runs", "-n", min=2, help="Seeds.")] = 20,
     against: Annotated[

@@ -133,18 +133,15 @@ def faults() -> list[KindItem]:
     return [_kind(spec, "") for spec in sensors.fault_specs()]
 
 
-def _name(spec: type[Spec]) -> str:
-    field = spec.model_fields.get("kind")
-    return str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
-
-
 def _kind(spec: type[Spec], fallback: str) -> KindItem:
+    field = spec.model_fields.get("kind")
+    kind = str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
     keys = {
         key: Key(info.is_required(), info.description or "")
         for key, (name, info) in spec.toml_keys().items()
         if name != "kind"
     }
-    return KindItem(_name(spec), (spec.__doc__ or fallback).strip().splitlines()[0], keys)
+    return KindItem(kind, (spec.__doc__ or fallback).strip().splitlines()[0], keys)
 
 
 #: Tracks and groups as they are listed; those of others follow, by name.

@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 __all__ = [
     "Debug",
     "Estimators",
+    "FilesOrNames",
     "FirstSeed",
     "Json",
     "MemoryLimit",
     "Minutes",
+    "OwnScenarios",
     "ScenarioName",
     "Scenarios",
     "Seed",
@@ -36,6 +38,12 @@ __all__ = [
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+FilesOrNames = Annotated[
+    list[str], typer.Argument(metavar="FILE_OR_NAME...", help="my_filter.py, or a name; one or several.")
+]
+OwnScenarios = Annotated[
+    list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")
+]
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, versioned id, or path of a TOML file.")]
 Scenarios = Annotated[
     list[str] | None,
@@ -66,8 +74,6 @@ MemoryLimit = Annotated[
     int, typer.Option("--memory-limit", min=16, help="MiB an estimator may take beyond the recording.")
 ]
 
-_STAGES = {"compile": "compiling kernels", "run": "running"}
-
 
 def parameters(given: Sequence[str] | None) -> dict[str, str]:
     """The values of ``--set``.
@@ -89,11 +95,11 @@ def absolute(path: Path | str) -> Path:
     return Path(path).expanduser().resolve()
 
 
-def campaign_progress(bar: ProgressBar) -> Callable[[Progress], None]:
-    """What shows a campaign's progress on a bar."""
+def campaign_progress(bar: ProgressBar, running: str = "running") -> Callable[[Progress], None]:
+    """What shows a campaign's progress on a bar; ``running`` is its text while estimators run."""
 
     def show(p: Progress) -> None:
-        bar.begin(_STAGES.get(p.stage, p.stage))
+        bar.begin("compiling kernels" if p.stage == "compile" else running)
         bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
 
     return show

@@ -10,6 +10,7 @@ import typer
 
 from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.cli.options import Debug, Json, Scenarios, Workers, absolute
+from simnav.leaderboard.ranking import tables
 
 __all__ = ["command"]
 
@@ -35,7 +36,7 @@ def command(
     """Run the oracles over many seeds, and store the figures that errors are divided by."""
     with session(json, debug) as out:
         from simnav.leaderboard import given
-        from simnav.leaderboard.ranking import reference, tables
+        from simnav.leaderboard.ranking import reference
         from simnav.leaderboard.ranking.reference_measurement import measure, save
         from simnav.leaderboard.results.errors import mistakes
         from simnav.leaderboard.results.store import StoreError

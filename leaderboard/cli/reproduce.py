@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json, Workers, absolute
+from simnav.leaderboard.cli.options import Debug, Json, Workers, absolute, campaign_progress
 from simnav.leaderboard.papers import PAPERS
-
-if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.campaign import Progress
 
 __all__ = ["command"]
 
@@ -56,14 +53,10 @@ def command(
         from simnav.leaderboard.papers.comparison import RULES
 
         with out.progress("starting") as bar:
-
-            def show(scenario: str, p: Progress) -> None:
-                bar.begin("compiling kernels" if p.stage == "compile" else scenario)
-                bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
-
             found = interface.reproduce(
                 paper, runs=runs, methods=method or (), until_decided=until_decided, limit=limit, minutes=minutes,
-                stored=stored, output=output, workers=workers, progress=show,
+                stored=stored, output=output, workers=workers,
+                progress=lambda scenario, p: campaign_progress(bar, scenario)(p),
             )  # fmt: skip
         about = found.paper
         folder = absolute(output or Path("reproduced") / about.key)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json
+from simnav.leaderboard.cli.options import Debug, Json, OwnScenarios
 
 __all__ = ["command"]
 
@@ -20,9 +20,7 @@ def command(
         list[str] | None,
         typer.Option("--score", help="Names of scores, by commas. Default: those that are missing."),
     ] = None,
-    scenario: Annotated[
-        list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")
-    ] = None,
+    scenario: OwnScenarios = None,
     key: Annotated[Path | None, typer.Option(metavar="KEYFILE", help="The key, where the seeds are sealed.")] = None,
     json: Json = False,
     debug: Debug = False,

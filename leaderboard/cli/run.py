@@ -10,11 +10,11 @@ import typer
 
 from simnav.leaderboard.cli.console import FAILED, USER, session
 from simnav.leaderboard.cli.options import Debug, Estimators, Json, ScenarioName, Seed, Set, absolute, parameters
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.single_run import RunReport
-    from simnav.leaderboard.ranking.tables import Fitted
 
 __all__ = ["command"]
 
@@ -49,20 +49,19 @@ def command(
             report = interface.run(chosen, estimator, seed=seed, parameters=parameters(set_), progress=progress)
         drawn = None
         if plot is not None and any(len(e.trial) for e in report.estimators):
-            from simnav.leaderboard.figures.style import save
+            from simnav.leaderboard.figures.style import save_as
 
-            drawn = save(report.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
+            drawn = save_as(report.plot(), absolute(plot))
         diagrams = {} if stanford is None else report.stanford(alert_limit)
         shown = None
         if stanford is not None and diagrams:
             from simnav.leaderboard.figures.stanford import stanford_diagrams
-            from simnav.leaderboard.figures.style import save
+            from simnav.leaderboard.figures.style import save_as
 
             title = f"{report.recording.scenario}, seed {seed}: alert limit {alert_limit:g} m"
-            drawing = stanford_diagrams(diagrams, title=title)
-            shown = save(drawing, absolute(stanford), formats=(stanford.suffix[1:],))[0]
+            shown = save_as(stanford_diagrams(diagrams, title=title), absolute(stanford))
         elif stanford is not None:
-            out.note("simnav: no Stanford diagram: no estimator gave a covariance or a protection level")
+            out.remark("no Stanford diagram: no estimator gave a covariance or a protection level")
         document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
         if stanford is not None:
             integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
@@ -71,12 +70,12 @@ def command(
         out.print(_table(report))
         for e in report.estimators:
             if e.status != "ok":
-                out.note(f"simnav: {e.estimator}: {e.status}: {e.reason}")
+                out.remark(f"{e.estimator}: {e.status}: {e.reason}")
             unseen = [f"{name} ({kind})" for name, kind in report.unseen(e).items()]
             if unseen:
                 left = "it out" if len(unseen) == 1 else "them out"
-                out.note(
-                    f"simnav: {e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}"
+                out.remark(
+                    f"{e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}"
                 )
         if drawn is not None:
             out.print(f"figure: {drawn}")
@@ -88,9 +87,8 @@ def command(
             out.code = USER
 
 
-def _table(report: RunReport) -> Fitted:
+def _table(report: RunReport) -> tables.Fitted:
     """Scores of the estimators, the best horizontal RMSE first."""
-    from simnav.leaderboard.ranking import tables
     from simnav.scoring.consistency import ending
 
     def order(k: int) -> tuple[bool, float]:

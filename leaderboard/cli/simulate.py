@@ -9,6 +9,7 @@ import typer
 
 from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.cli.options import Debug, Json, ScenarioName, Seed, absolute
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 
 __all__ = ["command"]
@@ -26,7 +27,6 @@ def command(
     with session(json, debug) as out:
         from simnav.leaderboard.campaign.single_run import record
         from simnav.leaderboard.interface import scenario_of
-        from simnav.leaderboard.ranking import tables
         from simnav.leaderboard.results.formats import write
 
         if output.suffix != ".npz":

@@ -10,21 +10,16 @@ import typer
 from simnav.leaderboard.cli.console import FAILED, session
 from simnav.leaderboard.cli.options import Debug, Json, Minutes, Workers, campaign_progress
 
-__all__ = ["register"]
+__all__ = ["app"]
 
-_app = typer.Typer(help="Run, check and publish the result that comes with simnav.", no_args_is_help=True)
+app = typer.Typer(help="Run, check and publish the result that comes with simnav.", no_args_is_help=True)
 _Results = Annotated[Path, typer.Option("--results", help="Folder to work in.")]
 _Profile = Annotated[str, typer.Option(help="What is run: a profile of simnav, or a file.")]
 _Shipped = Annotated[Path | None, typer.Option(help="Folder of the packed results. Default: that of simnav.")]
 _WORKING = Path("results/standard")
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.add_typer(_app, name="standard")
-
-
-@_app.command()
+@app.command()
 def run(
     minutes: Minutes = 110.0,
     results: _Results = _WORKING,
@@ -51,7 +46,7 @@ def run(
         )
 
 
-@_app.command()
+@app.command()
 def check(
     results: Annotated[
         Path | None, typer.Option("--results", help="Folder of results. Default: those of simnav.")
@@ -69,7 +64,7 @@ def check(
         out.code = FAILED if found else 0
 
 
-@_app.command()
+@app.command()
 def carry(
     runs: Annotated[int, typer.Option(min=1, help="Runs of each scenario and row that are repeated.")] = 1,
     shipped: _Shipped = None,
@@ -97,7 +92,7 @@ def carry(
         out.code = FAILED if made.different or made.left else 0
 
 
-@_app.command()
+@app.command()
 def publish(
     results: _Results = _WORKING,
     profile: _Profile = "standard",

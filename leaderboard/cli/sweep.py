@@ -22,10 +22,10 @@ from simnav.leaderboard.cli.options import (
     campaign_progress,
     parameters,
 )
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.tables import Fitted
     from simnav.leaderboard.sweep.report import Sweep
 
 __all__ = ["command"]
@@ -58,7 +58,6 @@ def command(
     """Turn a dial of a scenario: the error of estimators against it, and where each of them breaks."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
-        from simnav.leaderboard.ranking import tables
 
         if plot is not None and plot.suffix.lower() not in (".png", ".svg", ".pdf"):
             raise RequestError(f"--plot {plot.name}: it should end in .png, .svg or .pdf")
@@ -80,14 +79,11 @@ def command(
 
 
 def _figure(x: float) -> str:
-    from simnav.leaderboard.ranking import tables
-
     return "failed" if math.isinf(x) else tables.number(x)
 
 
-def _errors(sweep: Sweep) -> Fitted:
+def _errors(sweep: Sweep) -> tables.Fitted:
     """A row an estimator and setting."""
-    from simnav.leaderboard.ranking import tables
     from simnav.leaderboard.ranking.ranking_table import between
     from simnav.leaderboard.sweep.report import axis_label
     from simnav.scoring import SCORES
@@ -111,9 +107,8 @@ def _errors(sweep: Sweep) -> Fitted:
     )
 
 
-def _breaking(sweep: Sweep) -> Fitted:
+def _breaking(sweep: Sweep) -> tables.Fitted:
     """Where each estimator breaks."""
-    from simnav.leaderboard.ranking import tables
     from simnav.leaderboard.sweep.report import axis_label
 
     beyond = f"beyond {sweep.values[0][-1]:g}"
@@ -135,8 +130,8 @@ def _breaking(sweep: Sweep) -> Fitted:
 
 
 def _draw(sweep: Sweep, path: Path) -> Path:
-    from simnav.leaderboard.figures.style import save
+    from simnav.leaderboard.figures.style import save_as
 
     with mistakes(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        return save(sweep.plot(), path, formats=(path.suffix.lstrip(".").lower(),))[0]
+        return save_as(sweep.plot(), path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from simnav.estimators.adaptations.anfis_file import Parameters
     from simnav.estimators.training.hybrid_learning import Learned
 
-__all__ = ["register", "run"]
+__all__ = ["app", "run"]
+
+app = typer.Typer(no_args_is_help=True)
 
 #: Passes that the table shows.
 _ROWS = 12
@@ -35,18 +37,12 @@ class _Features(StrEnum):
     RECENT = "recent"
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the application."""
-    train = typer.Typer(no_args_is_help=True, help="Learn the parameters of an estimator anew.")
-    train.callback()(_root)
-    train.command("anfis")(_command)
-    app.add_typer(train, name="train")
-
-
+@app.callback()
 def _root() -> None:
     """Learn the parameters of an estimator anew."""
 
 
+@app.command("anfis")
 def _command(
     features: Annotated[_Features, typer.Option(help="Inputs of the network; see docs/explanation/anfis.md.")] = (
         _Features.INNOVATION
@@ -99,14 +95,12 @@ def run(out: Output, features: str, seeds: int, passes: int, output: Path | None
     command = f"simnav train anfis --features {features} --seeds {seeds}" + (
         f" --passes {passes}" if passes != 200 else ""
     )
-    record: dict[str, Any] = {
+    parameters.record.update({
         "command": command,
         "simulator": simulator_version(),
-        "training_seeds": [first["training"], first["training"] + seeds - 1],
-        "validation_seeds": [first["validation"], first["validation"] + count["validation"] - 1],
+        **{f"{kind}_seeds": [start, start + count[kind] - 1] for kind, start in first.items()},
         "fixes": len(data["training"].outputs),
-    }
-    parameters.record.update(record)
+    })  # fmt: skip
     with mistakes(OSError):
         parameters.save(path)
         figures = training_figures.write(parameters, learned, path)

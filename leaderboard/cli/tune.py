@@ -9,6 +9,7 @@ import typer
 
 from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.cli.options import Debug, FirstSeed, Json, Set, absolute, parameters
+from simnav.leaderboard.ranking import tables
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -66,9 +67,9 @@ def command(
         written = None if output is None else found.write(absolute(output))
         drawn = None
         if plot is not None:
-            from simnav.leaderboard.figures.style import save
+            from simnav.leaderboard.figures.style import save_as
 
-            drawn = save(found.plot(), absolute(plot), formats=(plot.suffix[1:],))[0]
+            drawn = save_as(found.plot(), absolute(plot))
         out.document(found.to_dict() | {"file": None if written is None else str(written)})
         out.print(_table(found))
         chosen = ", ".join(f"{name} {found.present[name]:g} -> {value:g}" for name, value in found.chosen.items())
@@ -82,8 +83,6 @@ def command(
 
 def _table(found: Tuning) -> Table:
     """Objective and ratios before and after, on the voyages of the search and on unseen ones."""
-    from simnav.leaderboard.ranking import tables
-
     first, last = found.seeds
     begin, end = found.unseen_seeds
     rows = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simnav.leaderboard.cli.console import FAILED, Output, session
-from simnav.leaderboard.cli.options import Debug, Estimators, Json
+from simnav.leaderboard.cli.options import Debug, Estimators, Json, OwnScenarios
 
 if TYPE_CHECKING:
     from simnav.leaderboard.submission.verifying import SubmissionReport
@@ -26,9 +26,7 @@ def command(
         typer.Option("--key", metavar="KEYFILE", help="Key of sealed seeds: of the results, or for a bundle."),
     ] = None,
     sample: Annotated[int, typer.Option(min=1, help="Runs that are repeated at most.")] = 10,
-    scenario: Annotated[
-        list[str] | None, typer.Option("--scenario", "-s", help="TOML files of scenarios outside the catalogue.")
-    ] = None,
+    scenario: OwnScenarios = None,
     estimator: Estimators = None,
     present: Annotated[
         bool, typer.Option("--present", help="Of a bundle: use the packages that are here, not a new environment.")

@@ -9,19 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simnav.leaderboard.figures.frames import legend_below, named_lines, plain_log_ticks, time_panels
 from simnav.leaderboard.figures.plots import Array, Curve
-from simnav.leaderboard.figures.style import (
-    GREY,
-    INK,
-    PAPER,
-    Style,
-    figure,
-    legend_below,
-    plain_log_ticks,
-    shade,
-    styled,
-    time_unit,
-)
+from simnav.leaderboard.figures.style import GREY, INK, PAPER, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,9 +41,9 @@ class Bar:
 
     label: str
     value: float
-    low: float
-    high: float
-    runs: Sequence[float]
+    low: float = math.nan
+    high: float = math.nan
+    runs: Sequence[float] = ()
     paper: tuple[float, float] = (math.nan, math.nan)
 
 
@@ -78,23 +68,16 @@ def curves_over_time(
         Title of the figure.
     """
     with styled():
-        fig = figure(7.6, 1.0 + 1.75 * len(panels))
-        axes = np.atleast_1d(fig.subplots(len(panels), 1, sharex=True))
-        longest = max((float(c.time[-1]) for cs in panels.values() for c in cs if len(c.time)), default=1.0)
-        unit, factor = time_unit(longest)
-        fullest = max(range(len(axes)), key=lambda i: len(list(panels.values())[i]), default=0)
-        for ax, (label, curves) in zip(axes, panels.items(), strict=True):
-            shade(ax, outages, factor, named=ax is axes[0])
+        fig, axes, factor = time_panels(panels, 1.75, outages, title)
+        for ax, curves in zip(axes, panels.values(), strict=True):
             order = sorted(curves, key=_layer)
             for k in range(len(order) - 1, -1, -1):  # what lies below is wider, so that equal curves are both seen
                 c, (time, values) = order[k], broken(order[k].time, order[k].values)
                 colour, line = style.colour(c.label), style.line(c.label)
                 ax.plot(time * factor, values, color=colour, ls=line, lw=1.0 + 0.5 * k, label=c.label)
             _frame(ax, [v for c in curves if len(v := c.values[np.isfinite(c.values)])])
-            ax.set(ylabel=label, xlim=(0.0, longest * factor))
-        axes[0].set_title(title)
-        axes[-1].set_xlabel(f"Time [{unit}]")
-        legend_below(fig, axes[fullest], style)
+        fullest = max(zip(axes, panels.values(), strict=True), key=lambda panel: len(panel[1]))[0]
+        legend_below(fig, fullest, style)
     return fig
 
 
@@ -168,11 +151,7 @@ def bars(panels: Mapping[str, Sequence[Bar]], style: Style, *, title: str = "", 
             elif values:
                 ax.set_xlim(left=0.0)
             ax.set(xlabel=label)
-            ax.grid(axis="y", visible=False)
-            ax.tick_params(axis="y", length=0)
-            ax.spines["left"].set_visible(False)
-        axes[0].set_yticks(range(len(labels)), labels)
-        axes[0].set_ylim(len(labels) - 0.4, -0.6)
+            named_lines(ax, labels)
         fig.suptitle(title, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
         _legend(fig, paper=any(math.isfinite(b.paper[0]) for of in panels.values() for b in of))
     return fig

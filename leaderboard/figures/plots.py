@@ -1,4 +1,4 @@
-"""Figures of the site and of ``simnav run --plot``: from plain arrays to matplotlib figures.
+"""Figures of runs, rankings and papers: from plain arrays to matplotlib figures.
 
 Nothing here knows results, campaigns or scenarios. The style is that of `simnav.leaderboard.figures.style`.
 """
@@ -7,25 +7,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.figures.style import (
-    GREY,
-    INK,
-    PAPER,
-    TRUTH,
-    Style,
-    figure,
+from simnav.leaderboard.figures.frames import (
     legend_below,
+    longest_time,
+    named_lines,
     plain_log_ticks,
     shade,
-    styled,
+    time_panels,
     time_unit,
 )
+from simnav.leaderboard.figures.style import GREY, INK, PAPER, TRUTH, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,7 +88,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Dot:
-    """A figure with its interval and the runs behind it.
+    """A figure with its interval.
 
     Attributes
     ----------
@@ -99,8 +96,6 @@ class Dot:
         Name of the estimator.
     value, low, high : float
         The value and its interval.
-    runs : sequence of float
-        Values of the single runs.
     hollow : bool
         Reference rows.
     note : str
@@ -111,13 +106,12 @@ class Dot:
     value: float
     low: float = math.nan
     high: float = math.nan
-    runs: Sequence[float] = field(default_factory=tuple)
     hollow: bool = False
     note: str = ""
 
 
 # ------------------------------------------------------------------------------------------------
-# Figures of the site
+# Figures over one run or many
 
 
 def trajectory(
@@ -195,12 +189,8 @@ def error_over_time(
         Title of the figure.
     """
     with styled():
-        fig = figure(7.6, 1.0 + 2.15 * len(panels))
-        axes = np.atleast_1d(fig.subplots(len(panels), 1, sharex=True))
-        longest = max((float(b.time[-1]) for bands in panels.values() for b in bands if len(b.time)), default=1.0)
-        unit, factor = time_unit(longest)
-        for ax, (label, bands) in zip(axes, panels.items(), strict=True):
-            shade(ax, outages, factor, named=ax is axes[0])
+        fig, axes, factor = time_panels(panels, 2.15, outages, title)
+        for ax, bands in zip(axes, panels.values(), strict=True):
             floor = math.inf
             for band in sorted(bands, key=lambda b: style.order(b.label), reverse=True):
                 every = max(1, -(-len(band.time) // _POINTS))
@@ -213,9 +203,6 @@ def error_over_time(
                 if len(shown):
                     floor = min(floor, float(np.percentile(shown, 2.0)))
             _log_scale(ax, floor)
-            ax.set(ylabel=label, xlim=(0.0, longest * factor))
-        axes[0].set_title(title)
-        axes[-1].set_xlabel(f"Time [{unit}]")
         legend_below(fig, axes[0], style)
     return fig
 
@@ -261,7 +248,7 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
 
 
 def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "") -> Figure:
-    """One line for each estimator: the runs as faint points, and the figure with its interval.
+    """One line for each estimator: the figure with its interval.
 
     What is more than `FAR_OFF` times the median estimator stands at the edge, as a number.
     """
@@ -272,10 +259,6 @@ def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "") -> F
         ax = fig.add_subplot()
         for y, row in enumerate(rows):
             colour = style.colour(row.label)
-            runs = np.asarray([r for r in row.runs if math.isfinite(r)])
-            if len(runs):
-                offset = 0.16 * np.cos(np.arange(len(runs)) * 2.399963)  # spread without a random draw
-                ax.plot(runs, y + offset, ".", ms=4, mew=0, color=colour, alpha=0.35, zorder=2)
             if not math.isfinite(row.value):
                 continue
             if row.value > limit:
@@ -289,16 +272,11 @@ def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "") -> F
                 ax.plot([row.low, row.high], [y, y], color=colour, lw=1.6, marker="|", ms=6.0, zorder=3)
             ax.plot(row.value, y, style.marker(row.label), ms=4.5, mew=1.0, mec=colour,
                     mfc=PAPER if row.hollow else colour, zorder=4)  # fmt: skip
-        if any(math.isfinite(r.value) and r.value > 0 for r in rows):
+        if values:
             ax.set_xscale("log")
             plain_log_ticks(ax.xaxis)
         ax.set_xlim(right=min(ax.get_xlim()[1], limit))
-        names = [f"{r.label}  {r.note}".rstrip() for r in rows]
-        ax.set_yticks(range(len(rows)), names)
-        ax.set_ylim(len(rows) - 0.4, -0.6)
-        ax.grid(axis="y", visible=False)
-        ax.tick_params(axis="y", length=0)
-        ax.spines["left"].set_visible(False)
+        named_lines(ax, [f"{r.label}  {r.note}".rstrip() for r in rows])
         ax.set(xlabel=label, title=title)
     return fig
 
@@ -349,7 +327,7 @@ def run_chart(
         chart.set_anchor("N")
         # Below the label of the axis, however high the chart is.
         chart.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, borderaxespad=3.6)
-        longest = max((float(c.time[-1]) for cs in errors.values() for c in cs if len(c.time)), default=1.0)
+        longest = longest_time(errors)
         unit, factor = time_unit(longest)
         first: Axes | None = None
         places = [(row, 1) for row in range(len(errors))] + [(top + k // 2, k % 2) for k in range(len(below))]

@@ -127,9 +127,10 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
             curves.append(Curve(label, trial.time, factor * e, bound))
         if curves:
             panels[title] = curves
-    tracks = []
-    for label, trial, _ in shown:
-        tracks.append(relative_track(label, np.where(trial.estimated[:, :3], trial.position, np.nan), recording))
+    tracks = [
+        relative_track(label, np.where(trial.estimated[:, :3], trial.position, np.nan), recording)
+        for label, trial, _ in shown
+    ]
     note = f", {recording.note}" if recording.note else ""
     return run_chart(
         true_track(recording),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.style import GREY, INK, PALETTE, SHADE, figure, styled
+from simnav.leaderboard.figures.frames import grid_of_panels
+from simnav.leaderboard.figures.style import GREY, INK, PALETTE, SHADE, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["stanford_diagrams"]
 
-_COLUMNS = 3
 _STEPS = 60
 
 
@@ -39,15 +38,10 @@ def stanford_diagrams(diagrams: Mapping[str, Stanford], *, title: str = "") -> F
     """
     if not diagrams:
         raise ValueError("a figure of Stanford diagrams needs at least one of them")
-    columns = min(_COLUMNS, len(diagrams))
-    rows = math.ceil(len(diagrams) / columns)
     with styled():
-        made = figure(3.4 * columns, 3.3 * rows + 0.3)
-        axes = made.subplots(rows, columns, squeeze=False).ravel()
-        for ax, (label, diagram) in zip(axes, diagrams.items(), strict=False):
+        made, axes = grid_of_panels(len(diagrams), (3.4, 3.3), (0.0, 0.3))
+        for ax, (label, diagram) in zip(axes, diagrams.items(), strict=True):
             _panel(ax, label, diagram)
-        for ax in axes[len(diagrams) :]:
-            ax.set_visible(False)
         if title:
             made.suptitle(title, color=INK)
     return made

@@ -1,4 +1,4 @@
-"""The common style of all figures: colours, lines and axes, and how a figure is written to files.
+"""The common style of all figures: colours and lines, and how a figure is written to files.
 
 Every estimator keeps one colour and line style in all figures (`Style`); the palette can be told
 apart with any colour vision. SVG files follow the reader's light or dark setting in a browser and
@@ -8,7 +8,6 @@ are ordinary light figures everywhere else.
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.results.files import write_whole
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = [
@@ -26,12 +24,9 @@ __all__ = [
     "SHADE",
     "Style",
     "figure",
-    "legend_below",
-    "plain_log_ticks",
     "save",
-    "shade",
+    "save_as",
     "styled",
-    "time_unit",
 ]
 
 # Light and dark form of each colour: Okabe and Ito (2008) without yellow, and two of Tol's "muted" set.
@@ -50,7 +45,7 @@ _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
 INK, GREY, GRID, SHADE, PAPER = "#1b2430", "#66707d", "#dfe3e8", "#eceff3", "#fefefe"
 _DARK = {INK: "#e8ebef", GREY: "#9aa5b1", GRID: "#343c46", SHADE: "#262d36", PAPER: "#161b21"}
 TRUTH = INK
-_LEGEND = 15.0  # characters of a legend that fit into an inch
+_DPI = 160  # of PNG files
 
 _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -110,9 +105,7 @@ class Style:
 
     def colour(self, label: str) -> str:
         """Hex colour on a light ground."""
-        if label in self._references:
-            return GREY
-        return PALETTE[self._of(label) % len(PALETTE)][0]
+        return GREY if label in self._references else PALETTE[self._of(label) % len(PALETTE)][0]
 
     def line(self, label: str) -> Any:
         """Matplotlib line style: changes once the colours are used up."""
@@ -133,10 +126,9 @@ class Style:
 
 def figure(width: float, height: float) -> Figure:
     """An empty figure in the common style; ``width`` and ``height`` in inches."""
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with mpl.rc_context(_RC):
+    with styled():
         return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -147,7 +139,7 @@ def styled() -> Any:
     return mpl.rc_context(_RC)
 
 
-def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dpi: int = 160) -> list[Path]:
+def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png")) -> list[Path]:
     """Write a figure, atomically, once for each format.
 
     Parameters
@@ -158,8 +150,6 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
         Its suffix is replaced by the format's.
     formats : sequence of str
         Endings of the files, such as ``png``.
-    dpi : int
-        Of pixel formats.
 
     Returns
     -------
@@ -186,7 +176,7 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
             elif kind == "pdf":
                 FigureCanvasPdf(fig).print_pdf(buffer, metadata={"CreationDate": None})  # type: ignore[no-untyped-call]
             else:
-                fig.set_dpi(dpi)
+                fig.set_dpi(_DPI)
                 FigureCanvasAgg(fig).print_png(buffer, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
             content = buffer.getvalue()
             if kind == "svg":
@@ -194,6 +184,11 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
             target = path.with_suffix(f".{kind}")
             written.append(write_whole(target, content))
     return written
+
+
+def save_as(fig: Figure, path: Path) -> Path:
+    """Write a figure in the format that its file's suffix names, such as ``.png``; returns the path."""
+    return save(fig, path, formats=(path.suffix[1:].lower(),))[0]
 
 
 def _follow_theme(svg: str) -> str:
@@ -205,56 +200,3 @@ def _follow_theme(svg: str) -> str:
     css = "<style>@media (prefers-color-scheme:dark){" + "".join(rules) + "}</style>"
     head, tag, rest = svg.partition("<defs>")
     return head + css + tag + rest
-
-
-def time_unit(longest: float) -> tuple[str, float]:
-    """Unit that suits a time axis up to ``longest`` [s], and the factor to it."""
-    if longest > 3.0 * 3600.0:
-        return "h", 1.0 / 3600.0
-    return ("min", 1.0 / 60.0) if longest > 600.0 else ("s", 1.0)
-
-
-def shade(ax: Axes, outages: Sequence[tuple[float, float, str]], factor: float, *, named: bool) -> None:
-    """Shade outages (start, end [s], name), and name them at the top."""
-    last = -math.inf
-    for start, end, name in sorted(outages):
-        ax.axvspan(start * factor, end * factor, color=SHADE, lw=0, zorder=0)
-        if named and name and start >= last:
-            ax.annotate(name, (start * factor, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2),
-                        textcoords="offset points", ha="left", va="top", fontsize=7.0, color=GREY)  # fmt: skip
-            last = end
-
-
-def plain_log_ticks(axis: Any) -> None:
-    """Powers of ten as 0.1, 1, 10, 100, 1k; more ticks where the range is short."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    low, high = sorted(axis.get_view_interval())
-    decades = math.log10(high / low) if low > 0.0 else 9.0
-
-    def text(value: float, _: int) -> str:
-        if value >= 1e6 or value < 1e-4:
-            return f"1e{round(math.log10(value))}" if value > 0 else ""
-        return f"{value / 1e3:g}k" if value >= 1e4 else f"{value:g}"
-
-    subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0, 3.0) if decades < 3.2 else (1.0,)
-    axis.set_major_locator(LogLocator(base=10.0, subs=subs, numticks=12))
-    axis.set_major_formatter(FuncFormatter(text))
-    axis.set_minor_locator(NullLocator())
-
-
-def legend_below(fig: Figure, ax: Axes, style: Style | None = None) -> None:
-    """One legend for all panels, from one of them: in the order of the style, or without one the last drawn first."""
-    handles, labels = ax.get_legend_handles_labels()
-    if not handles:
-        return
-    columns = max(1, int(_LEGEND * fig.get_figwidth() / (max(map(len, labels)) + 7)))  # as many as fit side by side
-    pairs = list(zip(labels, handles, strict=True))[::-1]
-    if style is not None:
-        pairs.sort(key=lambda pair: style.order(pair[0]))
-    fig.legend(
-        [handle for _, handle in pairs],
-        [label for label, _ in pairs],
-        loc="outside lower center",
-        ncols=min(len(labels), columns, 5),
-    )

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simnav.leaderboard.figures.frames import grid_of_panels, legend_below, plain_log_ticks
 from simnav.leaderboard.figures.plots import Array
-from simnav.leaderboard.figures.style import GREY, Style, figure, legend_below, plain_log_ticks, styled
+from simnav.leaderboard.figures.style import GREY, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,16 +112,12 @@ def error_against_dial(
 def error_maps(
     maps: Sequence[Map], across: Sequence[float], up: Sequence[float], x: str, y: str, label: str, title: str
 ) -> Figure:
-    """A coloured table an estimator, on one scale; grey where half of the runs failed."""
+    """A coloured table for each map, at least one, on one scale; grey where half of the runs failed."""
     with styled():
-        columns = min(3, len(maps))
-        rows = math.ceil(len(maps) / columns)
-        fig = figure(1.2 + 3.0 * columns, 0.9 + 2.7 * rows)
-        axes = np.atleast_1d(fig.subplots(rows, columns, squeeze=False)).ravel()
-        finite = np.concatenate([m.value[np.isfinite(m.value)] for m in maps]) if maps else np.empty(0)
+        fig, axes = grid_of_panels(len(maps), (3.0, 2.7), (1.2, 0.9))
+        finite = np.concatenate([m.value[np.isfinite(m.value)] for m in maps])
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-        image = None
-        for ax, m in zip(axes, maps, strict=False):
+        for ax, m in zip(axes, maps, strict=True):
             ax.set_facecolor(GREY)
             shown = np.ma.masked_invalid(m.value)
             image = ax.imshow(shown, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high)
@@ -134,9 +131,6 @@ def error_maps(
             ax.set_title(m.label)
             ax.set_xlabel(x)
             ax.set_ylabel(y)
-        for ax in axes[len(maps) :]:
-            ax.set_visible(False)
-        if image is not None:
-            fig.colorbar(image, ax=list(axes), label=label)
+        fig.colorbar(image, ax=fig.axes, label=label)
         fig.suptitle(title, fontsize=10)
     return fig

@@ -10,7 +10,8 @@ import numpy as np
 
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.training.hybrid_learning import Learned
-from simnav.leaderboard.figures.style import GREY, PALETTE, figure, legend_below, save, styled
+from simnav.leaderboard.figures.frames import legend_below
+from simnav.leaderboard.figures.style import GREY, PALETTE, figure, save_as, styled
 from simnav.types import Array
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ _NAMES = ("low", "medium", "high")
 def write(parameters: Parameters, learned: Learned, path: Path) -> list[Path]:
     """Draw both figures as PNG beside a parameter file; OSError where that cannot be."""
     return [
-        *save(membership_functions(parameters, learned), path.with_name(f"{path.stem}-memberships"), formats=("png",)),
-        *save(learning_curve(learned), path.with_name(f"{path.stem}-learning"), formats=("png",)),
+        save_as(membership_functions(parameters, learned), path.with_name(f"{path.stem}-memberships.png")),
+        save_as(learning_curve(learned), path.with_name(f"{path.stem}-learning.png")),
     ]
 
 

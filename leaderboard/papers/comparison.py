@@ -31,6 +31,7 @@ __all__ = [
     "RULES",
     "TOLERANCE",
     "Verdict",
+    "as_gain",
     "judge",
     "judge_gain",
 ]
@@ -108,6 +109,15 @@ def judge_gain(ours: Interval, paper: float) -> Verdict:
     """
     ends = sorted((paper ** (1.0 / GAIN), paper**GAIN))
     return _verdict(ours, *ends)
+
+
+def as_gain(ratio: Interval) -> Interval:
+    """A ratio of two scores as a gain: a ratio of 0.7 is a gain of 0.3, and a low ratio is a large gain.
+
+    >>> as_gain(Interval(0.75, 0.5, 1.0, 10))
+    Interval(value=0.25, low=0.0, high=0.5, runs=10)
+    """
+    return Interval(1.0 - ratio.value, 1.0 - ratio.high, 1.0 - ratio.low, ratio.runs)
 
 
 def _verdict(ours: Interval, low: float, high: float) -> Verdict:

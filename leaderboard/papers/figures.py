@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from simnav.leaderboard.figures.panels import Bar, bars, curves_over_time
 from simnav.leaderboard.figures.plots import Band, Curve, error_cdf, error_over_time, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
 from simnav.leaderboard.figures.style import Style, save
+from simnav.leaderboard.papers.comparison import as_gain
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.papers.paper import Figure, Gain, Range, Value
 from simnav.leaderboard.ranking.runs import Runs
@@ -56,6 +57,10 @@ ERRORS: dict[str, tuple[tuple[int, ...], float]] = {
 }
 _SPREAD_FACTORS = {"heading": _DEGREES}
 
+#: A figure, the methods in it, and its caption; `_NOTHING` where nothing can be drawn.
+_Made: TypeAlias = "tuple[matplotlib.figure.Figure | None, list[str], str]"
+_NOTHING: _Made = (None, [], "")
+
 
 @dataclass(frozen=True)
 class Drawn:
@@ -81,16 +86,6 @@ class Drawn:
     width: int = 0
     height: int = 0
     missing: tuple[str, ...] = ()
-
-    @property
-    def number(self) -> str:
-        """With the letter of its part, where it has one."""
-        return _number(self.figure)
-
-    @property
-    def title(self) -> str:
-        """What it shows."""
-        return _title(self.figure)
 
 
 def write_figures(
@@ -135,15 +130,6 @@ def draw(found: Reproduction, entry: Figure) -> matplotlib.figure.Figure | None:
     return _Sketch(found).draw(entry)[0]
 
 
-def _number(entry: Figure) -> str:
-    """With the letter of its part, where it has one."""
-    return f"{entry.number}{entry.part}" if len(entry.part) == 1 else entry.number
-
-
-def _title(entry: Figure) -> str:
-    return f"{entry.what}, {entry.part}" if len(entry.part) > 1 else entry.what
-
-
 class _Sketch:
     """What the figures of a paper share: style, recordings and trials of the first seed."""
 
@@ -153,8 +139,8 @@ class _Sketch:
         self.recordings: dict[str, Recording] = {}
         self.trials: dict[tuple[str, str], Trial | None] = {}
 
-    def draw(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
-        """A figure, the methods in it, and its caption."""
+    def draw(self, entry: Figure) -> _Made:
+        """Draw one figure."""
         draw = {
             "track": self._track,
             "run": self._run,
@@ -179,8 +165,8 @@ class _Sketch:
         return Drawn(entry, path, caption + note, round(width), round(height), missing)
 
     def _heading(self, entry: Figure, runs: str) -> str:
-        number = f", {_number(entry)}" if entry.number else ""
-        return f"{self.paper.short}{number}: {_title(entry)} ({runs})"
+        number = f", {entry.full_number}" if entry.number else ""
+        return f"{self.paper.short}{number}: {entry.title} ({runs})"
 
     # -- one run ---------------------------------------------------------------------------------
 
@@ -213,7 +199,7 @@ class _Sketch:
     def _seed(self) -> str:
         return f"seed {self.found.seeds[0]}"
 
-    def _track(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+    def _track(self, entry: Figure) -> _Made:
         recording = self._recording(entry.scenario)
         tracks = []
         for method in entry.methods:
@@ -225,12 +211,12 @@ class _Sketch:
                 position = trial.smoothed.position.copy()
             tracks.append(relative_track(method, position, recording))
         if entry.methods and not tracks:
-            return None, [], ""
+            return _NOTHING
         title = self._heading(entry, self._seed())
         fig = trajectory(true_track(recording), tracks, self.style, fixes=fixes(recording), title=title)
         return fig, [t.label for t in tracks], f"One run ({self._seed()}): the true track, the fixes and the estimates."
 
-    def _run(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+    def _run(self, entry: Figure) -> _Made:
         recording = self._recording(entry.scenario)
         panels: dict[str, list[Curve]] = {}
         for label, name in entry.series.items():
@@ -240,7 +226,7 @@ class _Sketch:
             panels[label] = curves
         shown = {c.label for curves in panels.values() for c in curves}
         if not shown:
-            return None, [], ""
+            return _NOTHING
         spans = outage_spans(recording)
         title = self._heading(entry, self._seed())
         fig = curves_over_time(panels, self.style, outages=spans, title=title)
@@ -288,28 +274,28 @@ class _Sketch:
     def _count(self) -> str:
         return f"{len(self.found.seeds)} runs"
 
-    def _spread(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+    def _spread(self, entry: Figure) -> _Made:
         panels: dict[str, list[Band]] = {}
         for label, name in entry.series.items():
             bands = ((m, r.band(name, _SPREAD_FACTORS.get(name, 1.0))) for m, r in self._all(entry))
             panels[label] = [Band(m, b.time, b.values) for m, b in bands if b is not None]
         shown = {b.label for bands in panels.values() for b in bands}
         if not shown:
-            return None, [], ""
+            return _NOTHING
         spans = outage_spans(self._recording(entry.scenario))
         fig = error_over_time(panels, self.style, outages=spans, title=self._heading(entry, self._count()))
         caption = f"{self._count()}: median of the error's size, and the band from the 5th to the 95th percentile."
         return fig, [m for m in entry.methods if m in shown], caption
 
-    def _distribution(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+    def _distribution(self, entry: Figure) -> _Made:
         bands = [Band(m, q.time, q.values) for m, r in self._all(entry) if (q := r.quantiles()) is not None]
         if not bands:
-            return None, [], ""
+            return _NOTHING
         fig = error_cdf(bands, self.style, label="Horizontal error [m]", title=self._heading(entry, self._count()))
         caption = f"Share of the epochs of {self._count()} whose horizontal error is below a value."
         return fig, [b.label for b in bands], caption
 
-    def _bars(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+    def _bars(self, entry: Figure) -> _Made:
         panels: dict[str, list[Bar]] = {}
         for label, score in entry.series.items():
             papers = {r.method: r.paper for r in self.paper.rows()
@@ -320,7 +306,7 @@ class _Sketch:
                 panels[label].append(_bar(method, mean(values), values, papers.get(method)))
         return self._compared(entry, panels, zero=False)
 
-    def _gains(self, entry: Figure) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+    def _gains(self, entry: Figure) -> _Made:
         first, *others = entry.methods
         ours = self._runs(entry.scenario, first)
         panels: dict[str, list[Bar]] = {}
@@ -335,22 +321,18 @@ class _Sketch:
                 if method not in others or ours is None or not ours.good:
                     continue
                 a, b = ({r.seed: value_of(r, score) for r in of.good} for of in (ours, runs))
-                ratio = mean_ratio(a, b)
-                value, low, high = (100.0 * (1.0 - x) for x in (ratio.value, ratio.high, ratio.low))
+                gain = as_gain(mean_ratio(a, b))
+                ours_in_percent = Interval(100.0 * gain.value, 100.0 * gain.low, 100.0 * gain.high, gain.runs)
                 each = [100.0 * (1.0 - a[s] / b[s]) for s in a if s in b and b[s] > 0.0]
                 paper = papers.get(method)
-                panels[label].append(
-                    _bar(method, Interval(value, low, high, ratio.runs), each, None if paper is None else 100.0 * paper)
-                )
+                panels[label].append(_bar(method, ours_in_percent, each, None if paper is None else 100.0 * paper))
         fig, shown, caption = self._compared(entry, panels, zero=True)
         return fig, [first, *shown] if shown else [], caption
 
-    def _compared(
-        self, entry: Figure, panels: dict[str, list[Bar]], *, zero: bool
-    ) -> tuple[matplotlib.figure.Figure | None, list[str], str]:
+    def _compared(self, entry: Figure, panels: dict[str, list[Bar]], *, zero: bool) -> _Made:
         shown = {b.label for of in panels.values() for b in of if math.isfinite(b.value)}
         if not shown:
-            return None, [], ""
+            return _NOTHING
         fig = bars(panels, self.style, title=self._heading(entry, self._count()), zero=zero)
         caption = f"Mean over {self._count()} with its 95 % interval, the runs (faint), and the paper's figure."
         return fig, [m for m in entry.methods if m in shown], caption

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Measure", "measure", "scores_of", "value_of"]
 
-_UNITS = {"rad": ("deg", 180.0 / math.pi), "s": ("s", 1.0)}
-
 
 class Measure(NamedTuple):
     """Title, unit as the papers have it, and the factor from SI to it."""
@@ -41,7 +39,7 @@ def measure(name: str) -> Measure:
     if name in _OWN:
         return _OWN[name]
     info = SCORES[name]
-    unit, factor = _UNITS.get(info.unit, (info.unit, 1.0))
+    unit, factor = ("deg", math.degrees(1.0)) if info.unit == "rad" else (info.unit, 1.0)
     return Measure(info.title, unit, factor)
 
 

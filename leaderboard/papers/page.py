@@ -191,7 +191,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn]) -> _Document:
         notes=list(paper.notes),
         tables=list(sheets(found)),
         figures=[
-            _Figure(d.number, d.title, d.path.name, d.caption, d.width, d.height, list(d.missing))
+            _Figure(d.figure.full_number, d.figure.title, d.path.name, d.caption, d.width, d.height, list(d.missing))
             for d in drawn
             if d.path is not None
         ],

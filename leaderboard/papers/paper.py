@@ -47,12 +47,13 @@ Draw = Literal["track", "run", "spread", "bars", "gains", "distribution"]
 
 
 # Panels of figures of one run.
-_NORTH_EAST = {"North error [m]": "north", "East error [m]": "east"}
-_NORTH_EAST_VELOCITY = {"North velocity error [m/s]": "velocity_north", "East velocity error [m/s]": "velocity_east"}
-POSITION: Mapping[str, str] = {**_NORTH_EAST, "Down error [m]": "down"}
-HORIZONTAL: Mapping[str, str] = _NORTH_EAST
-VELOCITY: Mapping[str, str] = {**_NORTH_EAST_VELOCITY, "Down velocity error [m/s]": "velocity_down"}
-HORIZONTAL_VELOCITY: Mapping[str, str] = _NORTH_EAST_VELOCITY
+HORIZONTAL: Mapping[str, str] = {"North error [m]": "north", "East error [m]": "east"}
+POSITION: Mapping[str, str] = {**HORIZONTAL, "Down error [m]": "down"}
+HORIZONTAL_VELOCITY: Mapping[str, str] = {
+    "North velocity error [m/s]": "velocity_north",
+    "East velocity error [m/s]": "velocity_east",
+}
+VELOCITY: Mapping[str, str] = {**HORIZONTAL_VELOCITY, "Down velocity error [m/s]": "velocity_down"}
 ATTITUDE: Mapping[str, str] = {
     "Tilt about north [deg]": "tilt_north",
     "Tilt about east [deg]": "tilt_east",
@@ -190,7 +191,7 @@ class Figure:
     number : str
         ``Figure 4``; empty for one that the paper does not have.
     what : str
-        Its title.
+        What it shows.
     draw : str
         How (see `Draw`).
     scenario : str
@@ -212,6 +213,16 @@ class Figure:
     methods: tuple[str, ...]
     series: Mapping[str, str] = field(default_factory=dict)
     part: str = ""
+
+    @property
+    def full_number(self) -> str:
+        """With the letter of its part, where it has one."""
+        return f"{self.number}{self.part}" if len(self.part) == 1 else self.number
+
+    @property
+    def title(self) -> str:
+        """What it shows, with the name of its part, where it has one."""
+        return f"{self.what}, {self.part}" if len(self.part) > 1 else self.what
 
     @property
     def name(self) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from simnav.leaderboard.papers.comparison import as_gain
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.measures import measure
 from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Gain, Range
@@ -114,7 +115,7 @@ def sheets(found: Reproduction) -> Iterator[Sheet]:
         for f in rows:
             name = _method(f)
             same = name == before
-            who = ["", ""] if same else [name, _by(f)]
+            who = ["", ""] if same else [name, " / ".join(f.estimators)]
             texts = [*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys)]
             cells.append(SheetRow(texts, f.verdict))
             before = name
@@ -173,10 +174,6 @@ def _method(f: Finding) -> str:
     return f"{f.row.method} against {f.row.than}" if isinstance(f.row, Gain) else f.row.method
 
 
-def _by(f: Finding) -> str:
-    return " / ".join(f.estimators)
-
-
 def _title(f: Finding, with_scenario: bool) -> str:
     m = measure(f.row.score)
     text = f"gain in {m.title[0].lower()}{m.title[1:]}" if isinstance(f.row, Gain) else f"{m.title} [{m.unit}]"
@@ -204,8 +201,9 @@ def _ours(f: Finding) -> str:
         return tables.interval(f.ours.value, f.ours.low, f.ours.high)
     if f.ours.value > 2.0:  # too large for a gain in percent
         return f"worse by a factor of {tables.interval(f.ours.value, f.ours.low, f.ours.high)}"
+    gain = as_gain(f.ours)
     # Rounded here, and added to zero, so that there is no -0.0.
-    value, low, high = (round(1.0 - x, 3) + 0.0 for x in (f.ours.value, f.ours.high, f.ours.low))
+    value, low, high = (round(x, 3) + 0.0 for x in (gain.value, gain.low, gain.high))
     if low != low or high != high:
         return tables.percent(value)
     return f"{tables.percent(value)} [{100.0 * low:.1f}, {100.0 * high:.1f}]"

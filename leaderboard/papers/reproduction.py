@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.papers.comparison import Verdict, judge, judge_gain
+from simnav.leaderboard.papers.comparison import Verdict, as_gain, judge, judge_gain
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row, kind_of
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
@@ -133,9 +133,7 @@ def _row_dict(f: Finding) -> dict[str, Any]:
     m = measure(f.row.score)
     gain = isinstance(f.row, Gain)
     paper: Any = f.row.paper
-    ours = None if f.ours is None else [f.ours.value, f.ours.low, f.ours.high]
-    if gain and ours is not None:  # a ratio of 0.7 is a gain of 30 %; a low ratio is a large gain
-        ours = [1.0 - ours[0], 1.0 - ours[2], 1.0 - ours[1]]
+    ours = as_gain(f.ours) if gain and f.ours is not None else f.ours
     return {
         "table": f.table,
         "scenario": f.row.scenario,
@@ -149,10 +147,10 @@ def _row_dict(f: Finding) -> dict[str, Any]:
         "rule": "gain" if isinstance(f.row, Gain) else f.row.rule,
         "kind": kind_of(f.row),
         "derived": f.row.derived,
-        "ours": None if ours is None else ours[0],
-        "low": None if ours is None else ours[1],
-        "high": None if ours is None else ours[2],
-        "runs": 0 if f.ours is None else f.ours.runs,
+        "ours": None if ours is None else ours.value,
+        "low": None if ours is None else ours.low,
+        "high": None if ours is None else ours.high,
+        "runs": 0 if ours is None else ours.runs,
         "failed": f.failed,
         "verdict": f.verdict,
         "why": f.why,

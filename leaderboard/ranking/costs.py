@@ -63,13 +63,9 @@ class CostReport:
     def plot(self) -> Figure:
         """Median time and peak memory of each estimator that could be measured."""
         measured = [cost for cost in self.costs if cost.status == "ok"]
-
-        def panel(values: list[float]) -> list[Bar]:
-            return [Bar(c.estimator, v, math.nan, math.nan, ()) for c, v in zip(measured, values, strict=True)]
-
         panels = {
-            "Median time of an epoch [ms]": panel([1e3 * c.update_median for c in measured]),
-            "Peak memory [kB]": panel([c.peak_memory / 1024.0 for c in measured]),
+            "Median time of an epoch [ms]": [Bar(c.estimator, 1e3 * c.update_median) for c in measured],
+            "Peak memory [kB]": [Bar(c.estimator, c.peak_memory / 1024.0) for c in measured],
         }
         title = f"{self.scenario}: what an epoch costs, {self.epochs} epochs"
         return bars(panels, Style([c.estimator for c in measured]), title=title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,10 +18,7 @@ __all__ = ["failure_table", "failures"]
 
 def failures(results: Sequence[Result]) -> dict[str, int]:
     """How many results have which status, but for those that are ok or do not suit."""
-    found: dict[str, int] = {}
-    for r in _failed(results):
-        found[r.status] = found.get(r.status, 0) + 1
-    return found
+    return dict(Counter(r.status for r in _failed(results)))
 
 
 def failure_table(results: Sequence[Result]) -> list[Table]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.fingerprint import digest, estimator_source, recording_digest, simulator_version
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.files import write_whole
 
 if TYPE_CHECKING:
     from simnav.estimators.reference import OracleRun
@@ -97,6 +98,4 @@ class OracleRuns:
         """Write head and runs anew: the file may be missing, be of another key, or end in half a line."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         lines = [self._head, *(json.dumps(asdict(r)) for r in self.runs.values())]
-        part = self.path.with_suffix(".part")
-        part.write_text("\n".join(lines) + "\n")
-        os.replace(part, self.path)
+        write_whole(self.path, "\n".join(lines) + "\n")

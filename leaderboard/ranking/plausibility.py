@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Reference
@@ -56,12 +56,10 @@ def too_good(log_ratios: ArrayLike, reference: Reference, scenarios: int = 1) ->
     x = np.asarray(log_ratios, dtype=np.float64)
     if not len(x) or not reference.bounds or reference.runs < 2:
         return False
-    from scipy.special import stdtr
-
     own = float(x.std(ddof=1)) if len(x) > 1 else 0.0
     spread = max(reference.spread, own, _LEAST_SPREAD)
-    statistic = (float(x.mean()) - math.log(MARGIN)) / (spread * math.sqrt(1.0 / len(x) + 1.0 / reference.runs))
-    return float(stdtr(reference.runs - 1.0, statistic)) < _ALPHA / max(scenarios, 1)
+    error = spread * math.sqrt(1.0 / len(x) + 1.0 / reference.runs)
+    return _below_margin(x, error, reference.runs - 1.0, scenarios)
 
 
 def beats(differences: ArrayLike, scenarios: int = 1) -> bool:
@@ -86,10 +84,16 @@ def beats(differences: ArrayLike, scenarios: int = 1) -> bool:
     >>> beats([-0.6, -0.7, -0.5, -0.65, -0.55]), beats([-0.6, 0.1, -0.2, 0.3, -0.1])
     (True, False)
     """
-    from scipy.special import stdtr
-
     x = np.asarray(differences, dtype=np.float64)
     if len(x) < LEAST_PAIRS:
         return False
     error = max(float(x.std(ddof=1)), _LEAST_SPREAD) / math.sqrt(len(x))
-    return float(stdtr(len(x) - 1.0, (float(x.mean()) - math.log(MARGIN)) / error)) < _ALPHA / max(scenarios, 1)
+    return _below_margin(x, error, len(x) - 1.0, scenarios)
+
+
+def _below_margin(logs: NDArray[np.float64], error: float, freedom: float, scenarios: int) -> bool:
+    """Whether the mean of logarithms is below that of `MARGIN` by more than chance, given its standard error."""
+    from scipy.special import stdtr
+
+    statistic = (float(logs.mean()) - math.log(MARGIN)) / error
+    return float(stdtr(freedom, statistic)) < _ALPHA / max(scenarios, 1)

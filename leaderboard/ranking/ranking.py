@@ -36,6 +36,7 @@ from simnav.leaderboard.ranking.adjustment import adjustments
 from simnav.leaderboard.ranking.board import (
     Consistency,
     Ranking,
+    Row,
     ScenarioRanking,
     ScenarioRow,
     Standing,
@@ -181,7 +182,7 @@ class _Scenario:
         self.unsuitable = {n: why for n in sorted(by) if (why := by[n].unsuitable())}
         entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
         if track.name == "post-processing":  # whoever never smooths is not in it
-            entries = {n: r for n, r in entries.items() if any(_finite(x, track.score) for x in r.tried)}
+            entries = {n: r for n, r in entries.items() if np.isfinite(r.scores(track.score)).any()}
         self.reference = reference_of(name, track.score, entries, self.recorded)
         ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
         seeds = sorted({x.seed for r in ranked for x in r.tried})
@@ -232,26 +233,15 @@ class _Scenario:
 
     def ranking(self) -> ScenarioRanking:
         """The ranking on this scenario alone."""
-        standing: dict[str, tuple[Standing, str]] = {}
-        for n, cell in self.cells.items():
-            standing[n] = ("ranked", "")
-            if cell.runs.reference:
-                standing[n] = ("reference", "")
-            elif not len(cell.logs):
-                standing[n] = ("incomplete", _NO_SEED)
-            elif self.implausible(n):
-                standing[n] = ("implausible", _IMPLAUSIBLE.format(self.name))
-            elif twin := real_time_twin(n, self.track.score, [{m: c.runs for m, c in self.cells.items()}]):
-                standing[n] = ("identical", _IDENTICAL.format(twin))
-        shown = {n: self.cells[n] for n in self.cells if len(self.cells[n].logs)}
-        rows, separation = _rows([self], {n: {self.name: c} for n, c in shown.items()}, standing)
+        shown = {n: {self.name: c} for n, c in self.cells.items() if len(c.logs)}
+        standing = {n: _standing(n, [self], c, self.track.score) for n, c in shown.items()}
+        rows, separation = _rows([self], shown, standing)
         found = []
         for row in rows:
-            cell = shown[row["estimator"]]
-            errors = [r.scores.get(self.track.score, math.nan) for r in cell.runs.good]
+            cell = self.cells[row["estimator"]]
             found.append(ScenarioRow(
                 **row,
-                median=float(np.median(errors)) if errors else math.nan,
+                median=_median(cell.runs.scores(self.track.score)),
                 statuses=cell.runs.statuses,
                 ratios={str(u): math.exp(x) for u, x in zip(*_by_unit(cell), strict=True)},
             ))  # fmt: skip
@@ -269,10 +259,6 @@ _IMPLAUSIBLE = (
 _IDENTICAL = "in real time it is {}, to the bit; it is ranked by what it smooths"
 
 
-def _finite(result: Result, name: str) -> bool:
-    return result.status == "ok" and math.isfinite(result.scores.get(name, math.nan))
-
-
 def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
     """The ranking over the scenarios of a track."""
     names = sorted({n for t in tables for n in (*t.cells, *t.unsuitable)})
@@ -281,25 +267,12 @@ def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
     cells: dict[str, dict[str, _Cell]] = {}
     for n in names:
         cells[n] = {t.name: t.cells[n] for t in used if n in t.cells and len(t.cells[n].logs)}
-        if not cells[n]:
-            if track.name != "post-processing" and any(n in t.unsuitable for t in used):
-                standing[n] = _not_suited(n, used)
-            elif any(n in t.cells for t in used):
-                standing[n] = ("incomplete", _NO_SEED)
-            continue
-        missing = [t.name for t in used if t.name not in cells[n]]
-        standing[n] = ("ranked", "")
-        if any(c.runs.reference for c in cells[n].values()):
-            standing[n] = ("reference", "")
-        elif any(n in t.unsuitable for t in used):
-            standing[n] = _not_suited(n, used)
-        elif missing:
-            more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-            standing[n] = ("incomplete", f"it has not run {missing[0]}{more}")
-        elif bad := [t.name for t in used if t.implausible(n, len(used))]:
-            standing[n] = ("implausible", _IMPLAUSIBLE.format(bad[0]))
-        elif twin := real_time_twin(n, track.score, [{m: c.runs for m, c in t.cells.items()} for t in used]):
-            standing[n] = ("identical", _IDENTICAL.format(twin))
+        if cells[n]:
+            standing[n] = _standing(n, used, cells[n], track.score)
+        elif track.name != "post-processing" and (why := _not_suited(n, used)):
+            standing[n] = "unsuitable", why
+        elif any(n in t.cells for t in used):
+            standing[n] = "incomplete", _NO_SEED
     shown = {n: c for n, c in cells.items() if c}
     rows, separation = _rows(used, shown, standing)
     found = []
@@ -324,9 +297,25 @@ def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
     )  # fmt: skip
 
 
-def _not_suited(name: str, tables: Sequence[_Scenario]) -> tuple[Standing, str]:
-    table = next(t for t in tables if name in t.unsuitable)
-    return "unsuitable", f"{table.name}: {table.unsuitable[name]}"
+def _standing(name: str, tables: Sequence[_Scenario], cells: Mapping[str, _Cell], score: str) -> tuple[Standing, str]:
+    """Whether a row that has runs (by scenario: ``cells``) is ranked over some scenarios, and if not, why."""
+    if any(c.runs.reference for c in cells.values()):
+        return "reference", ""
+    if why := _not_suited(name, tables):
+        return "unsuitable", why
+    if missing := [t.name for t in tables if t.name not in cells]:
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        return "incomplete", f"it has not run {missing[0]}{more}"
+    if bad := [t.name for t in tables if t.implausible(name, len(tables))]:
+        return "implausible", _IMPLAUSIBLE.format(bad[0])
+    if twin := real_time_twin(name, score, [{m: c.runs for m, c in t.cells.items()} for t in tables]):
+        return "identical", _IDENTICAL.format(twin)
+    return "ranked", ""
+
+
+def _not_suited(name: str, tables: Sequence[_Scenario]) -> str:
+    """Which scenario does not suit a row, the first one, and why; empty where all suit it."""
+    return next((f"{t.name}: {t.unsuitable[name]}" for t in tables if name in t.unsuitable), "")
 
 
 def _by_unit(cell: _Cell) -> tuple[list[Any], Array]:
@@ -361,14 +350,14 @@ def _figures(tables: Sequence[_Scenario], cells: Mapping[str, _Cell]) -> _Figure
     for t in tables:
         if t.name not in cells:
             continue
-        units, values = _by_unit(cells[t.name])
-        lost = {u for u, bad in zip(cells[t.name].units, cells[t.name].failed.tolist(), strict=True) if bad}
-        lost -= {u for u, bad in zip(cells[t.name].units, cells[t.name].failed.tolist(), strict=True) if not bad}
+        cell = cells[t.name]
+        units, values = _by_unit(cell)
+        completed = {u for u, failed_here in zip(cell.units, cell.failed.tolist(), strict=True) if not failed_here}
         strata += ["recordings" if t.recorded else t.name] * len(units)
         clusters += [(t.name, u) if t.recorded else u for u in units]
         logs.append(values)
-        adjusted.append(np.minimum(values + cells[t.name].adjustment, _CAP))
-        failed += [u in lost for u in units]
+        adjusted.append(np.minimum(values + cell.adjustment, _CAP))
+        failed += [u not in completed for u in units]
     return _Figures(strata, clusters, np.concatenate(logs), np.concatenate(adjusted), np.array(failed, dtype=bool))
 
 
@@ -446,13 +435,12 @@ def _places(
     return found, places
 
 
-def _units(rows: Sequence[Any], tables: Sequence[_Scenario], cells: Mapping[str, Any]) -> int:
+def _units(rows: Sequence[Row], tables: Sequence[_Scenario], cells: Mapping[str, Mapping[str, _Cell]]) -> int:
     """How many seeds (recordings) the ranked rows have at least, in a scenario (over a recorded track)."""
     names = [r.estimator for r in rows if r.ranked] or [r.estimator for r in rows if r.estimator in cells]
     counts = []
     for n in names:
-        mine = cells[n]
-        each = [len(set(c.units)) for c in (mine.values() if isinstance(mine, Mapping) else [mine])]
+        each = [len(set(c.units)) for c in cells[n].values()]
         counts.append(sum(each) if tables[0].recorded else min(each))
     return min(counts, default=0)
 

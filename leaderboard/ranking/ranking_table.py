@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking import tables
@@ -20,7 +20,6 @@ __all__ = [
     "ratio",
     "score_caption",
     "score_title",
-    "tier_starts",
     "track_table",
 ]
 
@@ -40,15 +39,6 @@ def score_caption(track: TrackRanking) -> str:
     what = f"{SCORES[track.score].title} [{SCORES[track.score].unit}]" if track.score in SCORES else track.score
     what = f"× reference: {what} over the scenario's reference figure" if track.relative else f"Error: {what}"
     return _CAPTION.format(score=what, cap=FAILURE)
-
-
-def tier_starts(tiers: Sequence[int | None]) -> list[bool]:
-    """Whether each row begins another tier than the one before.
-
-    >>> tier_starts([1, 1, 2, None])
-    [False, False, True, True]
-    """
-    return [k > 0 and tier != tiers[k - 1] for k, tier in enumerate(tiers)]
 
 
 def ratio(value: float) -> str:

@@ -110,8 +110,7 @@ def reference_of(scenario: str, score: str, cells: Mapping[str, Runs], recorded:
     if recorded:
         names = [n for n in PLAIN if n in cells]
     for candidate in names:
-        errors = [r.scores.get(score, math.nan) for r in cells[candidate].good]
-        made = figure(errors, candidate)
+        made = figure(cells[candidate].scores(score).tolist(), candidate)
         if made is not None:
             return made
     return Reference()

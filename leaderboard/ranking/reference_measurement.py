@@ -147,7 +147,6 @@ def save(figures: Mapping[str, Mapping[str, Reference]], path: Path = reference.
             for scenario, scores in sorted(merged.items())
         },
     }
-    text: Any = json.dumps(content, indent=1)
     with store.atomic(path) as file:
-        file.write(text.encode() + b"\n")
+        file.write(json.dumps(content, indent=1).encode() + b"\n")
     reference.stored.cache_clear()

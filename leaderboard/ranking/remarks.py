@@ -52,10 +52,10 @@ def remarks(
         elif not separation.any:
             found.append("No two rows can be told apart: all are tied.")
     without = [r for r in references if not r.estimator]
-    if without:
-        what = "there is no reference figure" if len(without) == len(references) else (
-            f"{len(without)} of {len(references)} scenarios have no reference figure, and count")  # fmt: skip
-        found.append(f"Errors are in metres: {what}." if len(without) == len(references) else f"{what} in metres.")
+    if without and len(without) == len(references):
+        found.append("Errors are in metres: there is no reference figure.")
+    elif without:
+        found.append(f"{len(without)} of {len(references)} scenarios have no reference figure, and count in metres.")
     return tuple(found)
 
 

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.figures.plots import Array, Band, Track
+from simnav.leaderboard.figures.plots import Array, Band
 from simnav.leaderboard.ranking.statistics import Interval, median
 from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.results.result import Result, Series
 
-__all__ = ["Run", "Runs", "group", "tracks"]
+__all__ = ["Run", "Runs", "at_times", "group", "has_series"]
 
 Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
 _PLACES = {name: k for k, name in enumerate(SCORES)}
@@ -65,7 +66,7 @@ class Runs:
     @cached_property
     def good(self) -> list[Result]:
         """Those that ended well."""
-        return [r for r, good in zip(self.results, self._good.tolist(), strict=True) if good]
+        return [r for r in self.results if r.status == "ok"]
 
     @property
     def failed(self) -> int:
@@ -112,46 +113,46 @@ class Runs:
     @cached_property
     def statuses(self) -> dict[str, int]:
         """How many runs ended how (`Result.ending`)."""
-        found = [r.ending for r in self.tried]
-        return {s: found.count(s) for s in sorted(set(found))}
+        return dict(sorted(Counter(r.ending for r in self.tried).items()))
 
     def unsuitable(self) -> str:
         """Which instrument is lacking, where the scenario does not suit the estimator; otherwise nothing."""
-        lacking = [r.reason or r.status for r in self.results if r.status == "unsuitable"]
-        return min(lacking) if lacking else ""
+        return min((r.reason or r.status for r in self.results if r.status == "unsuitable"), default="")
 
     # -- curves --------------------------------------------------------------------------------------
 
     def band(self, name: str, factor: float = 1.0) -> Band | None:
         """Magnitude of an error over time, a row a run, on the time axis of the longest run; None without any."""
-        found = [(r.series["time"], np.abs(r.series[name])) for r in self.good if _has(r, name)]
+        found = [(r.series["time"], np.abs(r.series[name])) for r in self.good if has_series(r.series, name)]
         if not found:
             return None
         time = max((t for t, _ in found), key=lambda t: float(t[-1])).astype(np.float64)
-        rows = [np.interp(time, t, v, right=np.nan) if len(t) != len(time) or not np.array_equal(t, time) else v
-                for t, v in found]  # fmt: skip
+        rows = [at_times(time, t, v) for t, v in found]
         return Band(self.estimator, time, factor * np.asarray(rows, dtype=np.float64))
 
     def quantiles(self) -> Band | None:
         """Quantiles of the horizontal error, a row a run: their pooled distribution is that of all epochs."""
-        rows = [r.series["quantiles"] for r in self.good if _has(r, "quantiles")]
+        rows = [r.series["quantiles"] for r in self.good if has_series(r.series, "quantiles")]
         if not rows:
             return None
         values = np.asarray(rows, dtype=np.float64)
         return Band(self.estimator, np.arange(values.shape[1], dtype=np.float64), values)
-
-    def at(self, seed: int) -> Result | None:
-        """The run with a seed, if it ended well."""
-        return next((r for r in self.good if r.seed == seed), None)
 
 
 def _run(result: Result) -> Run:
     return result.seed, result.note
 
 
-def _has(result: Result, name: str) -> bool:
-    values = result.series.get(name)
+def has_series(series: Mapping[str, Series], name: str) -> bool:
+    """Whether the series of a result have one of this name, with a finite value."""
+    values = series.get(name)
     return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
+
+
+def at_times(time: Array, t: NDArray[Any], values: NDArray[Any]) -> NDArray[Any]:
+    """Values at the times t (n,), interpolated at others (k,); NaN after the last one. All in seconds."""
+    same = len(t) == len(time) and np.array_equal(t, time)
+    return values if same else np.interp(time, t, values, right=np.nan)
 
 
 def group(results: Iterable[Result]) -> dict[str, dict[str, Runs]]:
@@ -160,23 +161,3 @@ def group(results: Iterable[Result]) -> dict[str, dict[str, Runs]]:
     for r in results:
         lists.setdefault(r.scenario, {}).setdefault(r.estimator, []).append(r)
     return {s: {e: Runs(found) for e, found in by.items()} for s, by in lists.items()}
-
-
-def tracks(runs: Iterable[Runs], seed: int) -> tuple[Track | None, list[Track]]:
-    """Truth and estimates of one seed, from the series; (None, []) where no run of it has a track."""
-    truth: Array | None = None
-    estimates = []
-    for r in runs:
-        result = r.at(seed)
-        if result is None or not _has(result, "truth_north"):
-            continue
-        s = {k: np.asarray(v, dtype=np.float64) for k, v in result.series.items()}
-        known = np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"])
-        this = np.column_stack([s["truth_east"][known], s["truth_north"][known]])
-        if truth is None or len(this) > len(truth):
-            truth = this
-        if _has(result, "estimate_north"):
-            estimates.append(Track(r.estimator, s["estimate_east"], s["estimate_north"]))
-    if truth is None or not len(truth):
-        return None, []
-    return Track("truth", truth[:, 0], truth[:, 1]), estimates

@@ -24,9 +24,7 @@ def number(value: Any, digits: int = 3) -> str:
     """
     if value is None:
         return MISSING
-    if isinstance(value, (bool, str)):
-        return str(value)
-    if isinstance(value, int):
+    if isinstance(value, (int, str)):
         return str(value)
     x = float(value)
     if math.isnan(x):

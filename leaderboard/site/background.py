@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -17,15 +17,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, true_track
-from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.site.facts import catalogued, datasheets, events
-from simnav.leaderboard.site.library import cache
-from simnav.leaderboard.site.rounding import short
+from simnav.leaderboard.site.charts import NO_BOUND, columns
+from simnav.leaderboard.site.facts import EVENT, catalogued, datasheets, events
+from simnav.leaderboard.site.library import cache, write_cache
+from simnav.leaderboard.site.rounding import short, spaced
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
+    from simnav.scenario import Scenario
 
-__all__ = ["BOUND_RUNS", "Background", "background", "background_of", "prepare", "track_of"]
+__all__ = [
+    "BOUND_RUNS",
+    "Background",
+    "background",
+    "background_of",
+    "faulty_points",
+    "fix_points",
+    "prepare",
+    "track_of",
+    "truth_of",
+]
 
 #: Seeds over which the bound is averaged.
 BOUND_RUNS = 2
@@ -53,12 +64,10 @@ class Background:
         By seed: ``faults`` as columns, and ``track`` as from `track_of`.
     """
 
-    happening: dict[str, list[Any]] = field(
-        default_factory=lambda: {key: [] for key in ("group", "name", "start", "end", "words")}
-    )
+    happening: dict[str, list[Any]] = field(default_factory=lambda: columns(EVENT, ()))
     instruments: list[dict[str, str]] = field(default_factory=list)
     units: dict[str, list[Any]] = field(default_factory=dict)
-    bound: dict[str, list[Any]] = field(default_factory=lambda: {"time": [], "bound": []})
+    bound: Mapping[str, list[Any]] = field(default_factory=lambda: NO_BOUND)
     runs: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
@@ -77,14 +86,23 @@ def background_of(identity: str, seeds: Sequence[int]) -> Background:
     seeds : sequence of int
         Of the runs whose recordings are wanted.
     """
-    kept = _kept(identity, seeds)
-    return kept if kept is not None else _keep(identity, seeds, background(identity, seeds))
+    path = _file(identity, seeds)
+    if path is not None:
+        with contextlib.suppress(OSError, ValueError, TypeError):  # it is not there, or damaged
+            return Background(**json.loads(path.read_bytes()))
+    made = background(identity, seeds)
+    if path is not None:
+        write_cache(path, json.dumps(asdict(made), separators=(",", ":")))
+        _forget(path.parent)
+    return made
 
 
 def background(identity: str, seeds: Iterable[int]) -> Background:
     """Make the recordings of a scenario again, and its bound."""
     scenario = catalogued(identity)
-    recordings = {seed: found for seed in seeds if (found := _recording(identity, seed)) is not None}
+    if scenario is None:
+        return Background()
+    recordings = {seed: found for seed in seeds if (found := _recording(scenario, seed)) is not None}
     first = next(iter(recordings.values()), None)
     if first is None:
         return Background()
@@ -96,79 +114,82 @@ def background(identity: str, seeds: Iterable[int]) -> Background:
         happening=events(scenario, first),
         instruments=datasheets(scenario, first),
         units=units,
-        bound=_bound(identity),
+        bound=_bound(scenario),
         runs={
-            str(seed): {"faults": _faults(events(None, recording)), "track": track_of(recording)}
+            str(seed): {"faults": _faults(recording), "track": track_of(recording)}
             for seed, recording in recordings.items()
         },
     )
 
 
-def _recording(identity: str, seed: int) -> Recording | None:
+def _recording(scenario: Scenario, seed: int) -> Recording | None:
     """The run, made again; None where that is not possible any more."""
     from simnav.source import record
 
-    scenario = catalogued(identity)
     try:
-        return None if scenario is None else record(scenario, seed)
+        return record(scenario, seed)
     except (ValueError, OSError):
         return None
 
 
-def _faults(happening: dict[str, list[Any]]) -> dict[str, list[Any]]:
+def _faults(recording: Recording) -> dict[str, list[Any]]:
     """Faults of a run, for shading."""
-    keep = [k for k, group in enumerate(happening["group"]) if group != "manoeuvres"]
-    return {
-        "start": [short(happening["start"][k]) for k in keep],
-        "end": [short(happening["end"][k]) for k in keep],
-        "name": [happening["group"][k] for k in keep],
-    }
+    found = events(None, recording)
+    return {"start": [short(t) for t in found["start"]], "end": [short(t) for t in found["end"]],
+            "name": found["group"]}  # fmt: skip
 
 
-def _bound(identity: str) -> dict[str, list[Any]]:
+def _bound(scenario: Scenario) -> Mapping[str, list[Any]]:
     from simnav.estimators.bound import bound
 
-    scenario = catalogued(identity)
-    if scenario is None or scenario.recorded:
-        return {"time": [], "bound": []}
+    if scenario.recorded:
+        return NO_BOUND
     try:
         found = bound(scenario, range(BOUND_RUNS), "flags")
     except (ValueError, OSError, ArithmeticError, np.linalg.LinAlgError):
-        return {"time": [], "bound": []}
-    keep = np.unique(np.linspace(0, len(found.time) - 1, 120).round().astype(int))
+        return NO_BOUND
+    keep = spaced(len(found.time), 120)
     return {"time": [short(t) for t in found.time[keep]], "bound": [short(v) for v in found.horizontal[keep]]}
 
 
 def track_of(recording: Recording) -> dict[str, Any]:
     """True track of a run with its ends, fixes, and the parts on which faults act, as columns; and its frame."""
-    faulty: dict[str, list[Any]] = {"east": [], "north": [], "time": [], "name": [], "part": []}
-    spots: dict[str, list[Any]] = {"east": [], "north": [], "name": []}
     track = true_track(recording)
     time = np.linspace(0.0, recording.duration, len(track.east))
-    for name, fix in fixes(recording, most=_TRACK_POINTS).items():
-        for east, north in zip(fix.east, fix.north, strict=True):
-            for key, x in (("east", short(east)), ("north", short(north)), ("name", name)):
-                spots[key].append(x)
+    spots = [
+        (short(east), short(north), name)
+        for name, fix in fixes(recording, most=_TRACK_POINTS).items()
+        for east, north in zip(fix.east, fix.north, strict=True)
+    ]
+    faulty: list[tuple[Any, ...]] = []
     for part, fault in enumerate(recording.faults):
         inside = np.flatnonzero((time >= fault.start) & (time <= fault.end))
-        for k in inside[:: max(1, len(inside) // 40)]:
-            for key, x in (
-                ("east", short(track.east[k])),
-                ("north", short(track.north[k])),
-                ("time", short(time[k])),
-                ("name", f"{fault.kind.replace('_', ' ')} ({', '.join(fault.instruments)})"),
-                ("part", part),
-            ):
-                faulty[key].append(x)
-    return {"faulty": faulty, "fixes": spots, **truth_of(track.east, track.north, time)}
+        name = f"{fault.kind.replace('_', ' ')} ({', '.join(fault.instruments)})"
+        faulty += [
+            (short(track.east[k]), short(track.north[k]), short(time[k]), name, part)
+            for k in inside[:: max(1, len(inside) // 40)]
+        ]
+    return {
+        "faulty": faulty_points(faulty), "fixes": fix_points(spots), **truth_of(track.east, track.north, time)
+    }  # fmt: skip
+
+
+def faulty_points(rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
+    """Points of a track on which faults act."""
+    return columns(("east", "north", "time", "name", "part"), rows)
+
+
+def fix_points(rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
+    """Fixes beside a track."""
+    return columns(("east", "north", "name"), rows)
 
 
 def truth_of(east: Any, north: Any, time: Any) -> dict[str, Any]:
     """A true track, thinned, with its ends and its frame."""
     if not len(east):
-        nothing: dict[str, list[Any]] = {"east": [], "north": [], "time": []}
+        nothing = columns(("east", "north", "time"), ())
         return {"truth": nothing, "ends": nothing | {"name": []}, "frame": {"x": [0.0, 1.0], "y": [0.0, 1.0]}}
-    keep = np.unique(np.linspace(0, len(east) - 1, _TRACK_POINTS).round().astype(int))
+    keep = spaced(len(east), _TRACK_POINTS)
     truth = {"east": [short(x) for x in east[keep]], "north": [short(x) for x in north[keep]],
              "time": [short(x) for x in time[keep]]}  # fmt: skip
     ends = {name: [values[0], values[-1]] for name, values in truth.items()} | {"name": ["start", "end"]}
@@ -202,23 +223,9 @@ def _file(identity: str, seeds: Sequence[int]) -> Path | None:
     return cache() / "site" / f"{digest(recording_digest(scenario, simulator), code, words)}.json"
 
 
-def _kept(identity: str, seeds: Sequence[int]) -> Background | None:
-    path = _file(identity, seeds)
-    if path is None:
-        return None
-    try:
-        return Background(**json.loads(path.read_bytes()))
-    except (OSError, ValueError, TypeError):
-        return None
-
-
-def _keep(identity: str, seeds: Sequence[int], made: Background) -> Background:
-    path = _file(identity, seeds)
-    if path is not None:
-        with contextlib.suppress(OSError):  # a cache that cannot be written costs time only
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, json.dumps(asdict(made), separators=(",", ":")))
-            every = sorted(path.parent.glob("*.json"), key=lambda p: p.stat().st_mtime)
-            for old in every[:-_MOST_KEPT]:
-                old.unlink(missing_ok=True)
-    return made
+def _forget(folder: Path) -> None:
+    """Delete the oldest files of the cache, if there are too many."""
+    with contextlib.suppress(OSError):
+        every = sorted(folder.glob("*.json"), key=lambda p: p.stat().st_mtime)
+        for old in every[:-_MOST_KEPT]:
+            old.unlink(missing_ok=True)

@@ -8,14 +8,12 @@ colours of the theme, which the page or `simnav.leaderboard.site.print_figures` 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from simnav.leaderboard.site.rounding import shorts
-
 __all__ = [
+    "NO_BOUND",
+    "NO_FAULTS",
     "Chart",
     "accuracy_and_cost",
     "columns",
@@ -25,7 +23,9 @@ __all__ = [
     "over_time",
     "ratios_by_group",
     "spread",
+    "spread_data",
     "stanford",
+    "timed",
     "timeline",
     "track",
 ]
@@ -75,12 +75,29 @@ class Chart:
 
     def to_dict(self) -> dict[str, Any]:
         """For the page."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return dict(vars(self))
 
 
-def columns(**values: Iterable[Any]) -> dict[str, list[Any]]:
-    """Columns of a data set: arrays become short lists."""
-    return {name: shorts(v) if isinstance(v, np.ndarray) else list(v) for name, v in values.items()}
+def columns(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> dict[str, list[Any]]:
+    """A data set as columns, from its rows.
+
+    >>> columns(("row", "value"), [("ekf", 1.0), ("ukf", 2.0)])
+    {'row': ['ekf', 'ukf'], 'value': [1.0, 2.0]}
+    """
+    listed = list(rows)
+    return {name: [row[k] for row in listed] for k, name in enumerate(names)}
+
+
+#: Data of `over_time` where there are no faults, or no bound.
+NO_FAULTS: Mapping[str, list[Any]] = columns(("start", "end", "name"), ())
+NO_BOUND: Mapping[str, list[Any]] = columns(("time", "bound"), ())
+
+
+def timed(
+    curves: Mapping[str, Any], faults: Mapping[str, Any] = NO_FAULTS, bound: Mapping[str, Any] = NO_BOUND
+) -> dict[str, Any]:
+    """The data of `over_time`."""
+    return {"curves": curves, "faults": faults, "bound": bound}
 
 
 def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
@@ -93,10 +110,26 @@ def _roomy(axis: Spec, pixels: int = 14) -> Spec:
     return {**axis, "scale": {**axis["scale"], "padding": pixels}}
 
 
-def _row(name: str = "row") -> Spec:
+_COLOUR = {"field": "row", "type": "nominal", "scale": "$colours", "legend": None}
+_ROW = {"color": _COLOUR, "strokeDash": {**_COLOUR, "scale": "$dashes"}}
+
+
+def _lines(curves: Spec, encoding: Spec) -> Spec:
+    """A line a row, which zooms."""
     return {
-        "color": {"field": name, "type": "nominal", "scale": "$colours", "legend": None},
-        "strokeDash": {"field": name, "type": "nominal", "scale": "$dashes", "legend": None},
+        **curves,
+        "params": [_ZOOM],
+        "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
+        "encoding": {**encoding, **_ROW},
+    }
+
+
+def _bands(curves: Spec, x: Spec, y: Spec) -> Spec:
+    """A band a row, from ``low`` to ``high``."""
+    return {
+        **curves,
+        "mark": {"type": "area", "opacity": 0.13},
+        "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _COLOUR},
     }
 
 
@@ -142,8 +175,8 @@ def over_time(
     Parameters
     ----------
     data : mapping
-        ``curves``: curves by row over ``time`` with ``middle`` (and ``low``, ``high``); ``faults``: columns ``start``,
-        ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
+        As of `timed`. ``curves``: curves by row over ``time`` with ``middle`` (and ``low``, ``high``); ``faults``:
+        columns ``start``, ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
     """
     x = _axis("time", "Time [s]")
     y = _axis("middle", f"{title} [{unit}]", log=log)
@@ -159,36 +192,18 @@ def over_time(
                 "tooltip": _tip(name="Fault", start="From [s]", end="To [s]"),
             },
         },
-    ]
-    if spread:
-        layers.append(
-            {
-                **curves,
-                "mark": {"type": "area", "opacity": 0.13},
-                "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
-            }
-        )
-    layers.append(
-        {
-            **curves,
-            "params": [_ZOOM],
-            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-            "encoding": {"x": x, "y": y, **_row()},
-        }
-    )
-    layers.append(
+        *([_bands(curves, x, y)] if spread else []),
+        _lines(curves, {"x": x, "y": y}),
         {
             "data": {"name": "bound"},
             "mark": {"type": "line", "clip": True, "color": "$ink", "strokeDash": [3, 3], "strokeWidth": 1.4},
             "encoding": {"x": x, "y": {**y, "field": "bound"}},
-        }
-    )
-    layers.append(
+        },
         _hover(
-            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            {**curves, "encoding": {"x": x, "y": y, "color": _COLOUR}},
             _tip(row="Estimator", time="Time [s]", middle=f"{title} [{unit}]"),
-        )
-    )
+        ),
+    ]
     return Chart(
         name, f"{title} over time", f"{caption} {_ZOOM_HELP}", {"height": 300, "layer": layers}, data, byrow=True
     )
@@ -199,19 +214,14 @@ def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], capt
     x, y = _axis("error", f"{title} [{unit}]", log=True), _axis("share", "Share of the epochs [%]")
     curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.error > 0"}]}
     layers: list[Spec] = [
-        {
-            **curves,
-            "params": [_ZOOM],
-            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-            "encoding": {"x": x, "y": y, "order": {"field": "share"}, **_row()},
-        },
+        _lines(curves, {"x": x, "y": y, "order": {"field": "share"}}),
         {
             "data": {"values": [{"level": 50}, {"level": 95}]},
             "mark": {"type": "rule", "color": "$grey", "strokeDash": [2, 2]},
             "encoding": {"y": {"field": "level", "type": "quantitative"}},
         },
         _hover(
-            {**curves, "encoding": {"x": x, "y": y, "color": _row()["color"]}},
+            {**curves, "encoding": {"x": x, "y": y, "color": _COLOUR}},
             _tip(row="Estimator", error=f"{title} [{unit}]", share="Share of the epochs [%]"),
         ),
     ]
@@ -245,7 +255,7 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
             "data": {"name": "curves"},
             "params": [_ZOOM],
             "mark": {"type": "line", "clip": True, "strokeWidth": 1.4},
-            "encoding": {**_row(), **order},
+            "encoding": {**_ROW, **order},
         },
         {
             "data": {"name": "ends"},
@@ -259,9 +269,7 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
                 "tooltip": _tip(name="Truth"),
             },
         },
-        _hover(
-            {"data": {"name": "curves"}, "encoding": {"color": _row()["color"]}}, _tip(row="Estimator", time="Time [s]")
-        ),
+        _hover({"data": {"name": "curves"}, "encoding": {"color": _COLOUR}}, _tip(row="Estimator", time="Time [s]")),
     ]
     return Chart(
         name,
@@ -381,24 +389,15 @@ def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str)
     curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.middle > 0"}]}
     sure = {"data": {"name": "curves"}, "transform": [{"filter": "datum.low > 0"}]}
     layers: list[Spec] = [
-        {
-            **sure,
-            "mark": {"type": "area", "opacity": 0.13},
-            "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _row()["color"]},
-        },
-        {
-            **curves,
-            "params": [_ZOOM],
-            "mark": {"type": "line", "clip": True, "strokeWidth": 1.7},
-            "encoding": {"x": x, "y": y, **_row()},
-        },
+        _bands(sure, x, y),
+        _lines(curves, {"x": x, "y": y}),
         {
             **curves,
             "mark": {"type": "point", "filled": True, "size": 35},
             "encoding": {
                 "x": x,
                 "y": y,
-                "color": _row()["color"],
+                "color": _COLOUR,
                 "tooltip": _tip(row="Estimator", value=across, middle=up, low="Low", high="High", failed="Failed runs"),
             },
         },
@@ -408,7 +407,7 @@ def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str)
             "encoding": {
                 "x": {**x, "field": "at"},
                 "y": {**y, "field": "threshold"},
-                "color": _row()["color"],
+                "color": _COLOUR,
                 "tooltip": _tip(row="Estimator", at="Breaks at", threshold="Twice its clean error"),
             },
         },
@@ -456,6 +455,14 @@ def spread(
     return Chart(name, title, caption, {"height": {"step": 17}, "layer": layers}, data)
 
 
+def spread_data(runs: Iterable[Sequence[Any]], middles: Iterable[Sequence[Any]]) -> dict[str, dict[str, list[Any]]]:
+    """The data of `spread`: from (row, value, run) of every run, and (row, value, low, high) of each row."""
+    return {
+        "runs": columns(("row", "value", "run"), runs),
+        "middles": columns(("row", "value", "low", "high"), middles),
+    }
+
+
 def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> Chart:
     """Epochs by error and protection level, a panel a row.
 
@@ -472,15 +479,13 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
     regions = [{"x": 0.0, "x2": end, "y": limit, "y2": end, "what": "not available"},
                {"x": limit, "x2": end, "y": 0.0, "y2": limit, "what": "hazardously misleading"}]  # fmt: skip
     diagonal = [{"x": 0.0, "y": 0.0}, {"x": end, "y": end}]
+    sides = {"x": x, "x2": {"field": "x2"}, "y": y, "y2": {"field": "y2"}}
     inner = [
         {
             "data": {"values": regions},
             "mark": {"type": "rect", "opacity": 0.18},
             "encoding": {
-                "x": x,
-                "x2": {"field": "x2"},
-                "y": y,
-                "y2": {"field": "y2"},
+                **sides,
                 "color": {"condition": {"test": "datum.y > 0", "value": "$shade"}, "value": "$second"},
                 "tooltip": {"field": "what", "title": "Region"},
             },
@@ -488,10 +493,7 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
         {
             "mark": "rect",
             "encoding": {
-                "x": x,
-                "x2": {"field": "x2"},
-                "y": y,
-                "y2": {"field": "y2"},
+                **sides,
                 "color": {
                     "field": "epochs",
                     "type": "quantitative",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +33,8 @@ class Column:
         Hidden at first on a phone.
     scale : tuple of float, optional
         Ends of the logarithmic scale of a bar.
+    factor : float
+        From the unit of the score, in SI, to that of the column.
     """
 
     key: str
@@ -44,6 +47,7 @@ class Column:
     descending: bool = False
     wide: bool = False
     scale: tuple[float, float] | None = None
+    factor: float = 1.0
 
     def to_dict(self) -> dict[str, Any]:
         """For the page; what is not set is left out."""
@@ -59,89 +63,59 @@ def plain(columns: Iterable[Column]) -> list[dict[str, Any]]:
     return [c.to_dict() for c in columns]
 
 
-#: Scores that pages show, as columns: the median over the runs that ended well. With the factor from SI.
-SCORES_SHOWN: tuple[tuple[Column, float], ...] = (
-    (
-        Column("horizontal_rmse", "Horizontal RMSE [m]", "Root mean square of the horizontal position error of a run."),
-        1.0,
+#: Scores that pages show, as columns: the median over the runs that ended well.
+SCORES_SHOWN = (
+    Column("horizontal_rmse", "Horizontal RMSE [m]", "Root mean square of the horizontal position error of a run."),
+    Column("r95", "R95 [m]", "Radius that 95 % of the horizontal errors of a run do not exceed."),
+    Column(
+        "vertical_rmse", "Vertical RMSE [m]", "Root mean square of the vertical position error of a run.", hidden=True
     ),
-    (Column("r95", "R95 [m]", "Radius that 95 % of the horizontal errors of a run do not exceed."), 1.0),
-    (
-        Column(
-            "vertical_rmse",
-            "Vertical RMSE [m]",
-            "Root mean square of the vertical position error of a run.",
-            hidden=True,
-        ),
-        1.0,
+    Column(
+        "velocity_horizontal_rmse", "Velocity RMSE [m/s]", "Root mean square of the error of the horizontal velocity."
     ),
-    (
-        Column(
-            "velocity_horizontal_rmse",
-            "Velocity RMSE [m/s]",
-            "Root mean square of the error of the horizontal velocity.",
-        ),
-        1.0,
+    Column(
+        "heading_rmse", "Heading RMSE [°]", "Root mean square of the error of the heading.", factor=math.degrees(1.0)
     ),
-    (Column("heading_rmse", "Heading RMSE [°]", "Root mean square of the error of the heading."), 57.29577951308232),
-    (Column("outage_end_error", "At outage end [m]", "Horizontal error at the end of the outages."), 1.0),
-    (Column("recovery_time", "Recovery [s]", "Time after an outage until the error is small again.", hidden=True), 1.0),
-    (
-        Column(
-            "nees_horizontal",
-            "NEES / dof",
-            "Normalised estimation error squared of the horizontal position, by degree of freedom. 1: the covariance "
-            "agrees with the errors. More: the estimator is optimistic.",
-        ),
-        1.0,
+    Column("outage_end_error", "At outage end [m]", "Horizontal error at the end of the outages."),
+    Column("recovery_time", "Recovery [s]", "Time after an outage until the error is small again.", hidden=True),
+    Column(
+        "nees_horizontal",
+        "NEES / dof",
+        "Normalised estimation error squared of the horizontal position, by degree of freedom. 1: the covariance "
+        "agrees with the errors. More: the estimator is optimistic.",
     ),
-    (
-        Column(
-            "coverage_95",
-            "95 % coverage",
-            "Share of the epochs at which the truth lies in the stated 95 % ellipse. 95 % is ideal.",
-            "percent",
-        ),
-        1.0,
+    Column(
+        "coverage_95",
+        "95 % coverage",
+        "Share of the epochs at which the truth lies in the stated 95 % ellipse. 95 % is ideal.",
+        "percent",
     ),
-    (
-        Column(
-            "inconsistent",
-            "Says inconsistent",
-            "Share of the epochs at which the estimator reports that its measurements contradict it.",
-            "percent",
-            hidden=True,
-        ),
-        1.0,
+    Column(
+        "inconsistent",
+        "Says inconsistent",
+        "Share of the epochs at which the estimator reports that its measurements contradict it.",
+        "percent",
+        hidden=True,
     ),
-    (
-        Column(
-            "detection_rate",
-            "Faults detected",
-            "Share of the faulty measurements that the estimator flags or gives little weight.",
-            "percent",
-            descending=True,
-        ),
-        1.0,
+    Column(
+        "detection_rate",
+        "Faults detected",
+        "Share of the faulty measurements that the estimator flags or gives little weight.",
+        "percent",
+        descending=True,
     ),
-    (
-        Column(
-            "false_alarm_rate",
-            "False alarms",
-            "Share of the measurements without a fault that the estimator flags or gives little weight.",
-            "percent",
-        ),
-        1.0,
+    Column(
+        "false_alarm_rate",
+        "False alarms",
+        "Share of the measurements without a fault that the estimator flags or gives little weight.",
+        "percent",
     ),
-    (
-        Column(
-            "smoothed_horizontal_rmse",
-            "Smoothed RMSE [m]",
-            "Horizontal RMSE of the smoothed trajectory, which knows all measurements of the run.",
-        ),
-        1.0,
+    Column(
+        "smoothed_horizontal_rmse",
+        "Smoothed RMSE [m]",
+        "Horizontal RMSE of the smoothed trajectory, which knows all measurements of the run.",
     ),
-    (Column("update_median", "Time per epoch", "Median wall-clock time of one epoch.", "duration"), 1.0),
+    Column("update_median", "Time per epoch", "Median wall-clock time of one epoch.", "duration"),
 )
 
 #: Terms of the pages, besides the columns.
@@ -174,7 +148,7 @@ _GLOSSARY: tuple[tuple[str, str], ...] = (
 def glossary(columns: Iterable[Column]) -> list[tuple[str, str]]:
     """All terms with what they mean, in alphabetical order: those of the pages, and the columns."""
     terms = dict(_GLOSSARY)
-    for column in (*columns, *(c for c, _ in SCORES_SHOWN)):
+    for column in (*columns, *SCORES_SHOWN):
         if column.help:
             terms.setdefault(column.title, column.help)
     return sorted(terms.items(), key=lambda item: item[0].lower().lstrip("× "))

@@ -11,7 +11,10 @@ from simnav.leaderboard.results.citation import Citation
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.site.facts import EstimatorFacts
 
-__all__ = ["EstimatorEntry", "ExtraPage", "Fact", "ScenarioEntry", "SiteFacts"]
+__all__ = ["PLAIN", "EstimatorEntry", "ExtraPage", "Fact", "ScenarioEntry", "SiteFacts"]
+
+#: The row that every estimator is compared with, and that everybody knows.
+PLAIN = "ekf"
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.ranking.runs import at_times, has_series
 from simnav.leaderboard.results.stored_series import read_ahead
-from simnav.leaderboard.site.rounding import shorts
+from simnav.leaderboard.site.rounding import shorts, spaced
 from simnav.scoring.integrity import RISK
 from simnav.scoring.plot_series import DIAGNOSTICS
 
@@ -103,7 +103,7 @@ def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
     for result in wanted | alone:
         every.setdefault(id(result.series), []).append(result)
     for series, read in read_ahead([results[0].series for results in every.values()]):
-        if not _has(read, "time"):
+        if not has_series(read, "time"):
             continue
         for result in every[id(series)]:
             if result.status != "ok":
@@ -115,18 +115,8 @@ def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
     return found
 
 
-def _has(s: Mapping[str, Series], name: str) -> bool:
-    values = s.get(name)
-    return values is not None and len(values) > 0 and bool(np.isfinite(values).any())
-
-
-@lru_cache(maxsize=64)
-def _spaced(n: int, points: int) -> NDArray[np.int64]:
-    return np.unique(np.linspace(0, n - 1, min(n, points)).round().astype(np.int64))
-
-
 def _curves(s: Mapping[str, Series], times: dict[bytes, Thin]) -> Curves:
-    keep = _spaced(len(s["time"]), _POINTS)
+    keep = spaced(len(s["time"]), _POINTS)
     time = s["time"][keep]
     time = times.setdefault(time.tobytes(), time)
     values = {name: np.abs(s[name][keep]) for name, *_ in QUANTITIES if name in s and np.isfinite(s[name]).any()}
@@ -135,16 +125,16 @@ def _curves(s: Mapping[str, Series], times: dict[bytes, Thin]) -> Curves:
     weights = {n: s[n].copy() for n in s if n.startswith("weight.") and (s[n] < _FULL).any()}
     if weights:
         weights["time"] = times.setdefault(s["diagnostics_time"].tobytes(), s["diagnostics_time"].copy())
-    return Curves(time, values, s["quantiles"].copy() if _has(s, "quantiles") else None, weights)
+    return Curves(time, values, s["quantiles"].copy() if has_series(s, "quantiles") else None, weights)
 
 
 def _thinned(s: Mapping[str, Series]) -> dict[str, Thin]:
-    keep = _spaced(len(s["time"]), _RUN_POINTS)
+    keep = spaced(len(s["time"]), _RUN_POINTS)
     names = ("time", *(key for key, *_ in QUANTITIES), "three_sigma", "estimate_north", "estimate_east")
     found = {name: s[name][keep] for name in names if name in s}
     if "truth_north" in s:
         known = np.flatnonzero(np.isfinite(s["truth_north"]) & np.isfinite(s["truth_east"]))
-        known = known[_spaced(len(known), _TRACK_POINTS)] if len(known) else known
+        known = known[spaced(len(known), _TRACK_POINTS)] if len(known) else known
         found |= {f"truth_{to}": s[name][known] for to, name in _TRUTH.items()}
     return found | {n: s[n].copy() for n in s if n == "diagnostics_time" or n.partition(".")[0] in DIAGNOSTICS}
 
@@ -153,7 +143,7 @@ def _level(s: Mapping[str, Series]) -> NDArray[Any] | None:
     """Protection level over time: the estimator's own, or that of its covariance."""
     if "protection_level" in s:
         return s["protection_level"]
-    return _PROTECTION * s["three_sigma"] if _has(s, "three_sigma") else None
+    return _PROTECTION * s["three_sigma"] if has_series(s, "three_sigma") else None
 
 
 def axis(curves: Iterable[Curves]) -> Array:
@@ -185,18 +175,12 @@ def band(curves: Sequence[Curves], name: str, factor: float, time: Array) -> dic
              for c in curves if name in c.diagnostics or name in c.values]  # fmt: skip
     if not pairs or not len(time):
         return None
-    rows = np.array(
-        [v if len(t) == len(time) and np.array_equal(t, time) else _at(time, t, v) for t, v in pairs], dtype=np.float64
-    )
+    rows = np.array([at_times(time, t, v) for t, v in pairs], dtype=np.float64)
     low, middle, high = factor * np.percentile(rows, (5.0, 50.0, 95.0), axis=0)
     gaps = np.flatnonzero(np.isnan(middle) & np.isfinite(rows).any(axis=0))  # some runs have a value, others none
     if len(gaps):
         low[gaps], middle[gaps], high[gaps] = factor * np.nanpercentile(rows[:, gaps], (5.0, 50.0, 95.0), axis=0)
     return {"low": shorts(low), "middle": shorts(middle), "high": shorts(high)}
-
-
-def _at(time: Array, t: Thin, v: Thin) -> Array:
-    return np.asarray(np.interp(time, t, v, right=np.nan), dtype=np.float64)
 
 
 def quantiles(curves: Sequence[Curves]) -> dict[str, list[float | None]] | None:

@@ -14,7 +14,7 @@ from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background
 from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
-from simnav.leaderboard.site.content import Fact
+from simnav.leaderboard.site.content import PLAIN, Fact
 from simnav.leaderboard.site.losses import losses
 from simnav.leaderboard.site.rounding import short, shorts
 from simnav.leaderboard.site.scenario_page import inside_chart, track_from
@@ -25,10 +25,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["PLAIN", "errors_data", "estimator_data", "facts_of", "runs_data", "worst_runs"]
-
-#: The row that every estimator is compared with.
-PLAIN = "ekf"
+__all__ = ["errors_data", "estimator_data", "facts_of", "runs_data", "worst_runs"]
 
 _COLUMNS = (
     Column("name", "Scenario", "The name leads to the page of the scenario.", "name", fixed=True),
@@ -52,16 +49,10 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
             if row.estimator != label or not row.runs:
                 continue
             costs.append(row.update_median)
+            place: str = row.standing
             if row.ranked:
-                provisional = ", provisional" if row.provisional else ""
-                found.append(
-                    Fact(
-                        f"{track.title}: rank {row.ranks.replace('-', '–') or row.rank}{provisional}",
-                        tables.number(row.score),
-                    )
-                )
-            else:
-                found.append(Fact(f"{track.title}: {row.standing}", tables.number(row.score)))
+                place = f"rank {row.ranks.replace('-', '–') or row.rank}" + (", provisional" if row.provisional else "")
+            found.append(Fact(f"{track.title}: {place}", tables.number(row.score)))
     known = [c for c in costs if c > 0.0]
     if known:
         found.append(Fact("Time per epoch", tables.duration(sum(known) / len(known))))
@@ -111,9 +102,8 @@ def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs
 
 def _scores(results: Sequence[Result]) -> dict[str, list[float | None]]:
     """Columns of the scores that any of the runs has."""
-    factors = np.array([factor for _, factor in SCORES_SHOWN])
-    matrix = factors * score_matrix([r.scores for r in results], [c.key for c, _ in SCORES_SHOWN])
-    found = {c.key: matrix[:, k] for k, (c, _) in enumerate(SCORES_SHOWN)}
+    matrix = score_matrix([r.scores for r in results], [c.key for c in SCORES_SHOWN])
+    found = {c.key: c.factor * matrix[:, k] for k, c in enumerate(SCORES_SHOWN)}
     return {key: shorts(values) for key, values in found.items() if np.isfinite(values).any()}
 
 
@@ -133,17 +123,11 @@ def estimator_data(
     label = entry.label
     rows = []
     shown = [
-        (c, f)
-        for c, f in SCORES_SHOWN
+        c
+        for c in SCORES_SHOWN
         if any(label in by and math.isfinite(by[label].score(c.key).value) for by in runs.values())
     ]
-    unsuitable = []
-    for table in ranking.scenarios:
-        if label in table.unsuitable:
-            unsuitable.append({"name": scenarios[table.scenario].name, "why": table.unsuitable[label]})
-        row = next((r for r in table.rows if r.estimator == label), None)
-        if row is None:
-            continue
+    for table, row in _tables(label, ranking):
         scenario, cell = scenarios[table.scenario], runs[table.scenario][label]
         rows.append(
             {
@@ -155,59 +139,50 @@ def estimator_data(
                 "score": short(row.score),
                 "interval": {"value": None, "low": short(row.low), "high": short(row.high)},
                 "failed": {"text": f"{row.failed} of {row.runs}", "value": row.failed},
-                **{c.key: short(f * cell.score(c.key).value) for c, f in shown},
+                **{c.key: short(c.factor * cell.score(c.key).value) for c in shown},
             }
         )
-    plain_row = estimators.get(PLAIN)
+    other = None if label == PLAIN else estimators.get(PLAIN)
     return {
         "kind": "estimator",
         "label": label,
         "data": entry.data,
-        "plain": None
-        if plain_row is None or label == PLAIN
-        else {"label": PLAIN, "data": plain_row.data, "page": plain_row.page},
+        "plain": None if other is None else {"label": PLAIN, "data": other.data, "page": other.page},
         "losses": None if label == PLAIN else losses(label, PLAIN, ranking, scenarios),
         "table": {
             "name": "main",
             "title": f"{label} by scenario",
-            "columns": plain((*_COLUMNS, *(c for c, _ in shown))),
+            "columns": plain((*_COLUMNS, *shown)),
             "rows": rows,
         },
         "charts": [c.to_dict() for c in _profile(label, ranking, scenarios)],
         "rows": {label: {"reference": entry.reference}},
         "first": [label],
         "worst": None if worst is None or single is None else _worst_page(label, *worst, single, scenarios),
-        "unsuitable": unsuitable,
+        "unsuitable": [
+            {"name": scenarios[table.scenario].name, "why": table.unsuitable[label]}
+            for table in ranking.scenarios
+            if label in table.unsuitable
+        ],
         "parameters": [{"name": n, "default": d, "annotation": a} for n, d, a in entry.facts.parameters],
     }
 
 
 def _profile(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry]) -> list[charts.Chart]:
-    points: dict[str, list[Any]] = {"group": [], "row": [], "value": [], "scenario": [], "plain": []}
-    found: list[tuple[str, ScenarioRow, str]] = []
-    for table in ranking.scenarios:
-        if any(r.estimator == label for r in table.rows):
-            found += [
-                (table.scenario, r, scenarios[table.scenario].group)
-                for r in table.rows
-                if r.estimator in (label, PLAIN)
-            ]
-    for scenario, row, group in sorted(found, key=lambda f: (f[2], f[1].estimator != PLAIN)):
-        if not (row.score > 0.0 and math.isfinite(row.score)):
-            continue
-        for key, x in (
-            ("group", group),
-            ("row", row.estimator),
-            ("value", short(row.score)),
-            ("scenario", scenarios[scenario].name),
-            ("plain", row.estimator != label),
-        ):
-            points[key].append(x)
-    if not points["row"]:
+    points = [
+        (scenarios[table.scenario].group, row.estimator, short(row.score), scenarios[table.scenario].name,
+         row.estimator != label)
+        for table, _ in _tables(label, ranking)
+        for row in table.rows
+        if row.estimator in (label, PLAIN) and row.score > 0.0 and math.isfinite(row.score)
+    ]  # fmt: skip
+    if not points:
         return []
+    points.sort(key=lambda point: (point[0], point[1] != PLAIN))
+    data = {"points": charts.columns(("group", "row", "value", "scenario", "plain"), points)}
     beside = " Diamonds: the plain EKF." if label != PLAIN else ""
     caption = f"One point a scenario, by what makes it difficult; 1 is the reference figure of the scenario.{beside}"
-    return [charts.ratios_by_group("profile", {"points": points}, caption)]
+    return [charts.ratios_by_group("profile", data, caption)]
 
 
 def worst_runs(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> list[tuple[Result, float]]:
@@ -234,26 +209,16 @@ def _worst_page(
     for key, title, unit, _ in curves.QUANTITIES:
         if key not in one or key in ("vertical", "velocity"):
             continue
-        bound = (
-            {"time": one[key]["time"], "bound": one[key]["bound"]} if "bound" in one[key] else {"time": [], "bound": []}
-        )
-        data = {
-            "curves": {"rows": {label: {"time": one[key]["time"], "middle": one[key]["middle"]}}},
-            "faults": {"start": [], "end": [], "name": []},
-            "bound": bound,
-        }
-        caption = (
-            "Dashed: three times the standard deviation that the estimator states."
-            if bound["time"]
-            else "Of the worst run."
-        )
+        curve = {name: one[key][name] for name in ("time", "middle")}
+        bound, caption = charts.NO_BOUND, "Of the worst run."
+        if "bound" in one[key]:
+            bound = {name: one[key][name] for name in ("time", "bound")}
+            caption = "Dashed: three times the standard deviation that the estimator states."
+        data = charts.timed({"rows": {label: curve}}, bound=bound)
         made.append(charts.over_time(f"worst-{key}", title, unit, data, caption, spread=False))
-    nothing: dict[str, list[Any]] = {"start": [], "end": [], "name": [], "time": [], "bound": []}
     for key in sorted(k for k in one if k.partition(".")[0] in ("weight", "nis")):
-        if key.endswith(".motion"):
-            continue
-        data = {"curves": {"rows": {label: one[key]}}, "faults": nothing, "bound": nothing}
-        made.append(inside_chart(key, Background(), data))
+        if not key.endswith(".motion"):
+            made.append(inside_chart(key, Background(), charts.timed({"rows": {label: one[key]}})))
     return {
         "scenario": {"name": scenario.name, "page": f"{scenario.page}#row={quote(label)}&seed={result.seed}"},
         "seed": result.seed,

@@ -13,14 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.site.charts import columns
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
 
-__all__ = ["EstimatorFacts", "catalogued", "datasheets", "estimator_facts", "events", "name_of"]
+__all__ = ["EVENT", "EstimatorFacts", "catalogued", "datasheets", "estimator_facts", "events", "name_of"]
 
 _NAME_OF_LABEL = re.compile(r"[(\[ ]")  # a label is a name, and its parameters in brackets
+
+#: What `events` gives of each, as columns.
+EVENT = ("group", "name", "start", "end", "words")
 
 #: Titles of the families, by the module that declares the row.
 _FAMILIES = {
@@ -134,9 +138,9 @@ def toml_of(identity: str) -> str:
         return ""
 
 
-def datasheets(scenario: Scenario | None, recording: Recording) -> list[dict[str, str]]:
+def datasheets(scenario: Scenario, recording: Recording) -> list[dict[str, str]]:
     """The instruments of a run: what each measures, how often, and how well, in the units of scenario files."""
-    specs = {} if scenario is None else scenario.instruments
+    specs = scenario.instruments
     found = []
     imu = recording.instruments.imu
     sheets: list[tuple[str, str, Any]] = [
@@ -169,15 +173,11 @@ def events(scenario: Scenario | None, recording: Recording) -> dict[str, list[An
         start, end = max(label.start, 0.0), min(label.end, recording.duration)
         if start < end:
             spec = specs.get((label.kind, tuple(label.instruments)))
-            words = (
-                ""
-                if spec is None
-                else _table(spec.to_toml(), skip=("kind", "instruments", "start_s", "end_s", "intervals_s"))
-            )
+            known = {} if spec is None else spec.to_toml()
+            words = _table(known, skip=("kind", "instruments", "start_s", "end_s", "intervals_s"))
             name = label.kind.replace("_", " ")
             rows.append((f"{name}: {', '.join(label.instruments) or 'all'}", name, start, end, words))
-    keys = ("group", "name", "start", "end", "words")
-    return {key: [row[i] for row in rows] for i, key in enumerate(keys)}
+    return columns(EVENT, rows)
 
 
 def _table(values: Mapping[str, Any], skip: Iterable[str] = ()) -> str:

@@ -5,12 +5,13 @@ And the folder in the user's cache, for what takes seconds to make.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
 from simnav.leaderboard.results.files import write_whole
 
-__all__ = ["VEGA_LITE", "bundle", "cache"]
+__all__ = ["VEGA_LITE", "bundle", "cache", "write_cache"]
 
 #: Version of Vega-Lite that the specifications are written for.
 VEGA_LITE = "6.4"
@@ -43,18 +44,20 @@ def bundle() -> str:
     from importlib.metadata import version
 
     kept = cache() / f"vega-{version('vl-convert-python')}-{VEGA_LITE}.js"
-    try:
+    with contextlib.suppress(OSError):
         return kept.read_text(encoding="utf-8")
-    except OSError:
-        import vl_convert
+    import vl_convert
 
-        made = _LICENCE + vl_convert.javascript_bundle(_SETS, vl_version=VEGA_LITE)
-    try:
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(kept, made)
-    except OSError:
-        pass  # a cache that cannot be written costs time only
+    made = _LICENCE + vl_convert.javascript_bundle(_SETS, vl_version=VEGA_LITE)
+    write_cache(kept, made)
     return made
+
+
+def write_cache(path: Path, content: str) -> None:
+    """Write a file of the cache, if that is possible: a cache that cannot be written costs time only."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content)
 
 
 def cache() -> Path:

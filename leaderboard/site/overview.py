@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.confinement import confined
-from simnav.leaderboard.site.charts import accuracy_and_cost, detection, spread
+from simnav.leaderboard.site.charts import accuracy_and_cost, columns, detection, spread, spread_data
 from simnav.leaderboard.site.columns import Column, plain
 from simnav.leaderboard.site.rounding import short
 
@@ -256,7 +256,7 @@ def _charts(
             }
         }
         made.append(accuracy_and_cost(f"{track.track}-cost", f"Score ({title})", data))
-    nees = _scores(track, rows, runs, "nees_horizontal")
+    nees = _medians_by_scenario(track, rows, runs, "nees_horizontal")
     if nees["middles"]["row"]:
         made.append(
             spread(
@@ -269,7 +269,7 @@ def _charts(
                 ideal=(0.7, 1.5),
             )
         )
-    found = _medians(track, rows, runs)
+    found = _detection(track, rows, runs)
     if len(found["row"]) > 1:
         made.append(detection(f"{track.track}-detection", {"rows": found}))
     return made
@@ -284,49 +284,33 @@ def _front(points: Sequence[tuple[float, float]]) -> list[bool]:
     return [not any(c <= x and e <= y and (c, e) != (x, y) for c, e in points) for x, y in points]
 
 
-def _scores(
+def _medians_by_scenario(
     track: TrackRanking, rows: Sequence[TrackRow], runs: Mapping[str, Mapping[str, Runs]], name: str
 ) -> dict[str, dict[str, list[Any]]]:
     """Medians of a score by scenario, as ticks, and over the scenarios."""
-    ticks: dict[str, list[Any]] = {"row": [], "value": [], "run": []}
-    middles: dict[str, list[Any]] = {"row": [], "value": [], "low": [], "high": []}
+    ticks = []
+    middles = []
     for row in rows:
-        values = []
-        for s in track.scenarios:
-            cell = runs[s].get(row.estimator)
-            value = math.nan if cell is None else cell.score(name).value
-            if value > 0.0 and math.isfinite(value):
-                values.append(value)
-                for key, x in (("row", row.estimator), ("value", short(value)), ("run", s)):
-                    ticks[key].append(x)
-        if values:
-            values.sort()
-            for key, x in (
-                ("row", row.estimator),
-                ("value", short(values[len(values) // 2])),
-                ("low", short(values[0])),
-                ("high", short(values[-1])),
-            ):
-                middles[key].append(x)
-    return {"runs": ticks, "middles": middles}
+        cells = ((s, runs[s][row.estimator]) for s in track.scenarios if row.estimator in runs[s])
+        found = [(s, v) for s, cell in cells if (v := cell.score(name).value) > 0.0 and math.isfinite(v)]
+        ticks += [(row.estimator, short(value), s) for s, value in found]
+        if found:
+            values = sorted(value for _, value in found)
+            middles.append((row.estimator, *(short(values[k]) for k in (len(values) // 2, 0, -1))))
+    return spread_data(ticks, middles)
 
 
-def _medians(
+def _detection(
     track: TrackRanking, rows: Sequence[TrackRow], runs: Mapping[str, Mapping[str, Runs]]
 ) -> dict[str, list[Any]]:
     """Detection and false-alarm rates of each row, in percent: means of the medians of the scenarios."""
-    found: dict[str, list[Any]] = {"row": [], "found": [], "false": []}
+    found: list[tuple[str, Any, Any]] = []
     for row in rows:
-        pairs = []
-        for s in track.scenarios:
-            cell = runs[s].get(row.estimator)
-            if cell is not None:
-                pair = cell.score("detection_rate").value, cell.score("false_alarm_rate").value
-                if all(map(math.isfinite, pair)):
-                    pairs.append(pair)
+        cells = [runs[s][row.estimator] for s in track.scenarios if row.estimator in runs[s]]
+        pairs = [(c.score("detection_rate").value, c.score("false_alarm_rate").value) for c in cells]
+        pairs = [pair for pair in pairs if all(map(math.isfinite, pair))]
         if pairs:
-            found["row"].append(row.estimator)
-            for key, k in (("found", 0), ("false", 1)):
-                found[key].append(short(100.0 * sum(p[k] for p in pairs) / len(pairs)))
-    found["front"] = _front([(false, -right) for false, right in zip(found["false"], found["found"], strict=True)])
-    return found
+            right, false = (100.0 * sum(values) / len(pairs) for values in zip(*pairs, strict=True))
+            found.append((row.estimator, short(right), short(false)))
+    front = _front([(false, -right) for _, right, false in found])
+    return {**columns(("row", "found", "false"), found), "front": front}

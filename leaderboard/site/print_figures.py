@@ -6,14 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from simnav.leaderboard.figures.style import INK, PALETTE
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.site.charts import Chart, Spec
 from simnav.leaderboard.site.library import VEGA_LITE
 
 __all__ = ["filled", "write_figure"]
 
-_PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255", "#999933")
-_INKS = {"$ink": "#1b2430", "$grey": "#5b6673", "$shade": "#9aa5b1", "$strong": _PALETTE[0], "$second": _PALETTE[1],
+_PALETTE = tuple(light for light, _ in PALETTE)
+_INKS = {"$ink": INK, "$grey": "#5b6673", "$shade": "#9aa5b1", "$strong": _PALETTE[0], "$second": _PALETTE[1],
          "$scheme": "blues"}  # fmt: skip
 _DASHES = ([1, 0], [6, 2], [2, 2], [6, 2, 2, 2])
 

@@ -1,13 +1,15 @@
-"""Figures of the data of the site: with few digits, so that pages stay small, but enough to be rounded again."""
+"""Data of the site, so that pages stay small: figures with few digits, enough to be rounded again, and few points."""
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["short", "shorts"]
+__all__ = ["short", "shorts", "spaced"]
 
 
 def short(value: Any, digits: int = 4) -> float | None:
@@ -66,3 +68,13 @@ def shorts(values: Any, digits: int = 4) -> list[float | None]:
         for k in np.flatnonzero(~known).tolist():
             found[k] = None
     return found  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=64)
+def spaced(n: int, points: int) -> NDArray[np.int64]:
+    """Places of at most so many points, at even steps, of a curve of n points.
+
+    >>> spaced(7, 3).tolist(), spaced(3, 7).tolist()
+    ([0, 3, 6], [0, 1, 2])
+    """
+    return np.unique(np.linspace(0, n - 1, min(n, points)).round().astype(np.int64))

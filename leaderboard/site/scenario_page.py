@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, curves
-from simnav.leaderboard.site.background import Background, truth_of
-from simnav.leaderboard.site.charts import Chart
+from simnav.leaderboard.site.background import Background, faulty_points, fix_points, truth_of
+from simnav.leaderboard.site.charts import NO_BOUND, NO_FAULTS, Chart, spread_data, timed
 from simnav.leaderboard.site.columns import SCORES_SHOWN
+from simnav.leaderboard.site.content import PLAIN
 from simnav.leaderboard.site.curves import Curves, Gathered
 from simnav.leaderboard.site.overview import bar_scale, board_columns, board_row
 from simnav.leaderboard.site.rounding import short
@@ -31,7 +32,6 @@ __all__ = ["RUNS_SHOWN", "ScenarioData", "inside_chart", "scenario_data", "seeds
 RUNS_SHOWN = 2
 
 _FIRST = 6  # rows that a chart shows at first
-_PLAIN = "ekf"
 _TICKS = 40  # runs of a row that a chart marks
 
 
@@ -73,8 +73,8 @@ def shown_first(ranking: ScenarioRanking, drawn: Sequence[str]) -> list[str]:
     references = {r.estimator for r in ranking.rows if r.reference}
     ranked = [name for name in drawn if name not in references | again]
     best = ranked[:_FIRST]
-    if _PLAIN in ranked and _PLAIN not in best:
-        best[-1] = _PLAIN
+    if PLAIN in ranked and PLAIN not in best:
+        best[-1] = PLAIN
     return best or list(drawn)[:_FIRST]
 
 
@@ -191,38 +191,37 @@ def _table(
     title = "× reference" if relative else "Error [m]"
     scored = [r for r in ranking.rows if r.ranked and math.isfinite(r.score)]
     shown = [
-        (c, f)
-        for c, f in SCORES_SHOWN
+        c
+        for c in SCORES_SHOWN
         if c.key != "update_median" and any(math.isfinite(runs[r.estimator].score(c.key).value) for r in ranking.rows)
     ]
     best = {
         c.key: min((v for r in scored if not math.isnan(v := runs[r.estimator].score(c.key).value)), default=math.nan)
-        for c, _ in shown
+        for c in shown
     }
     same = {n: [m for m in names if m != n] for names in same_results(ranking) for n in names}
     rows = []
     for row in ranking.rows:
         item = board_row(row, estimators[row.estimator], same.get(row.estimator, ()), provisional=ranking.provisional)
-        for column, factor in shown:
+        for column in shown:
             found = runs[row.estimator].score(column.key)
             item[column.key] = {
-                "value": short(factor * found.value),
+                "value": short(column.factor * found.value),
                 "best": column.kind == "number"
                 and column.key != "nees_horizontal"
                 and row.ranked
                 and found.value == best[column.key],
-                "help": f"95 % interval of the median: {tables.number(factor * found.low)} to "
-                f"{tables.number(factor * found.high)}"
+                "help": f"95 % interval of the median: {tables.number(column.factor * found.low)} to "
+                f"{tables.number(column.factor * found.high)}"
                 if math.isfinite(found.low)
                 else None,
             }
         rows.append(item)
     explanation = f"Geometric mean over the runs of the error, divided by {ranking.reference.text}."
-    more = [c for c, _ in shown]
     return {
         "name": "main",
         "title": f"{ranking.scenario}: ranking",
-        "columns": board_columns(title, explanation, bar_scale(scored), more),
+        "columns": board_columns(title, explanation, bar_scale(scored), shown),
         "rows": rows,
     }
 
@@ -233,8 +232,7 @@ def _failures(ranking: ScenarioRanking, runs: Mapping[str, Runs]) -> list[dict[s
     for row in ranking.rows:
         for status, count in row.statuses.items():
             if status != "ok":
-                results = [r for r in runs[row.estimator].results if r.ending == status]
-                reason = results[0].reason if results else ""
+                reason = next(r.reason for r in runs[row.estimator].tried if r.ending == status)
                 if status == "inconsistent":
                     reason = "it reports for most of the time that its measurements contradict it; its error counts"
                 found.append({"name": row.estimator, "status": status, "runs": count, "reason": reason})
@@ -254,7 +252,7 @@ def _over_all_runs(
     """Charts of errors, charts of weights, and the files of their data."""
     time = curves.axis(c for found in by.values() for c in found)
     first = next(iter(around.runs), "0")
-    faults = around.runs[first]["faults"] if around.runs else _NO_FAULTS
+    faults = around.runs[first]["faults"] if around.runs else NO_FAULTS
     made = []
     if around.happening["name"]:
         ends = [t for t in around.happening["end"] if t is not None]
@@ -268,11 +266,11 @@ def _over_all_runs(
         found = {n: b for n, c in by.items() if (b := curves.band(c, key, factor, time)) is not None}
         if not found:
             continue
-        bound = around.bound if key == "horizontal" else _NO_BOUND
+        bound = around.bound if key == "horizontal" else NO_BOUND
         caption = words + (
             " Dashed: the posterior Cramer-Rao bound on the RMS error, faults known." if bound["time"] else ""
         )
-        made.append(charts.over_time(key, title, unit, _timed(time, found, faults, bound), caption))
+        made.append(charts.over_time(key, title, unit, timed(_over(time, found), faults, bound), caption))
     spreads = (
         ("horizontal_rmse", "rmse", "Horizontal RMSE of every run", "Horizontal RMSE [m]", ()),
         ("nees_horizontal", "nees", "Consistency of every run", "NEES by degree of freedom [-]", (0.7, 1.5)),
@@ -293,7 +291,7 @@ def _over_all_runs(
         instrument = name.partition(".")[2]
         inside.append(
             charts.over_time(
-                f"weight-{instrument}", f"Weight of {instrument}", "-", _timed(axis, bands, faults, _NO_BOUND),
+                f"weight-{instrument}", f"Weight of {instrument}", "-", timed(_over(axis, bands), faults),
                 f"{_MEANING['weight']} {words}", log=False,
             )
         )  # fmt: skip
@@ -311,13 +309,11 @@ def _counted(runs: Sequence[int], seeds: int) -> str:
     return f"{first}{count} that ended well"
 
 
-def _timed(time: Any, rows: Mapping[str, Any], faults: Any, bound: Any) -> dict[str, Any]:
-    axis = {"axis": [short(t) for t in time], "name": "time", "rows": rows}
-    return {"curves": axis, "faults": faults, "bound": bound}
+def _over(time: Any, rows: Mapping[str, Any]) -> dict[str, Any]:
+    """Curves by row over a common time."""
+    return {"axis": [short(t) for t in time], "name": "time", "rows": rows}
 
 
-_NO_FAULTS: dict[str, list[Any]] = {"start": [], "end": [], "name": []}
-_NO_BOUND: dict[str, list[Any]] = {"time": [], "bound": []}
 _MEANING = {
     "weight": "1: the measurement counts in full. 0: it is rejected.",
     "residual": "What remains between measurement and estimate after the adjustment, by its standard deviation.",
@@ -356,35 +352,28 @@ def _spread(
     axis: str,
     ideal: Sequence[float] = (),
 ) -> Chart | None:
-    ticks: dict[str, list[Any]] = {"row": [], "value": [], "run": []}
-    middles: dict[str, list[Any]] = {"row": [], "value": [], "low": [], "high": []}
+    ticks: list[tuple[Any, ...]] = []
+    middles: list[tuple[Any, ...]] = []
     for row in ranking.rows:
         cell = runs[row.estimator]
         found = cell.score(score)
         if not found.value > 0.0:
             continue
         values = zip(cell.scores(score).tolist(), cell.good, strict=True)
-        for value, result in _marked([(v, r) for v, r in values if v > 0.0]):
-            for key, x in (("row", row.estimator), ("value", short(value)), ("run", _run_name(result))):
-                ticks[key].append(x)
+        marked = _marked([(v, r) for v, r in values if v > 0.0])
+        ticks += [(row.estimator, short(value), _run_name(result)) for value, result in marked]
         low, high = (found.low, found.high) if math.isfinite(found.low) else (found.value, found.value)
-        for key, x in (
-            ("row", row.estimator),
-            ("value", short(found.value)),
-            ("low", short(max(low, 1e-9))),
-            ("high", short(high)),
-        ):
-            middles[key].append(x)
-    if not middles["row"]:
+        middles.append((row.estimator, short(found.value), short(max(low, 1e-9)), short(high)))
+    if not middles:
         return None
     most = max(len(runs[row.estimator].good) for row in ranking.rows)
     some = f", at most {_TICKS} of a row from the smallest to the largest value" if most > _TICKS else ""
-    line = any(low < high for low, high in zip(middles["low"], middles["high"], strict=True))
+    line = any(low < high for *_, low, high in middles)
     middle = "Point and line: the median with its 95 % interval." if line else "Point: the median."
     caption = f"Ticks: runs that ended well{some}. {middle}"
     if ideal:
         caption += " In the band the covariance agrees with the errors; to the right the estimator is optimistic."
-    return charts.spread(name, title, axis, {"runs": ticks, "middles": middles}, caption, ideal=ideal)
+    return charts.spread(name, title, axis, spread_data(ticks, middles), caption, ideal=ideal)
 
 
 def _marked(runs: list[tuple[float, Result]]) -> list[tuple[float, Result]]:
@@ -424,11 +413,11 @@ def _one_run(
 ) -> dict[str, Any]:
     """Data of the charts of one run, by the name of the chart."""
     known = around.runs.get(str(seed), {})
-    faults = known.get("faults", _NO_FAULTS)
+    faults = known.get("faults", NO_FAULTS)
     data: dict[str, Any] = {}
     for key, *_ in curves.QUANTITIES:
         found = {n: {"time": one[key]["time"], "middle": one[key]["middle"]} for n, one in single.items() if key in one}
-        data[f"run-{key}"] = {"curves": {"rows": found}, "faults": faults, "bound": _NO_BOUND}
+        data[f"run-{key}"] = timed({"rows": found}, faults)
     track = {n: one["track"] for n, one in single.items() if "track" in one}
     data["track"] = {"curves": {"rows": track}, **(known.get("track") or track_from(single.values()))}
     mine = [r for n in rows for r in runs[n].results if r.seed == seed]
@@ -443,7 +432,7 @@ def _one_run(
 
 def _inside(single: Mapping[str, dict[str, Any]], around: Background, seed: str) -> dict[str, Any]:
     """Data of the charts of innovations, residuals and weights of one run, by the name of the chart."""
-    faults = around.runs.get(seed, {}).get("faults", _NO_FAULTS)
+    faults = around.runs.get(seed, {}).get("faults", NO_FAULTS)
     found: dict[str, Any] = {}
     for n, one in single.items():
         for name, values in one.items():
@@ -451,9 +440,7 @@ def _inside(single: Mapping[str, dict[str, Any]], around: Background, seed: str)
             if kind not in DIAGNOSTICS:
                 continue
             factor = around.units.get(instrument, ["", 1.0])[1] if kind == "innovation" else 1.0
-            data = found.setdefault(
-                f"run-{kind}-{instrument}", {"curves": {"rows": {}}, "faults": faults, "bound": _NO_BOUND}
-            )
+            data = found.setdefault(f"run-{kind}-{instrument}", timed({"rows": {}}, faults))
             middle = [short(factor * v) for v in values["middle"]] if factor != 1.0 else values["middle"]
             data["curves"]["rows"][n] = {"time": values["time"], "middle": middle}
     return found
@@ -462,5 +449,4 @@ def _inside(single: Mapping[str, dict[str, Any]], around: Background, seed: str)
 def track_from(single: Iterable[dict[str, Any]]) -> dict[str, Any]:
     """Truth and frame of a track from the series of a run, where there is no recording."""
     truth: Sequence[Any] = next((one["truth"] for one in single if "truth" in one), ([], [], []))
-    nothing: dict[str, list[Any]] = {"east": [], "north": [], "time": [], "name": [], "part": []}
-    return {"faulty": nothing, "fixes": {k: nothing[k] for k in ("east", "north", "name")}, **truth_of(*truth)}
+    return {"faulty": faulty_points(()), "fixes": fix_points(()), **truth_of(*truth)}

@@ -291,7 +291,6 @@ class _Site:
 
     def _other_pages(self, worst: Mapping[str, tuple[Result, float] | None]) -> None:
         """The pages of estimators, with their worst runs, and those of the whole board."""
-        pages = self.pages
         for label, entry in self.estimators.items():
             self._data(entry.data, errors_data(label, self.ranking, self.scenarios))
             self._data(entry.runs, runs_data(label, self.ranking, self.runs))
@@ -299,7 +298,7 @@ class _Site:
             shown = None if last is None else one_run(self.plan.gathered.single[last[0]])
             data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, shown)
             parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
-            self._page(pages, "estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
+            self._page("estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
                        data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
         tracks = overview(self.ranking, self.estimators, self.scenarios, self.runs)
         if self.plan.figures:
@@ -308,12 +307,11 @@ class _Site:
         headers = [t if k == 0 else {"key": t["key"], "file": f"track-{t['key']}"} for k, t in enumerate(tracks)]
         for later in tracks[1:]:  # read when its tab is opened
             self._data(f"track-{later['key']}", later)
-        self._page(
-            pages, "index.html", "index.html", {"kind": "index", "tracks": headers}, tracks=tracks, facts=self._counts()
-        )
+        index = {"kind": "index", "tracks": headers}
+        self._page("index.html", "index.html", index, tracks=tracks, facts=self._counts())
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
-        self._page(pages, "compare.html", "compare.html", {"kind": "compare", "rows": rows})
-        self._page(pages, "about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
+        self._page("compare.html", "compare.html", {"kind": "compare", "rows": rows})
+        self._page("about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
         for extra in (*self.facts.papers, *self.facts.editions):
             extra.install(self.folder, self.facts)
         for name in _STATIC:
@@ -341,7 +339,7 @@ class _Site:
             self._data(name, content)
         if plan.figures:
             self._print(entry, found)
-        self._page(self.pages, "scenario.html", entry.page, found.page, scenario=entry)
+        self._page("scenario.html", entry.page, found.page, scenario=entry)
 
     def _counts(self) -> list[Fact]:
         tried = [r for r in self.results if r.tried]
@@ -375,10 +373,10 @@ class _Site:
         for chart in found.charts:
             write_figure(filled(chart, found.first), self.folder / "figures" / f"{scenario.data}-{chart.name}")
 
-    def _page(self, pages: Any, template: str, name: str, content: Mapping[str, Any], **values: Any) -> None:
+    def _page(self, template: str, name: str, content: Mapping[str, Any], **values: Any) -> None:
         cited = self.facts.citation.text if self.facts.citation is not None else ""
         values.setdefault("data", content)
-        text = pages.get_template(template).render(
+        text = self.pages.get_template(template).render(
             page=name, site=self.facts, page_data=_json({**content, "citation": cited, "failure": FAILURE}), **values
         )
         (self.folder / name).write_text(text, encoding="utf-8")

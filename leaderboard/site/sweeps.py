@@ -15,7 +15,7 @@ from typing import Any
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.plain import plain
-from simnav.leaderboard.site.charts import Chart, dial
+from simnav.leaderboard.site.charts import Chart, columns, dial
 from simnav.leaderboard.site.rounding import short
 from simnav.leaderboard.sweep.report import Sweep
 
@@ -74,23 +74,21 @@ class SweepFile:
         }
 
     def _chart(self, name: str, across: str, breaking: Sequence[Mapping[str, Any]]) -> Chart:
-        score = self.content["score"]
-        curves: dict[str, dict[str, list[Any]]] = {}
-        for p in self.content["points"]:
-            mine = curves.setdefault(p["estimator"], {key: [] for key in ("value", "middle", "low", "high", "failed")})
-            mine["value"].append(p["values"][0])
-            for key, x in (("middle", "value"), ("low", "low"), ("high", "high")):
-                mine[key].append(short(p["error"][x]))
-            mine["failed"].append(p["failed"])
+        score, points = self.content["score"], self.content["points"]
+        rows: dict[str, list[Any]] = {row: [] for row in self.rows}
+        for p in points:
+            error = (short(p["error"][key]) for key in ("value", "low", "high"))
+            rows[p["estimator"]].append((p["values"][0], *error, p["failed"]))
+        curves = {row: columns(("value", "middle", "low", "high", "failed"), of) for row, of in rows.items()}
         marks = {
             b["estimator"]: {"at": [short(b["value"]["value"])], "threshold": [short(b["threshold"])]}
             for b in breaking
             if b["criterion"] == "twice-clean" and b["value"]["value"] is not None
         }
         unit = "" if score["unit"] == "-" else f" [{score['unit']}]"
-        runs = max((p["error"]["runs"] for p in self.content["points"]), default=0)
+        runs = max((p["error"]["runs"] for p in points), default=0)
         data = {"curves": {"rows": curves}, "marks": {"rows": marks}}
-        known = any(short(p["error"]["low"]) is not None for p in self.content["points"])
+        known = any(short(p["error"]["low"]) is not None for p in points)
         band = " with its 95 % interval" if known else ""
         return dial(name, across, f"{score['title']}{unit}", data, f"Median of {runs} runs{band}.")
 

@@ -26,7 +26,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["FAILURE", "FEWEST", "Interval", "mean", "mean_ratio", "median", "score", "share", "weighted_quantile"]
+__all__ = [
+    "FAILURE",
+    "FEWEST",
+    "Interval",
+    "codes",
+    "mean",
+    "mean_ratio",
+    "median",
+    "score",
+    "share",
+    "weighted_quantile",
+]
 
 Array = NDArray[np.float64]
 
@@ -94,8 +105,8 @@ def score(
     cap = math.log(FAILURE)
     bad = np.zeros(n, dtype=bool) if failed is None else np.asarray(failed, dtype=bool)
     x = np.where(bad, cap, np.minimum(x, cap))
-    stratum = _codes([0] * n if strata is None else strata)
-    cluster = _codes(range(n) if clusters is None else clusters)
+    stratum = codes([0] * n if strata is None else strata)
+    cluster = codes(range(n) if clusters is None else clusters)
     runs = np.bincount(stratum).astype(np.float64)
     value = float(np.mean(np.bincount(stratum, x) / runs))
     good = np.bincount(stratum[~bad], minlength=len(runs)).astype(np.float64)
@@ -119,7 +130,8 @@ def score(
     return Interval(math.exp(value), math.exp(value - reach), math.exp(min(value + reach, 700.0)), n)
 
 
-def _codes(items: Iterable[Hashable]) -> NDArray[np.int64]:
+def codes(items: Iterable[Hashable]) -> NDArray[np.int64]:
+    """A number from 0 on for each item, the same for equal ones, in the order in which they come first."""
     known: dict[Hashable, int] = {}
     return np.array([known.setdefault(item, len(known)) for item in items], dtype=np.int64)
 

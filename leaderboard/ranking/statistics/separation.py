@@ -28,6 +28,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simnav.leaderboard.ranking.statistics.intervals import codes
+
 __all__ = ["Separation", "separate", "smallest_p_value", "tiers"]
 
 Array = NDArray[np.float64]
@@ -84,9 +86,6 @@ def separate(
     values: ArrayLike,
     strata: Sequence[Hashable] | None = None,
     clusters: Sequence[Hashable] | None = None,
-    *,
-    alpha: float = ALPHA,
-    flips: int = FLIPS,
 ) -> Separation:
     """Test all pairs of rows at once.
 
@@ -99,10 +98,6 @@ def separate(
         The scenario of each run; each counts the same. Default: all are of one.
     clusters : sequence of u, optional
         The independent unit that each run belongs to: its seed or recording. Default: each run is one.
-    alpha : float
-        Family-wise error rate.
-    flips : int
-        Random flips, where there are too many clusters to try all.
 
     Returns
     -------
@@ -117,35 +112,30 @@ def separate(
     """
     x: Array = np.asarray(values, dtype=np.float64)
     u, n = x.shape
-    _, stratum = np.unique(np.zeros(u) if strata is None else _codes(strata), return_inverse=True)
-    _, cluster = np.unique(np.arange(u) if clusters is None else _codes(clusters), return_inverse=True)
+    stratum = codes([0] * u if strata is None else strata)
+    cluster = codes(range(u) if clusters is None else clusters)
     count = int(cluster.max()) + 1 if u else 0
     first, second = np.triu_indices(n, 1)
     if not count or not len(first):
-        return _conclude(np.ones((n, n)), np.zeros((n, n)), np.ones(n, dtype=bool), count, alpha)
-    signs = _signs(count, flips)
+        return _conclude(np.ones((n, n)), np.zeros((n, n)), np.ones(n, dtype=bool), count)
+    signs = _signs(count)
     observed, drawn = _statistics(x, stratum, cluster, count, signs, first, second)
 
     p = np.ones((n, n))
     p[first, second] = p[second, first] = _step_down(observed, drawn)
     sign = np.zeros((n, n))
     sign[first, second], sign[second, first] = np.sign(observed), -np.sign(observed)
-    best = _confidence_set(n, observed, drawn, first, second, alpha)
-    return _conclude(p, sign, best, count, alpha)
-
-
-def _codes(items: Sequence[Hashable]) -> NDArray[np.int64]:
-    known: dict[Hashable, int] = {}
-    return np.array([known.setdefault(item, len(known)) for item in items], dtype=np.int64)
+    best = _confidence_set(n, observed, drawn, first, second)
+    return _conclude(p, sign, best, count)
 
 
 @lru_cache(maxsize=8)
-def _signs(clusters: int, flips: int) -> NDArray[np.float32]:
+def _signs(clusters: int) -> NDArray[np.float32]:
     """(B, clusters) signs; the first row changes nothing. One sign is free, for only sizes count."""
     if clusters <= _FEW:
         bits = np.arange(2 ** (clusters - 1))[:, None] >> np.arange(clusters) & 1
     else:
-        bits = np.random.default_rng(clusters).integers(0, 2, (flips, clusters), dtype=np.int8)
+        bits = np.random.default_rng(clusters).integers(0, 2, (FLIPS, clusters), dtype=np.int8)
         bits[0] = 0
     return np.asarray(1 - 2 * bits, dtype=np.float32)
 
@@ -171,9 +161,7 @@ def _statistics(
         if not common.any():
             continue
         shares = _shares(x[np.ix_(common, rows)], stratum[common], cluster[common], count)
-        where = {int(row): k for k, row in enumerate(rows)}
-        i = np.array([where[int(r)] for r in first[here]])
-        j = np.array([where[int(r)] for r in second[here]])
+        i, j = np.searchsorted(rows, first[here]), np.searchsorted(rows, second[here])
         difference = shares[:, i] - shares[:, j]  # (K, pairs)
         norm = np.sqrt(np.sum(difference**2, axis=0))
         flat = norm <= _TINY * max(float(np.abs(shares).max()), 1e-300)
@@ -215,7 +203,7 @@ def _step_down(observed: NDArray[np.float32], drawn: NDArray[np.float32]) -> Arr
 
 def _confidence_set(
     n: int, observed: NDArray[np.float32], drawn: NDArray[np.float32], first: NDArray[np.int64],
-    second: NDArray[np.int64], alpha: float,
+    second: NDArray[np.int64],
 ) -> NDArray[np.bool_]:  # fmt: skip
     """Which rows may be the best: the worst of the most different pair goes while the rest are not equally good."""
     gone: list[int] = []  # in which order they would go, if all did
@@ -239,14 +227,14 @@ def _confidence_set(
             p[step] = _reached(most, steps[step])
     inside[:] = True
     for row, value in zip(gone, p, strict=True):
-        if value > alpha:
+        if value > ALPHA:
             break
         inside[row] = False
     return inside
 
 
-def _conclude(p: Array, sign: Array, best: NDArray[np.bool_], clusters: int, alpha: float) -> Separation:
-    better = (p <= alpha) & (sign < 0.0)  # lower is better
+def _conclude(p: Array, sign: Array, best: NDArray[np.bool_], clusters: int) -> Separation:
+    better = (p <= ALPHA) & (sign < 0.0)  # lower is better
     n = len(p)
     return Separation(p, better, 1 + better.sum(axis=0), n - better.sum(axis=1), best, clusters)
 
@@ -275,13 +263,11 @@ def tiers(order: Sequence[int], better: NDArray[np.bool_]) -> list[int]:
     """
     found: list[int] = []
     members: list[int] = []
+    tier = 1
     for row in order:
         if any(better[other, row] for other in members):
+            tier += 1
             members = []
-        elif found:
-            members.append(row)
-            found.append(found[-1])
-            continue
         members.append(row)
-        found.append(found[-1] + 1 if found else 1)
+        found.append(tier)
     return found
