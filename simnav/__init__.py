@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         tune,
         verify,
     )
+    from simnav.leaderboard.publishing import check_standard, publish_standard, run_standard, submit, verify_bundle
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
