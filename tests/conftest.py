@@ -10,7 +10,9 @@ import pytest
 
 from simnav.estimator import names, registry
 from simnav.kinds import INSTRUMENTS
-from simnav.plugins import is_file_module
+from simnav.plugins import Registry, is_file_module
+from simnav.scoring import SCORES
+from simnav.scoring import registry as scores
 from simnav.sensors.faults import FAULTS
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
@@ -43,9 +45,27 @@ def plugins(monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield Path(__file__).parent / "simnav" / "plugins"
     for registry_, before in classes:
-        registry_._classes = before
+        registry_._classes = before  # in use a kind is never forgotten, so there is no public way
     for name in [name for name in sys.modules if is_file_module(name)]:
         del sys.modules[name]
+
+
+@pytest.fixture
+def forget_scores(monkeypatch):
+    """Scores that a test registers are gone for the others of the process; a call forgets those so far.
+
+    What packages register is looked for again.
+    """
+    before = dict(SCORES)
+
+    def forget():
+        fresh = Registry("score", "simnav.scores", "simnav.scoring.standard", term="name")
+        for name, score in before.items():
+            fresh.add(name, score)
+        monkeypatch.setattr(scores, "_REGISTRY", fresh)  # in use a score is never forgotten, so there is no public way
+
+    forget()
+    return forget
 
 
 @pytest.fixture

@@ -269,7 +269,7 @@ def test_folded_noise_is_the_measurements_and_the_motions(recording: Recording):
     linearised = front.measure(last)
     assert linearised is not None
     H, d = linearised.jacobian, len(last.value)
-    expected = 0.01 * np.eye(d) + H @ chain._noise @ H.T
+    expected = 0.01 * np.eye(d) + H @ chain.folds["noise"][-1] @ H.T
     for _ in range(2):  # it is added once
         chain.linearise_aids()
         np.testing.assert_allclose(chain.aids["noise"][-1][:d, :d], expected, rtol=1e-9)

@@ -153,7 +153,7 @@ def test_a_package_travels_as_a_wheel_and_is_never_imported_here(
 
     folder = written(tmp_path / "site", package="simnav_packed_fix")
     monkeypatch.syspath_prepend(str(folder))
-    monkeypatch.setattr(registry, "_discovered", False)
+    registry.discover_point("simnav_packed_fix.rows")
     (tmp_path / "short.toml").write_text(PROFILE.replace("runs = 2", "runs = 1"))
     done = publishing.submit("simnav-packed-fix", profile=tmp_path / "short.toml", output=tmp_path / "made.zip",
                              results=tmp_path / "results", workers=1)  # fmt: skip
