@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from simnav.estimator import EstimatorError, make
+from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
@@ -97,6 +98,25 @@ def test_a_linear_problem_is_the_kalman_filter_to_rounding(numbers):
             np.testing.assert_allclose(filter_.covariance, P, rtol=0, atol=1e-10)
 
 
+class Listener(Adaptation):
+    """Changes nothing, and keeps the innovation that a solver hands to adaptations."""
+
+    heard: Innovation
+
+    def adapt(self, innovation):
+        self.heard = innovation
+        return innovation.noise
+
+
+def innovation_of(model: PointModel, value: np.ndarray, **numbers: float) -> Innovation:
+    """What the filter finds in a measurement at the start of a run."""
+    listener = Listener()
+    estimator = SigmaPointEstimator(model, listener, **numbers)
+    estimator.reset(START, Instruments((METER,)))
+    estimator.update(Measurements(0.0, 0.0, None, [Measurement(0.0, "meter", METER.kind, value)]))
+    return listener.heard
+
+
 class Polar(Linear):
     """Range and bearing, seen in Cartesian axes."""
 
@@ -125,9 +145,8 @@ def test_the_mean_of_polar_coordinates_in_closed_form(numbers):
     """E[r cos(b)] = r exp(-s^2/2); the points give r (1 + (cos(k s) - 1) / k^2) at k sigma, equal to fourth order."""
     r, bearing_sigma, range_sigma = 50.0, 0.25, 0.5
     model = Polar((r, 0.0), (range_sigma, bearing_sigma))
-    estimator = SigmaPointEstimator(model, **dict(zip(("alpha", "beta", "kappa"), numbers)))
-    estimator.reset(START, Instruments((METER,)))
-    residual, _, covariance, _ = estimator._observe(Measurement(0.0, "meter", METER.kind, np.zeros(3)))
+    innovation = innovation_of(model, np.zeros(3), **dict(zip(("alpha", "beta", "kappa"), numbers)))
+    residual, covariance = innovation.residual, innovation.predicted
     alpha, _, kappa = numbers
     k = alpha * np.sqrt(2 + kappa)
     assert -residual[0] == pytest.approx(r * (1 + (np.cos(k * bearing_sigma) - 1) / k**2), rel=1e-9)
@@ -145,10 +164,11 @@ def test_the_moments_are_those_of_the_scaled_unscented_transform():
     rng = np.random.default_rng(0)
     n = 4
     for alpha, beta, kappa in [(0.5, 2.0, 0.0), (0.1, 2.0, 1.0), (1.0, 0.0, 0.0), (0.3, 0.09, -1.0)]:
-        estimator = SigmaPointEstimator(Linear(), alpha=alpha, beta=beta, kappa=kappa)
-        estimator.reset(START, Instruments((METER,)))
         values = rng.standard_normal((2 * n, 3)) + 2.0
-        mean, covariance = estimator._moments(values)
+        model = Linear()
+        model.observe_points = lambda measurement, errors, values=values: values
+        found = innovation_of(model, Linear.H @ np.arange(4.0), alpha=alpha, beta=beta, kappa=kappa)
+        mean, covariance = -found.residual, found.predicted
         lam = alpha**2 * (n + kappa) - n
         w = np.full(2 * n + 1, 0.5 / (n + lam))
         wc = w.copy()
