@@ -34,17 +34,15 @@ SHEETS = (
 
 def perturbed(model: InertialModel, e: np.ndarray) -> InertialModel:
     """The same model with an error added: estimate = truth + e, by the definitions of the error and nothing else."""
-    other = InertialModel.__new__(InertialModel)
-    other.__dict__.update(model.__dict__)
-    for name in ("_memory", "_turn", "_clock", "transition", "process_noise"):
-        setattr(other, name, getattr(model, name).copy())
-    other.raw_rate = other._clock[12:15]
-    other.position = earth.displace(model.position, e[:3])
-    other.velocity = model.velocity + e[3:6]
-    other.dcm = np.ascontiguousarray(rotation.dcm_from_rotation_vector(e[6:9]) @ model.dcm)
-    other.bias = model.bias + e[9:15]
-    other.calibration = model.calibration + e[15:]
-    other._jacobians = {k: v.copy() for k, v in model._jacobians.items()}
+    other = InertialModel()
+    nowhere = InitialState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((9, 9)))
+    other.begin(nowhere, model.instruments)
+    other.take_over(model)
+    other.position[:] = earth.displace(model.position, e[:3])
+    other.velocity += e[3:6]
+    other.dcm[:] = rotation.dcm_from_rotation_vector(e[6:9]) @ model.dcm
+    other.bias += e[9:15]
+    other.calibration += e[15:]
     return other
 
 

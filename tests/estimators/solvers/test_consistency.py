@@ -19,7 +19,6 @@ import pytest
 
 from simnav.estimator import make
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.propagation import propagate_covariance
 from simnav.estimators.solvers.federated import FederatedEstimator
 from simnav.geometry import earth, rotation
 from simnav.recording import Recording
@@ -185,15 +184,12 @@ def analysed(reset_locals: bool) -> FederatedEstimator:
             self.actual = np.kron(self.all, self.covariance)
 
         def _step(self, until):
-            model = self.model
-            elapsed, n = until - model.time, model.size
+            elapsed, before = until - self.model.time, self.covariance.copy()
             super()._step(until)
             if elapsed > 0.0:
-                F, Q = np.diag(np.exp(-np.append(np.zeros(15), model._decay) * elapsed)), np.zeros((n, n))
-                F[:15, :15] = model.transition
-                propagate_covariance(
-                    Q, model.transition, model.process_noise, np.zeros(n - 15), model._decay, model._density, elapsed
-                )
+                F = np.eye(self.model.size)
+                self.model.carry(F, elapsed)
+                Q = self.covariance - F @ before @ F.T
                 F = np.kron(np.eye(len(self.at)), F)
                 self.actual = F @ self.actual @ F.T + np.kron(self.all, Q)
 

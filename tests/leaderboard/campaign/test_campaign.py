@@ -455,7 +455,7 @@ def test_an_error_in_a_worker_reaches_the_user(tmp_path: Path) -> None:
 
 def test_a_worker_that_dies_is_replaced_but_not_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As when the system kills it for want of memory; here an estimator does it, which nothing keeps from it."""
-    monkeypatch.setattr(campaign, "_RESTARTS", 1)
+    monkeypatch.setattr(campaign, "RESTARTS", 1)
     monkeypatch.setenv("SIMNAV_CONFINEMENT", "none")
     killer = "import os, signal; os.kill(os.getppid(), signal.SIGKILL)"
     note = f"import pathlib; p = pathlib.Path({str(tmp_path / 'was-here')!r})"

@@ -146,7 +146,7 @@ def test_nothing_is_lost_with_a_worker_or_with_the_scheduler(tmp_path: Path, clu
 def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from simnav.leaderboard.campaign import cluster
 
-    monkeypatch.setattr(cluster, "_WAIT", 1.0)
+    monkeypatch.setattr(cluster, "WAIT", 1.0)
     request = request_of(tmp_path, 0.0)
     with pytest.raises(CampaignError, match=r"the Dask scheduler tcp://127.0.0.1:1 cannot be used"):
         run_campaign([parse(SHIP)], [request], [0], tmp_path / "out", backend="dask", scheduler="tcp://127.0.0.1:1")

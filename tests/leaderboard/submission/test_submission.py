@@ -115,7 +115,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
         told = answer(Asked.read(asked.text()), lambda *_: None)
         return [Again(**run) for run in told["runs"]], Provenance.from_dict(told["provenance"])
 
-    monkeypatch.setattr(verifying, "_repeated", repeated)
+    monkeypatch.setattr(verifying, "repeat", repeated)
 
 
 def test_a_bundle_holds_what_is_needed_and_no_more(made: Path, tmp_path: Path) -> None:
@@ -320,7 +320,7 @@ def test_links_doubles_and_floods_are_refused(tmp_path: Path, monkeypatch: pytes
         file.writestr(entry("source/zeros"), bytes(2 << 20), zipfile.ZIP_DEFLATED)
     assert bad.stat().st_size < 10_000
     refused("more than 1 MiB when they are unpacked")
-    monkeypatch.setattr(archive, "_MOST_FILES", 3)
+    monkeypatch.setattr(archive, "MOST_FILES", 3)
     with zipfile.ZipFile(bad, "w") as file:
         for k in range(4):
             file.writestr(entry(f"source/{k}"), "1")
