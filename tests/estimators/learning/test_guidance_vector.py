@@ -11,7 +11,6 @@ from simnav.estimators.learning.guidance_vector import GuidanceVectorEnv
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.kalman import KalmanEstimator
 
-
 update = KalmanEstimator.update
 
 

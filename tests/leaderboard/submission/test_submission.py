@@ -25,6 +25,7 @@ from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.submission import archive, source, verifying
 from simnav.leaderboard.submission.bundle import open_bundle
 from simnav.leaderboard.submission.repetition import Again, Asked, answer
+from tests.cases.packages import install
 
 PROFILE = """
 title = "two short voyages"
@@ -70,26 +71,17 @@ def last(measurements, otherwise):
 
 def written(folder: Path, *, package: str = "") -> Path:
     """The estimator as a file with what it needs, or as an installed package."""
+    beside = {"helper.py": HELPER, "gain.json": '{"gain": 0.5}'}
+    if package:
+        rows = MINE.replace("from helper", "from .helper").replace("my-last-fix", "packed-fix")
+        files = {"__init__.py": "", "rows.py": rows, **beside}
+        points = {"simnav.estimators": {"rows": f"{package}.rows"}}
+        install(folder, package, points, {f"{package}/{name}": text for name, text in files.items()})
+        return folder
     folder.mkdir(parents=True)
-    if not package:
-        (folder / "my_last_fix.py").write_text(MINE)
-        (folder / "helper.py").write_text(HELPER)
-        (folder / "gain.json").write_text('{"gain": 0.5}')
-        return folder / "my_last_fix.py"
-    inside = folder / package
-    inside.mkdir()
-    (inside / "__init__.py").write_text("")
-    (inside / "rows.py").write_text(MINE.replace("from helper", "from .helper").replace("my-last-fix", "packed-fix"))
-    (inside / "helper.py").write_text(HELPER)
-    (inside / "gain.json").write_text('{"gain": 0.5}')
-    info = folder / f"{package}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\nRequires-Dist: simnav\n")
-    (info / "WHEEL").write_text("Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
-    (info / "entry_points.txt").write_text(f"[simnav.estimators]\nrows = {package}.rows\n")
-    names = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()]
-    (info / "RECORD").write_text("".join(f"{n},,\n" for n in names))
-    return folder
+    for name, text in {"my_last_fix.py": MINE, **beside}.items():
+        (folder / name).write_text(text)
+    return folder / "my_last_fix.py"
 
 
 @pytest.fixture(scope="module")
