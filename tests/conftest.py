@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from simnav.estimator import names, registry
 from simnav.kinds import INSTRUMENTS
@@ -26,6 +27,11 @@ os.environ.setdefault("SIMNAV_CONFINEMENT", "process")
 
 # Tables are compared as they are where there is no terminal; a worker of pytest-xdist is told of a narrow one.
 os.environ.pop("COLUMNS", None)
+
+
+# How long an example takes depends on the machine, and is nothing that a test asserts.
+settings.register_profile("simnav", deadline=None)
+settings.load_profile("simnav")
 
 
 @pytest.fixture

@@ -122,7 +122,7 @@ def assert_packets_equal(a, b):
 times = st.lists(st.floats(0.001, 10.0), max_size=30).map(sorted)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(imu=times, fixes=times, headings=st.lists(st.integers(1, 40).map(lambda k: k / 4), max_size=30).map(sorted))
 def test_an_observation_holds_the_packet_of_its_step_whatever_the_timing(imu, fixes, headings):
     rng = np.random.default_rng(0)

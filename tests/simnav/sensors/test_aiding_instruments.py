@@ -251,7 +251,7 @@ def test_slow_bias_is_stationary_from_the_first_measurement_and_correlated(name)
 
 
 @given(cuts=st.lists(st.integers(0, 60), max_size=5))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_blocks_of_any_length_give_the_same_bits(cuts):
     edges = [0, *sorted(cuts), 60]
     for name, spec in FULL.items():

@@ -287,7 +287,7 @@ def through(layers, s: AidStream) -> AidStream:
 
 
 @given(cuts=st.lists(st.floats(0, 100), max_size=6), name=st.sampled_from(["gnss", "dvl"]))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_blocks_of_any_length_give_the_same_bits(cuts, name):
     s = stream(name)
     whole = through(build_layers(faults(*ALL), 3), s)
