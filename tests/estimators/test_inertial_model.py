@@ -14,22 +14,9 @@ from simnav.geometry import earth, rotation
 from simnav.scenario import load
 from simnav.simulation.simulator import ideal
 from simnav.types import Datasheet, ImuDatasheet, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
+from tests.cases.closed_form import EVERY_KIND
 
 DEG = np.pi / 180.0
-
-SHEETS = (
-    Datasheet("gnss", "gnss_position", 1.0, np.ones(3), bias=np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
-    Datasheet("gnss_velocity", "gnss_velocity", 1.0, np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
-    Datasheet(
-        "dvl", "dvl", 1.0, np.ones(3), bias=np.full(3, 0.01), scale=0.01, misalignment=np.full(3, 0.01),
-        lever_arm=np.array([1.0, 0.5, 3.0]),
-    ),
-    Datasheet("magnetic", "magnetic_compass", 1.0, np.ones(1), bias=np.ones(1)),
-    Datasheet("gyrocompass", "gyrocompass", 1.0, np.ones(1)),
-    Datasheet("log", "speed_log", 1.0, np.ones(1), scale=0.01, lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("depth", "depth", 1.0, np.ones(1), lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("terrain", "terrain_fix", 1.0, np.ones(2), lever_arm=np.array([1.0, 0.5, 3.0])),
-)  # fmt: skip
 
 
 def perturbed(model: InertialModel, e: np.ndarray) -> InertialModel:
@@ -73,7 +60,7 @@ def model(recording_of, request) -> InertialModel:
     recording = recording_of(3, 20.0, aids=())
     start = replace(recording.start, attitude=np.array(attitude), velocity=np.array(velocity))
     m = InertialModel()
-    P = m.begin(start, Instruments(SHEETS, recording.instruments.imu))
+    P = m.begin(start, Instruments(EVERY_KIND, recording.instruments.imu))
     m.load(recording.data.imu)
     m.propagate(P, 7.004)
     rng = np.random.default_rng(5)
@@ -82,7 +69,7 @@ def model(recording_of, request) -> InertialModel:
     return m
 
 
-@pytest.mark.parametrize("sheet", SHEETS, ids=lambda s: s.name)
+@pytest.mark.parametrize("sheet", EVERY_KIND, ids=lambda s: s.name)
 def test_jacobians_by_finite_differences(model: InertialModel, sheet: Datasheet):
     """The innovation falls by H e when the state has the error e."""
     value = {

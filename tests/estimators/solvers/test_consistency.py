@@ -25,7 +25,7 @@ from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.scoring import nees_band
 from simnav.source import record
-from simnav.types import ImuSamples
+from tests.cases.realised import imu_biases
 
 SEEDS = 50
 DURATION = 100.0
@@ -74,15 +74,6 @@ Run = tuple[Recording, np.ndarray]
 Errors = tuple[np.ndarray, np.ndarray]
 
 
-def biases(scenario: Scenario, seed: int, time: np.ndarray) -> np.ndarray:
-    """(T, 6) realised biases of gyroscopes and accelerometers."""
-    spec = scenario.instruments["imu"]
-    quiet = {n: getattr(spec, n).model_copy(update={"random_walk": 0.0}) for n in ("gyroscope", "accelerometer")}
-    zeros = np.zeros((len(time), 3))
-    real = spec.model_copy(update=quiet).build(seed).sense(ImuSamples(time, np.full(len(time), 1.0), zeros, zeros))
-    return np.hstack([real.angular_rate, real.specific_force])
-
-
 @pytest.fixture(scope="module")
 def runs() -> Callable[[str], list[Run]]:
     """Recordings of a scenario with the biases of the IMU, one a seed; made once for all filters."""
@@ -92,7 +83,7 @@ def runs() -> Callable[[str], list[Run]]:
         if name not in made:
             scenario = SCENARIOS[name]()
             recordings = [record(scenario, seed) for seed in range(SEEDS)]
-            made[name] = [(r, biases(scenario, r.seed, r.data.truth.time)) for r in recordings]
+            made[name] = [(r, imu_biases(scenario, r.seed, r.data.truth.time)) for r in recordings]
         return made[name]
 
     return get

@@ -26,6 +26,7 @@ from simnav.types import (
     Measurement,
     Measurements,
 )
+from tests.cases.closed_form import EVERY_KIND
 
 DEG = np.pi / 180.0
 #: alpha, beta, kappa: unscented of three kinds, and cubature.
@@ -196,27 +197,11 @@ def test_points_reproduce_a_covariance_of_any_rank():
         )
 
 
-SHEETS = (
-    Datasheet("gnss", "gnss_position", 1.0, np.ones(3), bias=np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
-    Datasheet("gnss_velocity", "gnss_velocity", 1.0, np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
-    Datasheet(
-        "dvl", "dvl", 1.0, np.ones(3), bias=np.full(3, 0.01), scale=0.01, misalignment=np.full(3, 0.01),
-        lever_arm=np.array([1.0, 0.5, 3.0]),
-    ),
-    Datasheet("plain_dvl", "dvl", 1.0, np.ones(3), lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("magnetic", "magnetic_compass", 1.0, np.ones(1), bias=np.ones(1)),
-    Datasheet("gyrocompass", "gyrocompass", 1.0, np.ones(1)),
-    Datasheet("log", "speed_log", 1.0, np.ones(1), bias=np.ones(1), scale=0.01, lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("depth", "depth", 1.0, np.ones(1), lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("terrain", "terrain_fix", 1.0, np.ones(2), lever_arm=np.array([1.0, 0.5, 3.0])),
-)  # fmt: skip
-
-
 def inertial(recording_of, kind: type[InertialModel]) -> InertialModel:
     recording = recording_of(3, 20.0, aids=())
     start = replace(recording.start, attitude=np.array([0.2, -0.15, 3.1]), velocity=np.array([3.0, -5.0, 0.4]))
     model = kind()
-    P = model.begin(start, Instruments(SHEETS, recording.instruments.imu))
+    P = model.begin(start, Instruments(EVERY_KIND, recording.instruments.imu))
     model.load(recording.data.imu)
     model.propagate(P, 7.004)
     rng = np.random.default_rng(5)
@@ -272,7 +257,7 @@ def test_points_move_as_a_state_through_every_sample(recording_of):
 
 
 @pytest.mark.parametrize("calibration", [False, True], ids=["navigation", "calibration"])
-@pytest.mark.parametrize("sheet", SHEETS, ids=lambda s: s.name)
+@pytest.mark.parametrize("sheet", EVERY_KIND, ids=lambda s: s.name)
 def test_points_read_what_the_instrument_would(recording_of, sheet: Datasheet, calibration: bool):
     """Against the innovation at a state that is where the point is; a heading over the wrap among them.
 
@@ -303,7 +288,7 @@ def test_points_read_what_the_instrument_would(recording_of, sheet: Datasheet, c
 
 
 SHIP = (
-    *(s for s in SHEETS if s.kind not in ("depth",)),
+    *(s for s in EVERY_KIND if s.kind not in ("depth",)),
     Datasheet("fix", "gnss_position", 1.0, np.ones(3), bias=np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
 )
 

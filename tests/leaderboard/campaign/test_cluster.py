@@ -16,24 +16,11 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.provenance import here
 from simnav.scenario import parse
+from tests.cases import ship
 
 pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
 
-SHIP = """
-name = "tiny-ship"
-version = 1
-title = "a minute at sea"
-duration_s = 60.0
-[start]
-latitude_deg = 54.0
-longitude_deg = 8.0
-speed_m_s = 4.0
-[[manoeuvre]]
-kind = "hold"
-duration_s = 60.0
-[instruments.gnss_position]
-sigma_m = [1.0, 1.0, 2.0]
-"""
+SHIP = ship("tiny-ship", 60.0)
 
 MINE = """
 import time
