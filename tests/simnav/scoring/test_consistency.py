@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from simnav.recording import Recording
 from simnav.scoring import badge, nees, nees_band, score
 from simnav.scoring.consistency import GROUPS, LARGEST, MARGIN, coverage
 
@@ -70,6 +71,16 @@ def test_consistency_scores_of_a_run(make_recording: Any, make_trial: Any, drawn
     assert twice["nees_velocity"] == pytest.approx(4.0 * s["nees_velocity"], rel=1e-6)
     singular = score(make_trial(recording, error, covariance=0.0 * covariance), recording)
     assert singular["nees_position"] == LARGEST
+
+
+def test_epochs_count_by_their_components(recording: Recording, make_trial: Any) -> None:
+    """Three errors of one sigma at half of the epochs, two of two sigmas at the others: (3 + 8) / (3 + 2)."""
+    error, estimated = np.ones((len(recording.data.truth), 9)), np.ones((len(recording.data.truth), 9), dtype=bool)
+    error[::2], estimated[::2, 2] = 2.0, False
+    covariance = np.tile(np.eye(9), (len(error), 1, 1))
+    s = score(make_trial(recording, error, covariance=covariance, estimated=estimated), recording)
+    assert s["nees_position"] == pytest.approx(11.0 / 5.0, rel=1e-6)
+    assert s["nees_horizontal"] == pytest.approx(2.5, rel=1e-6)
 
 
 def test_no_covariance_no_consistency(make_recording: Any, make_trial: Any) -> None:
