@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,17 @@ def test_epochs_count_by_their_components(recording: Recording, make_trial: Any)
     s = score(make_trial(recording, error, covariance=covariance, estimated=estimated), recording)
     assert s["nees_position"] == pytest.approx(11.0 / 5.0, rel=1e-6)
     assert s["nees_horizontal"] == pytest.approx(2.5, rel=1e-6)
+
+
+def test_what_an_estimator_reports_of_itself_is_scored_over_the_run_and_over_its_last_tenth(
+    recording: Recording, make_trial: Any
+) -> None:
+    reported = np.zeros(100)
+    reported[0] = math.nan  # nothing said
+    reported[-12:-4] = 1.0
+    s = score(make_trial(recording, np.zeros(9), diagnostics={"inconsistent": reported}), recording)
+    assert s["inconsistent"] == pytest.approx(8 / 99)
+    assert s["inconsistent_end"] == pytest.approx(5 / 9)
 
 
 def test_no_covariance_no_consistency(make_recording: Any, make_trial: Any) -> None:
