@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from simnav.recording import Recording
+from simnav.recording import ImuLabels, Recording
 from simnav.scoring import badge, nees, nees_band, score
-from simnav.scoring.consistency import GROUPS, LARGEST, MARGIN, coverage
+from simnav.scoring.consistency import GROUPS, LARGEST, MARGIN, coverage, first_fault
+from simnav.types import ImuSamples
 
 N = 20_000
 
@@ -82,6 +84,17 @@ def test_epochs_count_by_their_components(recording: Recording, make_trial: Any)
     s = score(make_trial(recording, error, covariance=covariance, estimated=estimated), recording)
     assert s["nees_position"] == pytest.approx(11.0 / 5.0, rel=1e-6)
     assert s["nees_horizontal"] == pytest.approx(2.5, rel=1e-6)
+
+
+def test_the_first_fault_is_that_of_any_instrument_or_of_the_imu(make_recording: Any) -> None:
+    assert first_fault(make_recording()) == math.inf
+    recording = make_recording(faulty=[(49, 5.0, 0)])
+    assert first_fault(recording) == 50.0
+    time, zeros = 0.5 * np.arange(1.0, 201.0), np.zeros((200, 3))
+    for first in (30.5, 70.5):
+        labels = ImuLabels((time >= first).astype(np.uint32), np.zeros((200, 6)))
+        data = replace(recording.data, imu=ImuSamples(time, np.full(200, 0.5), zeros, zeros), imu_labels=labels)
+        assert first_fault(replace(recording, data=data)) == min(first, 50.0)
 
 
 def test_what_an_estimator_reports_of_itself_is_scored_over_the_run_and_over_its_last_tenth(
