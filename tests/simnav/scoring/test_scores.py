@@ -151,6 +151,16 @@ def test_no_recovery_before_the_next_outage(make_recording: Any) -> None:
     assert second.threshold == pytest.approx(29.0 - 1.0)  # the error at 59 s
 
 
+def test_several_outages_are_scored_by_their_means_and_the_largest(make_recording: Any, make_trial: Any) -> None:
+    recording = make_recording(outages=[(20.0, 30.0), (60.0, 80.0)])
+    error = ramp(recording, 20.0, 30.0, 1.0, 1.0) + ramp(recording, 60.0, 80.0, 2.0, 0.5)
+    s = score(make_trial(recording, error), recording)
+    assert [o.end_error for o in outages(error, recording)] == pytest.approx([9.0, 38.0])
+    assert [(o.recovery_time, o.recovered) for o in outages(error, recording)] == [(0.0, True), (20.0, False)]
+    assert (s["outage_end_error"], s["outage_end_error_max"]) == pytest.approx((23.5, 38.0))
+    assert (s["recovery_time"], s["recovered"]) == pytest.approx((10.0, 0.5))
+
+
 def test_an_outage_to_the_end_has_an_error_and_no_recovery(make_recording: Any, make_trial: Any) -> None:
     recording = make_recording(outages=[(80.0, 200.0)])
     error = ramp(recording, 80.0, 200.0, 1.0, 1.0)
