@@ -76,6 +76,11 @@ def test_every_parameter_is_documented_and_every_row_says_whose_it_is(name: str)
     assert not re.search(r"paper 00\d", text.split("Parameters\n")[0])
 
 
+def test_what_a_piece_documents_together_stays_together():
+    assert "\nlowest, highest : float\n" in inspect.getdoc(find("iae"))
+    assert documented(find("iae"))["lowest"] == documented(find("iae"))["highest"]
+
+
 @pytest.mark.parametrize("name", [n for n in RECORDED if "dead" not in n])
 def test_a_row_can_be_pickled(name: str):
     row = pickle.loads(pickle.dumps(make(name)))
