@@ -263,6 +263,13 @@ def test_blocks_of_any_length_give_the_same_bits(cuts):
             assert np.array_equal(joined, getattr(whole, field)), (name, field)
 
 
+def test_an_instrument_of_others_is_told_where_its_lever_arm_is_and_how_it_moves():
+    sensor = GnssVelocity(sigma=0.0, lever_arm=LEVER_ARM).build("v", 1)
+    assert sensor.lever_displacement(TAP) == pytest.approx(dcm_from_rpy(TAP.attitude) @ LEVER_ARM, abs=1e-12)
+    assert sensor.lever_velocity(TAP) == pytest.approx(np.cross(TAP.angular_rate, LEVER_ARM), abs=1e-12)
+    assert np.abs(sensor.lever_velocity(TAP)).max(axis=0).min() > 0.01  # on every axis
+
+
 @pytest.mark.parametrize("off", ["sigma", "bias", "bias_instability"])
 def test_switching_one_process_off_leaves_the_others(off):
     spec = FULL["gnss_velocity"]
