@@ -140,6 +140,7 @@ def test_a_weighting_sees_every_factor_and_is_asked_until_it_has_settled(clean: 
     asked = np.array(Slow.asked)
     assert np.all(asked[:-1][asked[1:] == 0] >= 4)  # at the end of each epoch
     assert np.nanmax(trial.diagnostics["weight.gnss"]) == 0.25
+    assert sorted(trial.flagged) == [("gnss", t) for t in clean.data.aids["gnss"].time]  # a weight of half or less
     # Every GNSS position with twice its sigma: the window is less sure of its own.
     plain = run_trial(make("sw-fgo"), clean)
     assert sigma(trial)[-1] > 1.3 * sigma(plain)[-1]
