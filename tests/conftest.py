@@ -7,10 +7,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from simnav.estimator import names, registry
 from simnav.kinds import INSTRUMENTS
-from simnav.plugins import is_file_module
+from simnav.plugins import Registry, is_file_module
+from simnav.scoring import SCORES
+from simnav.scoring import registry as scores
 from simnav.sensors.faults import FAULTS
 from simnav.spec import UNITS
 
@@ -25,6 +28,11 @@ os.environ.setdefault("SIMNAV_CONFINEMENT", "process")
 
 # Tables are compared as they are where there is no terminal; a worker of pytest-xdist is told of a narrow one.
 os.environ.pop("COLUMNS", None)
+
+
+# How long an example takes depends on the machine, and is nothing that a test asserts.
+settings.register_profile("simnav", deadline=None)
+settings.load_profile("simnav")
 
 
 @pytest.fixture
@@ -45,11 +53,29 @@ def plugins(monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield Path(__file__).parent / "simnav" / "plugins"
     for registry_, before in classes:
-        registry_._classes = before
+        registry_._classes = before  # in use a kind is never forgotten, so there is no public way
     UNITS.clear()
     UNITS.update(units)
     for name in [name for name in sys.modules if is_file_module(name)]:
         del sys.modules[name]
+
+
+@pytest.fixture
+def forget_scores(monkeypatch):
+    """Scores that a test registers are gone for the others of the process; a call forgets those so far.
+
+    What packages register is looked for again.
+    """
+    before = dict(SCORES)
+
+    def forget():
+        fresh = Registry("score", "simnav.scores", "simnav.scoring.standard", term="name")
+        for name, score in before.items():
+            fresh.add(name, score)
+        monkeypatch.setattr(scores, "_REGISTRY", fresh)  # in use a score is never forgotten, so there is no public way
+
+    forget()
+    return forget
 
 
 @pytest.fixture

@@ -49,7 +49,8 @@ RUNS = 50
 #: Memory that an estimator may take, by default [bytes].
 MEMORY = 2 << 30
 
-_RESTARTS = 3  # of the workers, where one died
+#: How often the workers are started again, where one died.
+RESTARTS = 3
 _GATHERED = 5000  # results that are gathered into one file meanwhile, so that a killed campaign is soon read again
 
 
@@ -369,7 +370,7 @@ def _outcomes(
             left[index] = unit
             yield index, unit
 
-    for _ in range(1 + _RESTARTS):
+    for _ in range(1 + RESTARTS):
         try:
             for index, outcome in _parallel(dispatched(), workers, backend, scheduler):
                 yield left.pop(index), outcome
@@ -386,7 +387,7 @@ def _outcomes(
                     if not left[index].entrants:
                         del left[index]
     raise CampaignError(
-        f"worker processes died {1 + _RESTARTS} times, as they do when the machine has no memory left; what is done is "
+        f"worker processes died {1 + RESTARTS} times, as they do when the machine has no memory left; what is done is "
         "on disk, so try again with fewer workers"
     )
 

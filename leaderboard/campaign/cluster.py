@@ -26,9 +26,11 @@ from simnav.leaderboard.results import store
 
 __all__ = ["ClusterError", "run_on_cluster"]
 
+#: For a first worker [s].
+WAIT = 60.0
+
 _AHEAD = 3  # units a thread of the cluster that are sent before the first one is back
 _RETRIES = 3  # of a unit whose worker died
-_WAIT = 60.0  # for a first worker [s]
 
 
 class ClusterError(RuntimeError):
@@ -104,8 +106,8 @@ def run_on_cluster(
     options = {"address": scheduler} if scheduler else {"n_workers": workers, "threads_per_worker": 1}
     with ExitStack() as stack:
         try:
-            client = stack.enter_context(distributed.Client(**options, timeout=_WAIT, set_as_default=False))
-            client.wait_for_workers(1, timeout=_WAIT)
+            client = stack.enter_context(distributed.Client(**options, timeout=WAIT, set_as_default=False))
+            client.wait_for_workers(1, timeout=WAIT)
         except lost as error:
             raise ClusterError(f"the Dask scheduler {scheduler or 'here'} cannot be used: {error}") from error
         folders: dict[int, Path] = {}

@@ -40,7 +40,8 @@ class ProgressBar:
         None while it is not known.
     """
 
-    _PAUSE = 5.0  # seconds between lines where there is no terminal
+    #: Between lines where there is no terminal [s].
+    PAUSE = 5.0
 
     def __init__(self, console: Console, text: str, total: int | None = None):
         from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -80,7 +81,7 @@ class ProgressBar:
         left_text = _clock(self.left() if left is None else left)
         self._bar.update(self._task, completed=done, total=self._total, note=note, left=left_text)
         now = time.monotonic()
-        if not self._console.is_terminal and now - self._said >= self._PAUSE:
+        if not self._console.is_terminal and now - self._said >= self.PAUSE:
             self._said = now
             self._line(f", {left_text} left")
 

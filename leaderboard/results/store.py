@@ -73,7 +73,7 @@ __all__ = [
 ]
 
 #: More files with many results than this are merged into one.
-_MOST_PARTS = 16
+MOST_PARTS = 16
 
 
 class Ending(NamedTuple):
@@ -298,7 +298,7 @@ def compact(folder: str | os.PathLike[str]) -> None:
     files = files_of(path)
     parts = [f for f in files if f.parent.name == COMPACTED]
     loose = files[len(parts) :]
-    merged = [*(parts if len(parts) >= _MOST_PARTS else []), *loose]
+    merged = [*(parts if len(parts) >= MOST_PARTS else []), *loose]
     if not merged:
         return
     done: list[Path] = []

@@ -51,7 +51,8 @@ if TYPE_CHECKING:
 
 __all__ = ["build"]
 
-_WORTH_PROCESSES = 3  # scenarios
+#: Fewer scenarios than this are written by one process.
+WORTH_PROCESSES = 3
 _STALE = 3600.0  # a build of this age runs no more [s]
 _STATIC = (*STATIC, "core.js", "table.js", "charts.js", "compare.js", "page.js", "results.schema.json")
 
@@ -185,7 +186,7 @@ def _beside(site: _Site, method: str, arguments: Sequence[str]) -> Iterator[Iter
     Where there is only one process, the calls are made as the iterator is read.
     """
     global _building
-    forks = "fork" in multiprocessing.get_all_start_methods() and len(site.scenarios) >= _WORTH_PROCESSES
+    forks = "fork" in multiprocessing.get_all_start_methods() and len(site.scenarios) >= WORTH_PROCESSES
     if site.workers < 2 or not forks:
         yield map(getattr(site, method), arguments)
         return

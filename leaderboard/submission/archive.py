@@ -17,7 +17,8 @@ __all__ = ["MOST_BYTES", "digest_of", "members", "opened", "unpack", "write_arch
 
 #: Of all files of an archive together, unpacked [bytes].
 MOST_BYTES = 256 << 20
-_MOST_FILES = 2000
+#: Files in an archive.
+MOST_FILES = 2000
 _BLOCK = 1 << 20
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the same content gives the same archive
 
@@ -57,8 +58,8 @@ def members(archive: zipfile.ZipFile, what: str) -> list[zipfile.ZipInfo]:
     """
     found, names, total = [], set[str](), 0
     infos = archive.infolist()
-    if len(infos) > _MOST_FILES:
-        raise RequestError(f"{what} holds {len(infos)} files; at most {_MOST_FILES} are taken")
+    if len(infos) > MOST_FILES:
+        raise RequestError(f"{what} holds {len(infos)} files; at most {MOST_FILES} are taken")
     for info in infos:
         name = info.filename
         parts = PurePosixPath(name).parts

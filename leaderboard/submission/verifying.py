@@ -164,7 +164,7 @@ def verify_bundle(
         asked = Asked(
             str(home / "runs"), bundle.requests(home / "packages"), wanted, seal.key.hex(), confinement,
         )  # fmt: skip
-        again, where = _repeated(python, asked, home, not present, report)
+        again, where = repeat(python, asked, home, not present, report)
     known = {(r.scenario, r.estimator, r.seed): r for r in chosen}
     identical, close, different, unknown = 0, 0, list[str](), dict[str, None]()
     for run in (a for a in again if not a.sealed):
@@ -287,7 +287,7 @@ def _sealed(bundle: Bundle, results: Sequence[Result], sample: int) -> list[Want
 # --- running ---------------------------------------------------------------------------------------------------
 
 
-def _repeated(
+def repeat(
     python: Path, asked: Asked, home: Path, clean: bool, report: Callable[..., None]
 ) -> tuple[list[Again], Provenance]:
     """Run the repetition in another process; returns the runs, and the provenance there."""

@@ -59,7 +59,7 @@ def used(process: int) -> float:
 
 def process_of(server: EstimatorServer) -> int:
     """The server itself; in a sandbox it is the child of ``bwrap``."""
-    started = server._process.pid
+    started = server.process_id
     if server.confinement != "bubblewrap":
         return started
     return int(Path(f"/proc/{started}/task/{started}/children").read_text().split()[0])

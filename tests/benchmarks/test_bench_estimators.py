@@ -95,12 +95,12 @@ def test_update_without_propagation(benchmark, recording: Recording):
     for step in steps:
         estimator.update(step)
     aids = steps[-1].aids
-    covariance = estimator.covariance.copy()
+    covariance, correction = estimator.covariance.copy(), np.empty(estimator.model.size)
 
     def update() -> None:
         estimator.covariance[:] = covariance
         for m in aids:
-            estimator._take(m, {}, [])
+            estimator.model.assimilate(m, estimator.covariance, correction)
 
     benchmark(update)
     assert len(aids) == 4

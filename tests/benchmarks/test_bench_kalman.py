@@ -56,14 +56,13 @@ def test_update_only(benchmark, recording: Recording, row: str, kind: str):
     model, covariance = estimator.model, estimator.covariance
     measurement: Measurement = next(m for m in packet.aids if m.kind == kind)
     state, before = model.snapshot(), covariance.copy()
+    none, correction = np.zeros(len(model.calibration)), np.empty(model.size)
 
     def update():
         model.restore(state)
         covariance[:] = before
-        propagate_covariance(
-            covariance, model.transition, model.process_noise, model.calibration, model._decay, model._density, 1.0
-        )
-        estimator._take(measurement, {}, [])
+        propagate_covariance(covariance, model.transition, model.process_noise, model.calibration, none, none, 1.0)
+        model.assimilate(measurement, covariance, correction)
 
     benchmark(update)
     assert np.trace(covariance[:3, :3]) <= np.trace(before[:3, :3]) * 1.5

@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
-__all__ = ["POND", "ROV", "ship"]
+__all__ = ["POND", "ROV", "SHORT", "ship"]
 
 #: A short voyage with fixes only: the text of its file.
 POND = Path(__file__).with_name("pond.toml").read_text(encoding="utf-8")
+#: Twelve steps with an IMU at 20 Hz and a GNSS receiver at 0.5 Hz: the text of its file.
+SHORT = Path(__file__).with_name("short.toml").read_text(encoding="utf-8")
 #: A slow ROV with a DVL at 23 Hz and a MEMS IMU: its file.
 ROV = Path(__file__).with_name("rov.toml")
 

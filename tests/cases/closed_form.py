@@ -35,6 +35,21 @@ AIDS = (
     Datasheet("compass", "magnetic_compass", 2.0, np.array([1.0 * DEG])),
     Datasheet("depth", "depth", 1.0, np.array([0.3]), lever_arm=np.array([0.0, 0.0, 2.0])),
 )
+#: One instrument of each kind, with biases, scale factors and lever arms, and a DVL without errors but its noise.
+EVERY_KIND = (
+    Datasheet("gnss", "gnss_position", 1.0, np.ones(3), bias=np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
+    Datasheet("gnss_velocity", "gnss_velocity", 1.0, np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
+    Datasheet(
+        "dvl", "dvl", 1.0, np.ones(3), bias=np.full(3, 0.01), scale=0.01, misalignment=np.full(3, 0.01),
+        lever_arm=np.array([1.0, 0.5, 3.0]),
+    ),
+    Datasheet("plain_dvl", "dvl", 1.0, np.ones(3), lever_arm=np.array([1.0, 0.5, 3.0])),
+    Datasheet("magnetic", "magnetic_compass", 1.0, np.ones(1), bias=np.ones(1)),
+    Datasheet("gyrocompass", "gyrocompass", 1.0, np.ones(1)),
+    Datasheet("log", "speed_log", 1.0, np.ones(1), bias=np.ones(1), scale=0.01, lever_arm=np.array([1.0, 0.5, 3.0])),
+    Datasheet("depth", "depth", 1.0, np.ones(1), lever_arm=np.array([1.0, 0.5, 3.0])),
+    Datasheet("terrain", "terrain_fix", 1.0, np.ones(2), lever_arm=np.array([1.0, 0.5, 3.0])),
+)  # fmt: skip
 SIGMAS = np.array([2.0, 2.0, 3.0, 0.2, 0.2, 0.2, 0.1 * DEG, 0.1 * DEG, 1.0 * DEG])
 
 

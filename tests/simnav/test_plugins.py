@@ -13,6 +13,7 @@ import pytest
 from simnav import plugins as module
 from simnav.plugins import PluginError, Registry, code_digest, load_plugin
 from simnav.scenario import load
+from tests.cases.packages import install
 
 
 class One:
@@ -108,13 +109,8 @@ def test_a_file_that_is_not_there():
 
 
 def test_an_installed_package_is_found_by_its_entry_points(plugins, tmp_path):
-    for name in ("beacon", "echo"):
-        (tmp_path / f"{name}.py").write_text((plugins / f"{name}.py").read_text())
-    info = tmp_path / "lagoon-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lagoon\nVersion: 1.0\n")
-    groups = "[simnav.instruments]\nbeacon = beacon\n[simnav.faults]\necho = echo\nbroken = nowhere\n"
-    (info / "entry_points.txt").write_text(groups)
+    points = {"simnav.instruments": {"beacon": "beacon"}, "simnav.faults": {"echo": "echo", "broken": "nowhere"}}
+    install(tmp_path, "lagoon", points, {f: (plugins / f).read_text() for f in ("beacon.py", "echo.py")})
     code = (
         "from simnav.kinds import KINDS\nfrom simnav.sensors import fault_specs\n"
         "print(list(KINDS)[-1], KINDS['beacon'].role, fault_specs()[-1].__name__)"

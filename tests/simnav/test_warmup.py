@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from simnav import compiled, warmup
+from tests.cases.packages import install
 
-PACKAGE = {
+FILES = {
     "simnav_plugin/__init__.py": "import simnav_plugin.kernels\n",
     "simnav_plugin/kernels.py": """
 from simnav.compiled import kernel
@@ -25,8 +28,6 @@ def outer(x):
     return 2.0 * inner(x)
 """,
     "broken_plugin.py": "raise RuntimeError('never works')\n",
-    "plugins-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: plugins\nVersion: 1.0\n",
-    "plugins-1.0.dist-info/entry_points.txt": "[simnav.estimators]\na = simnav_plugin\nb = broken_plugin\n",
 }
 
 RUN = """
@@ -36,21 +37,18 @@ reported = []
 with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
     # Only the plug-in's kernels: those of the project are other tests' business.
-    ours = lambda: [k for k in compiled._kernels if "plugin" in k.__module__ and k.signature]
+    ours = lambda: [k for k in compiled.kernels() if "plugin" in k.__module__]
     warmup.kernels = ours
     warmup.warmup(lambda *p: reported.append(p))
 assert sum("broken_plugin" in str(w.message) for w in caught) == 1, caught
-modules = {k.__module__ for k in compiled._kernels}
+modules = {k.__module__ for k in compiled.kernels()}
 print(reported, sorted(modules & {"simnav.strapdown", "simnav.world.motion", "simnav_plugin.kernels"}))
 assert "matplotlib" not in sys.modules and "gtsam" not in sys.modules
 """
 
 
 def test_plug_ins_are_warm_too_and_a_broken_one_is_named(tmp_path: Path) -> None:
-    for name, text in PACKAGE.items():
-        path = tmp_path / "site" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+    install(tmp_path / "site", "plugins", {"simnav.estimators": {"a": "simnav_plugin", "b": "broken_plugin"}}, FILES)
     environment = os.environ | {
         "PYTHONPATH": str(tmp_path / "site"),
         "SIMNAV_CACHE_DIR": str(tmp_path / "cache"),
@@ -65,7 +63,10 @@ def test_plug_ins_are_warm_too_and_a_broken_one_is_named(tmp_path: Path) -> None
         assert done.stdout.strip() == f"{reported} {modules}"
 
 
-SEVERAL = "\n".join(f"@kernel('f8(f8)')\ndef k{i}(x):\n    return x + {i}.0\n" for i in range(5))
+# Made without the decorator: no other test of the process should come across them.
+SEVERAL = "from simnav.compiled import Kernel\n" + "\n".join(
+    f"def k{i}(x):\n    return x + {i}.0\nk{i} = Kernel(k{i}, 'f8(f8)', False)\n" for i in range(5)
+)
 
 
 @pytest.mark.parametrize("processes", [1, 2])
@@ -73,28 +74,22 @@ def test_several_are_compiled_beside_each_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, processes: int
 ) -> None:
     """In other processes, which leave them in the cache; each is reported once, and all are loaded here."""
-    source = tmp_path / "several.py"
-    source.write_text("from simnav.compiled import kernel\n" + SEVERAL)
+    (tmp_path / "several.py").write_text(SEVERAL)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.delitem(sys.modules, "several", raising=False)
-    before = list(compiled._kernels)
-    try:
-        import several  # type: ignore[import-not-found]
-
-        ours = [k for k in compiled._kernels if k not in before]
-    finally:
-        compiled._kernels[:] = before
-        monkeypatch.delitem(sys.modules, "several", raising=False)
+    several = importlib.import_module("several")
+    monkeypatch.delitem(sys.modules, "several")
+    ours: list[compiled.Kernel[[float], float]] = [getattr(several, f"k{i}") for i in range(5)]
     monkeypatch.setattr(warmup, "kernels", lambda: ours)
     here: list[str] = []
-    original = compiled.Kernel._jit
+    original = compiled.Kernel.compile
 
-    def jit(self: compiled.Kernel, directory: str | None) -> object:
-        here.append(self.__name__ if not self.cached() else "cached")
-        return original(self, directory)
+    def noted(self: compiled.Kernel[[float], float]) -> Callable[..., float]:
+        here.append("cached" if self.cached() else self.__name__)
+        return original(self)
 
-    monkeypatch.setattr(compiled.Kernel, "_jit", jit)
+    monkeypatch.setattr(compiled.Kernel, "compile", noted)
     reported: list[tuple[int, int, str]] = []
     warmup.warmup(lambda *p: reported.append(p), processes=processes)
     assert [t[0] for t in reported] == [0, 1, 2, 3, 4, 5]

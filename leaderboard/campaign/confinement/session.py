@@ -148,6 +148,11 @@ class EstimatorServer:
         self._control = ours
         self._ready = False
 
+    @property
+    def process_id(self) -> int:
+        """Id of the process that was started; in a sandbox that of ``bwrap``."""
+        return self._process.pid
+
     def _caches(self) -> Path | None:
         """Folder of the kernels that estimators of files compile, each in one of its own."""
         from simnav.compiled import cache_directory

@@ -180,7 +180,7 @@ def test_posterior_against_the_textbook():
     assert after.nis == pytest.approx(given.residual @ np.linalg.solve(PREDICTED + TRUE, given.residual))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.booleans(), st.floats(-6.0, 6.0))
 def test_an_estimate_stays_within_its_bounds(seed: int, full: bool, exponent: float):
     """Whatever the innovations: eigenvalues in units of the nominal variances, and symmetric."""

@@ -47,7 +47,7 @@ WEIGHTS = {
 
 @pytest.mark.parametrize("weight", WEIGHTS.values(), ids=WEIGHTS)
 @given(u=st.floats(0.0, 1e6), step=st.floats(0.0, 0.01))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_weight_lies_in_its_range_falls_and_has_no_jump(weight, u: float, step: float):
     w = weight(u)
     assert 0.0 <= w <= 1.0

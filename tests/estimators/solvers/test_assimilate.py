@@ -55,7 +55,7 @@ def test_it_is_the_same_filter(recording_of, row: type[Row]):
 
 
 @pytest.mark.parametrize("hook", ["_observe", "_absorb"])
-def test_a_solver_that_does_it_in_its_own_way_is_asked(recording_of, hook: str):
+def test_a_solver_that_does_it_in_its_own_way_is_asked(recording_of, run_over, hook: str):
     seen = []
 
     def own(self, argument):
@@ -64,14 +64,12 @@ def test_a_solver_that_does_it_in_its_own_way_is_asked(recording_of, hook: str):
 
     recording = recording_of(2, 5.0)
     estimator = type("Hooked", (KalmanEstimator,), {hook: own, "assimilates": False})(InertialModel())
-    estimator.reset(recording.start, recording.instruments)
-    for packet in recording.steps():
-        estimator.update(packet)
+    run_over(estimator, recording)
     assert len(seen) == sum(map(len, (p.aids for p in recording.steps())))
 
 
 @pytest.mark.parametrize("method", ["measure", "correct"])
-def test_a_model_that_does_it_in_its_own_way_says_so_and_is_asked(recording_of, method: str):
+def test_a_model_that_does_it_in_its_own_way_says_so_and_is_asked(recording_of, run_over, method: str):
     seen = []
 
     def own(self, argument):
@@ -82,9 +80,7 @@ def test_a_model_that_does_it_in_its_own_way_says_so_and_is_asked(recording_of, 
         type("Silent", (InertialModel,), {method: own})
     recording = recording_of(2, 5.0)
     estimator = KalmanEstimator(type("Own", (InertialModel,), {method: own, "fused": False})())
-    estimator.reset(recording.start, recording.instruments)
-    for packet in recording.steps():
-        estimator.update(packet)
+    run_over(estimator, recording)
     assert seen
 
 

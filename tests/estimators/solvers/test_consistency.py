@@ -19,14 +19,13 @@ import pytest
 
 from simnav.estimator import make
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.propagation import propagate_covariance
 from simnav.estimators.solvers.federated import FederatedEstimator
 from simnav.geometry import earth, rotation
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.scoring import nees_band
 from simnav.source import record
-from simnav.types import ImuSamples
+from tests.cases.realised import imu_biases
 
 SEEDS = 50
 DURATION = 100.0
@@ -75,15 +74,6 @@ Run = tuple[Recording, np.ndarray]
 Errors = tuple[np.ndarray, np.ndarray]
 
 
-def biases(scenario: Scenario, seed: int, time: np.ndarray) -> np.ndarray:
-    """(T, 6) realised biases of gyroscopes and accelerometers."""
-    spec = scenario.instruments["imu"]
-    quiet = {n: getattr(spec, n).model_copy(update={"random_walk": 0.0}) for n in ("gyroscope", "accelerometer")}
-    zeros = np.zeros((len(time), 3))
-    real = spec.model_copy(update=quiet).build(seed).sense(ImuSamples(time, np.full(len(time), 1.0), zeros, zeros))
-    return np.hstack([real.angular_rate, real.specific_force])
-
-
 @pytest.fixture(scope="module")
 def runs() -> Callable[[str], list[Run]]:
     """Recordings of a scenario with the biases of the IMU, one a seed; made once for all filters."""
@@ -93,7 +83,7 @@ def runs() -> Callable[[str], list[Run]]:
         if name not in made:
             scenario = SCENARIOS[name]()
             recordings = [record(scenario, seed) for seed in range(SEEDS)]
-            made[name] = [(r, biases(scenario, r.seed, r.data.truth.time)) for r in recordings]
+            made[name] = [(r, imu_biases(scenario, r.seed, r.data.truth.time)) for r in recordings]
         return made[name]
 
     return get
@@ -185,15 +175,12 @@ def analysed(reset_locals: bool) -> FederatedEstimator:
             self.actual = np.kron(self.all, self.covariance)
 
         def _step(self, until):
-            model = self.model
-            elapsed, n = until - model.time, model.size
+            elapsed, before = until - self.model.time, self.covariance.copy()
             super()._step(until)
             if elapsed > 0.0:
-                F, Q = np.diag(np.exp(-np.append(np.zeros(15), model._decay) * elapsed)), np.zeros((n, n))
-                F[:15, :15] = model.transition
-                propagate_covariance(
-                    Q, model.transition, model.process_noise, np.zeros(n - 15), model._decay, model._density, elapsed
-                )
+                F = np.eye(self.model.size)
+                self.model.carry(F, elapsed)
+                Q = self.covariance - F @ before @ F.T
                 F = np.kron(np.eye(len(self.at)), F)
                 self.actual = F @ self.actual @ F.T + np.kron(self.all, Q)
 

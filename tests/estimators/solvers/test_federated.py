@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav.estimator import EstimatorError, UnsuitableScenario, make
+from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario, make
 from simnav.geometry import earth
 from simnav.recording import Recording
 from simnav.scenario import load
@@ -19,6 +19,11 @@ GNSS = Datasheet("gnss", "gnss_position", 1.0, np.array([1.5, 1.5, 3.0]), lever_
 DVL = Datasheet("dvl", "dvl", 1.0, np.full(3, 0.02), phase=0.333, lever_arm=np.array([1.0, 0.5, 3.0]))
 BIASED_DVL = replace(DVL, bias=np.full(3, 0.02), scale=0.01, misalignment=np.full(3, 0.005))
 DEPTH = Datasheet("depth", "depth", 0.5, np.array([0.3]), bias=np.array([0.2]))
+
+
+def locals_of(estimator: Estimator) -> dict:
+    """The local filters by name: share, error and covariance. Only the fusion reads them, so they are not public."""
+    return estimator._locals
 
 
 def assert_same(run_over, recording: Recording, reference: str, name: str, **parameters) -> None:
@@ -51,11 +56,11 @@ def test_the_master_adds_up_the_information(recording_of, run_over):
     recording = recording_of(5, 40.0)
     estimator = make("federated-no-reset", fusion_period=4.0)
     _, covariances = run_over(estimator, recording)
-    total = sum(np.linalg.inv(local.covariance[:15, :15]) for local in estimator._locals.values())
+    total = sum(np.linalg.inv(local.covariance[:15, :15]) for local in locals_of(estimator).values())
     scale = np.sqrt(np.diag(total))
     ours = np.linalg.inv(estimator.covariance[:15, :15])
     np.testing.assert_allclose(ours / np.outer(scale, scale), total / np.outer(scale, scale), atol=1e-5)
-    assert sum(local.share for local in estimator._locals.values()) == pytest.approx(1.0)
+    assert sum(local.share for local in locals_of(estimator).values()) == pytest.approx(1.0)
     central = run_over(make("ekf"), recording)[1][-1]
     scale = np.sqrt(np.diag(central))
     assert np.linalg.eigvalsh((covariances[-1] - central) / np.outer(scale, scale))[0] > -1e-3
@@ -122,7 +127,7 @@ def test_without_reset_a_fault_stays_with_its_sensor(recording_of, run_over):
         for r in (recording, spoilt):
             estimator = make(name)
             run_over(estimator, r)
-            local = estimator._locals["dvl"]
+            local = locals_of(estimator)["dvl"]
             offset = earth.relative_position(estimator.model.position, recording.data.truth.position[-1])
             ends.append(offset + local.error[:3])
         moved[name] = np.abs(ends[1] - ends[0]).max()

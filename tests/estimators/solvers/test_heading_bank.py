@@ -12,7 +12,7 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.heading_bank import HeadingBank, initial_headings
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.geometry.rotation import wrap_angle
-from simnav.types import Datasheet, Measurements
+from simnav.types import Datasheet, InitialState, Instruments, Measurements
 
 DEG = np.pi / 180.0
 GNSS = Datasheet("gnss", "gnss_position", 1.0, np.array([1.5, 1.5, 3.0]), lever_arm=np.array([2.0, -1.0, -8.0]))
@@ -63,20 +63,24 @@ def test_it_finds_a_heading_that_is_far_off(recording_of, run_over, off: float):
     assert np.hypot(*errors[-1, :2]) < 5.0
 
 
-def test_what_is_left_is_the_filter_that_began_there(recording_of, run_over):
-    """The bank's last filter gives what a Kalman filter gives that starts with its heading and its covariance."""
+def test_what_is_left_is_the_filter_that_began_there(recording_of, monkeypatch: pytest.MonkeyPatch):
+    """The bank's last filter gives what a Kalman filter gives that is told the same start."""
     recording = unknown(recording_of(7, 60.0, aids=(GNSS, DVL)), 120.0 * DEG, 104.0 * DEG)
+    starts: dict[KalmanEstimator, InitialState] = {}
+
+    def noted(self: KalmanEstimator, start: InitialState, instruments: Instruments) -> None:
+        starts[self] = start
+        reset(self, start, instruments)
+
+    reset = KalmanEstimator.reset
+    monkeypatch.setattr(KalmanEstimator, "reset", noted)
     estimator = make("heading-bank")
     estimator.reset(recording.start, recording.instruments)
-    starts = [(h.filter.model.dcm.copy(), h.filter.covariance.copy()) for h in estimator._hypotheses]
-    begun = [h.filter for h in estimator._hypotheses]
     for packet in recording.steps():
         last = estimator.update(packet)
-    (left,) = estimator._hypotheses
-    k = next(i for i, f in enumerate(begun) if f is left.filter)
+    assert last.diagnostics["hypotheses"] == 1.0
     alone = KalmanEstimator(InertialModel())
-    alone.reset(recording.start, recording.instruments)
-    alone.model.dcm[...], alone.covariance[...] = starts[k]
+    alone.reset(starts[estimator.best], recording.instruments)
     for packet in recording.steps():
         expected = alone.update(packet)
     np.testing.assert_allclose(last.position, expected.position, rtol=0, atol=1e-12)

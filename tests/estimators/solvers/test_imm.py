@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from simnav.estimator import EstimatorError, make
 from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.solvers.imm import _chain, mixture_update
+from simnav.estimators.solvers.imm import mixture_update
 
 
 def problem(seed: int, m: int = 3):
@@ -59,7 +59,7 @@ def test_levels_change_by_the_chain_first():
     """Where the levels are alike, the measurement says nothing of them: what is left is the chain."""
     P, H, R, v = problem(4)
     cross = np.ascontiguousarray(P @ H.T)
-    chain, probability = _chain(3, 0.9, 0.6), np.array([0.2, 0.5, 0.3])
+    chain, probability = np.array([[0.9, 0.05, 0.05], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]]), np.array([0.2, 0.5, 0.3])
     predicted = probability @ chain
     mixture_update(P, cross, H @ cross, R, v, np.ones(3), chain, probability, np.empty(7))
     np.testing.assert_allclose(probability, predicted)
@@ -79,7 +79,7 @@ def test_a_singular_innovation_covariance_changes_nothing():
 
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_the_chain_is_a_chain(n: int):
-    chain = _chain(n, 0.99, 0.8)
+    chain = make("imm", levels=tuple(range(1, n + 1)), stay=0.99, stay_high=0.8).transition
     np.testing.assert_allclose(chain.sum(axis=1), 1.0)
     np.testing.assert_allclose(np.diag(chain), [0.99, *[0.8] * (n - 1)])
     assert chain.min() > 0.0

@@ -17,7 +17,7 @@ from simnav.geometry.rotation import (
     rpy_from_dcm,
     skew,
 )
-from simnav.types import Datasheet, Instruments, Measurement
+from simnav.types import Datasheet, Instruments, Measurement, Measurements
 
 DEG = np.pi / 180.0
 SHEETS = (
@@ -89,7 +89,7 @@ def test_an_update_is_the_textbooks(recording_of, error: str, origin: float):
         p = origin * np.array([1.0, -2.0, 0.5])
         rest = np.concatenate([model.bias, model.calibration])
         wanted = textbook(error, C, v, p, rest, P.copy(), H, R, residual)
-        estimator._take(m, {}, [])
+        estimator.update(Measurements(0.0, 0.0, None, [m]))
         turned = rotation_vector_from_dcm(model.dcm @ C.T)
         assert np.linalg.norm(turned) > 0.05
         np.testing.assert_allclose(model.dcm, wanted[0], atol=1e-9)

@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from simnav.estimator import EstimatorError, make
+from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
@@ -25,6 +26,7 @@ from simnav.types import (
     Measurement,
     Measurements,
 )
+from tests.cases.closed_form import EVERY_KIND
 
 DEG = np.pi / 180.0
 #: alpha, beta, kappa: unscented of three kinds, and cubature.
@@ -97,6 +99,25 @@ def test_a_linear_problem_is_the_kalman_filter_to_rounding(numbers):
             np.testing.assert_allclose(filter_.covariance, P, rtol=0, atol=1e-10)
 
 
+class Listener(Adaptation):
+    """Changes nothing, and keeps the innovation that a solver hands to adaptations."""
+
+    heard: Innovation
+
+    def adapt(self, innovation):
+        self.heard = innovation
+        return innovation.noise
+
+
+def innovation_of(model: PointModel, value: np.ndarray, **numbers: float) -> Innovation:
+    """What the filter finds in a measurement at the start of a run."""
+    listener = Listener()
+    estimator = SigmaPointEstimator(model, listener, **numbers)
+    estimator.reset(START, Instruments((METER,)))
+    estimator.update(Measurements(0.0, 0.0, None, [Measurement(0.0, "meter", METER.kind, value)]))
+    return listener.heard
+
+
 class Polar(Linear):
     """Range and bearing, seen in Cartesian axes."""
 
@@ -125,9 +146,8 @@ def test_the_mean_of_polar_coordinates_in_closed_form(numbers):
     """E[r cos(b)] = r exp(-s^2/2); the points give r (1 + (cos(k s) - 1) / k^2) at k sigma, equal to fourth order."""
     r, bearing_sigma, range_sigma = 50.0, 0.25, 0.5
     model = Polar((r, 0.0), (range_sigma, bearing_sigma))
-    estimator = SigmaPointEstimator(model, **dict(zip(("alpha", "beta", "kappa"), numbers)))
-    estimator.reset(START, Instruments((METER,)))
-    residual, _, covariance, _ = estimator._observe(Measurement(0.0, "meter", METER.kind, np.zeros(3)))
+    innovation = innovation_of(model, np.zeros(3), **dict(zip(("alpha", "beta", "kappa"), numbers)))
+    residual, covariance = innovation.residual, innovation.predicted
     alpha, _, kappa = numbers
     k = alpha * np.sqrt(2 + kappa)
     assert -residual[0] == pytest.approx(r * (1 + (np.cos(k * bearing_sigma) - 1) / k**2), rel=1e-9)
@@ -145,10 +165,11 @@ def test_the_moments_are_those_of_the_scaled_unscented_transform():
     rng = np.random.default_rng(0)
     n = 4
     for alpha, beta, kappa in [(0.5, 2.0, 0.0), (0.1, 2.0, 1.0), (1.0, 0.0, 0.0), (0.3, 0.09, -1.0)]:
-        estimator = SigmaPointEstimator(Linear(), alpha=alpha, beta=beta, kappa=kappa)
-        estimator.reset(START, Instruments((METER,)))
         values = rng.standard_normal((2 * n, 3)) + 2.0
-        mean, covariance = estimator._moments(values)
+        model = Linear()
+        model.observe_points = lambda measurement, errors, values=values: values
+        found = innovation_of(model, Linear.H @ np.arange(4.0), alpha=alpha, beta=beta, kappa=kappa)
+        mean, covariance = -found.residual, found.predicted
         lam = alpha**2 * (n + kappa) - n
         w = np.full(2 * n + 1, 0.5 / (n + lam))
         wc = w.copy()
@@ -176,27 +197,11 @@ def test_points_reproduce_a_covariance_of_any_rank():
         )
 
 
-SHEETS = (
-    Datasheet("gnss", "gnss_position", 1.0, np.ones(3), bias=np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
-    Datasheet("gnss_velocity", "gnss_velocity", 1.0, np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
-    Datasheet(
-        "dvl", "dvl", 1.0, np.ones(3), bias=np.full(3, 0.01), scale=0.01, misalignment=np.full(3, 0.01),
-        lever_arm=np.array([1.0, 0.5, 3.0]),
-    ),
-    Datasheet("plain_dvl", "dvl", 1.0, np.ones(3), lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("magnetic", "magnetic_compass", 1.0, np.ones(1), bias=np.ones(1)),
-    Datasheet("gyrocompass", "gyrocompass", 1.0, np.ones(1)),
-    Datasheet("log", "speed_log", 1.0, np.ones(1), bias=np.ones(1), scale=0.01, lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("depth", "depth", 1.0, np.ones(1), lever_arm=np.array([1.0, 0.5, 3.0])),
-    Datasheet("terrain", "terrain_fix", 1.0, np.ones(2), lever_arm=np.array([1.0, 0.5, 3.0])),
-)  # fmt: skip
-
-
 def inertial(recording_of, kind: type[InertialModel]) -> InertialModel:
     recording = recording_of(3, 20.0, aids=())
     start = replace(recording.start, attitude=np.array([0.2, -0.15, 3.1]), velocity=np.array([3.0, -5.0, 0.4]))
     model = kind()
-    P = model.begin(start, Instruments(SHEETS, recording.instruments.imu))
+    P = model.begin(start, Instruments(EVERY_KIND, recording.instruments.imu))
     model.load(recording.data.imu)
     model.propagate(P, 7.004)
     rng = np.random.default_rng(5)
@@ -252,7 +257,7 @@ def test_points_move_as_a_state_through_every_sample(recording_of):
 
 
 @pytest.mark.parametrize("calibration", [False, True], ids=["navigation", "calibration"])
-@pytest.mark.parametrize("sheet", SHEETS, ids=lambda s: s.name)
+@pytest.mark.parametrize("sheet", EVERY_KIND, ids=lambda s: s.name)
 def test_points_read_what_the_instrument_would(recording_of, sheet: Datasheet, calibration: bool):
     """Against the innovation at a state that is where the point is; a heading over the wrap among them.
 
@@ -283,7 +288,7 @@ def test_points_read_what_the_instrument_would(recording_of, sheet: Datasheet, c
 
 
 SHIP = (
-    *(s for s in SHEETS if s.kind not in ("depth",)),
+    *(s for s in EVERY_KIND if s.kind not in ("depth",)),
     Datasheet("fix", "gnss_position", 1.0, np.ones(3), bias=np.ones(3), lever_arm=np.array([2.0, -1.0, -8.0])),
 )
 

@@ -51,11 +51,8 @@ def test_weights_tell_the_wrong_fixes(recording_of):
     recording = faulty(recording_of(5, 200.0), 90.0, 120.0, 15.0)
     estimator = make("student-t-rts")
     run_trial(estimator, recording)
-    smoother = estimator.smoother
-    by_time = {}
-    for used, weights in ((u, smoother.weights[u.stop]) for u in smoother._used if len(u.known) == 3 and u.stop):
-        by_time.setdefault(used.stop, min(weights))
-    assert sum(w < 0.2 for w in by_time.values()) >= 25
+    low = [stop for stop, weights in estimator.smoother.weights.items() if min(weights) < 0.2]
+    assert 25 <= len(low) <= 30  # of 30 wrong fixes, and of no other measurement
 
 
 def test_the_filter_in_front_is_not_touched(recording_of):

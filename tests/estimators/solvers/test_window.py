@@ -13,6 +13,7 @@ from simnav.estimator import Estimator, find, make, names
 from simnav.estimators.adaptations.gating import ChiSquareGate
 from simnav.estimators.composition import Row
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.recording import Recording
@@ -111,7 +112,12 @@ def test_an_adaptation_decides_when_a_measurement_arrives(clean: Recording):
     at = int(np.searchsorted(gated.time, 61.5))
     assert horizontal(plain, bad)[at] > 5.0 * horizontal(gated, bad)[at]
     assert any(name == "gnss" and 60.0 <= t <= 61.0 for name, t in gated.flagged)
-    assert "nis.gnss" in gated.diagnostics
+    # What it sees is what it sees in a filter: the innovation, normalised by the covariance of its prediction.
+    filtered = run_trial(KalmanEstimator(InertialModel(), ChiSquareGate()), clean)
+    for quantity in ("innovation.gnss", "nis.gnss"):
+        seen, expected = gated.diagnostics[quantity][:10], filtered.diagnostics[quantity][:10]
+        assert seen == pytest.approx(expected, rel=0.05, nan_ok=True)
+        assert np.isfinite(seen).any()
 
 
 def test_a_weighting_sees_every_factor_and_is_asked_until_it_has_settled(clean: Recording):
@@ -134,6 +140,7 @@ def test_a_weighting_sees_every_factor_and_is_asked_until_it_has_settled(clean: 
     asked = np.array(Slow.asked)
     assert np.all(asked[:-1][asked[1:] == 0] >= 4)  # at the end of each epoch
     assert np.nanmax(trial.diagnostics["weight.gnss"]) == 0.25
+    assert sorted(trial.flagged) == [("gnss", t) for t in clean.data.aids["gnss"].time]  # a weight of half or less
     # Every GNSS position with twice its sigma: the window is less sure of its own.
     plain = run_trial(make("sw-fgo"), clean)
     assert sigma(trial)[-1] > 1.3 * sigma(plain)[-1]

@@ -14,7 +14,8 @@ from simnav.geometry import earth, rotation
 from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.source import record
-from simnav.types import ImuSamples, NavigationStates
+from simnav.types import NavigationStates
+from tests.cases.realised import imu_biases
 
 SEEDS = 50
 GROUPS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9), "biases": slice(9, 15)}
@@ -47,15 +48,6 @@ def run(estimator: Estimator, recording: Recording) -> tuple[NavigationStates, n
     return states, np.array(biases), np.array(covariances)
 
 
-def true_biases(scenario: Scenario, seed: int, time: np.ndarray) -> np.ndarray:
-    """(T, 6) biases that the simulated IMU draws: its errors without white noise, at zero input."""
-    spec = scenario.instruments["imu"]
-    quiet = {n: getattr(spec, n).model_copy(update={"random_walk": 0.0}) for n in ("gyroscope", "accelerometer")}
-    zeros = np.zeros((len(time), 3))
-    real = spec.model_copy(update=quiet).build(seed).sense(ImuSamples(time, np.full(len(time), 1.0), zeros, zeros))
-    return np.hstack([real.angular_rate, real.specific_force])
-
-
 def both(scenario: Scenario) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Errors (50, T, 15) and covariances (50, T, 15, 15) of filter and window."""
     rows = {"ekf": {}, "sw-fgo": {"window": 5}}
@@ -63,7 +55,7 @@ def both(scenario: Scenario) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     for seed in range(SEEDS):
         recording = record(scenario, seed)
         truth = recording.data.truth
-        biases = true_biases(scenario, seed, truth.time)
+        biases = imu_biases(scenario, seed, truth.time)
         for row, parameters in rows.items():
             states, estimated, covariance = run(make(row, **parameters), recording)
             found[row][0].append(np.hstack([errors(states, truth), estimated - biases]))

@@ -117,7 +117,7 @@ def test_weight_functions_in_closed_form():
 
 @pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
 @given(u=st.floats(0.0, 1e4), step=st.floats(0.0, 10.0))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_weight_starts_at_one_and_never_rises(function, u: float, step: float):
     at = function(np.array([0.0, u, u + step]))
     assert at[0] == 1.0
@@ -272,7 +272,7 @@ def test_eliminated_switches_find_the_minimum_of_the_joint_problem():
 
 
 @given(chi2=st.floats(0.0, 400.0), phi=st.floats(0.2, 20.0))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_dcs_is_twice_the_switch_and_at_most_one(chi2: float, phi: float):
     """With F = 1/sigma_s^2, DCS scales by min(1, 2 s) where a switch is s."""
     switch = weights(SwitchableConstraints(phi**-0.5, smallest=0.0), [chi2**0.5], components=1)[0] ** 0.5

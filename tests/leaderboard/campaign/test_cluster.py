@@ -16,24 +16,11 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.provenance import here
 from simnav.scenario import parse
+from tests.cases import ship
 
 pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
 
-SHIP = """
-name = "tiny-ship"
-version = 1
-title = "a minute at sea"
-duration_s = 60.0
-[start]
-latitude_deg = 54.0
-longitude_deg = 8.0
-speed_m_s = 4.0
-[[manoeuvre]]
-kind = "hold"
-duration_s = 60.0
-[instruments.gnss_position]
-sigma_m = [1.0, 1.0, 2.0]
-"""
+SHIP = ship("tiny-ship", 60.0)
 
 MINE = """
 import time
@@ -146,7 +133,7 @@ def test_nothing_is_lost_with_a_worker_or_with_the_scheduler(tmp_path: Path, clu
 def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from simnav.leaderboard.campaign import cluster
 
-    monkeypatch.setattr(cluster, "_WAIT", 1.0)
+    monkeypatch.setattr(cluster, "WAIT", 1.0)
     request = request_of(tmp_path, 0.0)
     with pytest.raises(CampaignError, match=r"the Dask scheduler tcp://127.0.0.1:1 cannot be used"):
         run_campaign([parse(SHIP)], [request], [0], tmp_path / "out", backend="dask", scheduler="tcp://127.0.0.1:1")

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import RequestError
 from simnav.plugins import load_plugin
-from simnav.scoring import SCORES, ScoringInput, register_score, registry
+from simnav.scoring import SCORES, ScoringInput, register_score
 from tests.cases import POND
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")
@@ -36,11 +37,10 @@ ESTIMATORS = ["gnss-only", "gnss-only:acceleration=2"]
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, forget_scores: Callable[[], None]) -> Path:
     """A working directory with a short scenario; scores that a test registers are forgotten."""
     (tmp_path / "pond.toml").write_text(POND)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry._REGISTRY, "_classes", dict(SCORES))
     return tmp_path
 
 
@@ -163,7 +163,7 @@ def test_what_cannot_be_rescored_is_one_sentence(here: Path, monkeypatch: pytest
         simnav.rescore("out", "cep50", scenarios="pond.toml")
 
 
-def test_scores_of_a_plug_in_and_of_kept_trials_are_verified(here: Path) -> None:
+def test_scores_of_a_plug_in_and_of_kept_trials_are_verified(here: Path, forget_scores: Callable[[], None]) -> None:
     campaign(keep_trials=True)
 
     @register_score("north_spread", title="Spread of the north error", unit="m", better="lower")
@@ -175,7 +175,7 @@ def test_scores_of_a_plug_in_and_of_kept_trials_are_verified(here: Path) -> None
     known = simnav.verify("out", **wanted)
     assert (known.passed, known.different, known.unknown) == (True, (), ())
     assert all("north_spread" in text for text in known.close)
-    registry._REGISTRY._classes.pop("north_spread")
+    forget_scores()
     assert (simnav.verify("out", **wanted).passed, simnav.verify("out", **wanted).unknown) == (True, ("north_spread",))
     words = ["verify", "out", "-s", "pond.toml", *(w for e in ESTIMATORS for w in ("-e", e))]
     said = CliRunner().invoke(app, words)

@@ -13,27 +13,18 @@ import pytest
 from typer.testing import CliRunner
 
 from simnav.leaderboard import cli
+from tests.cases import POND
 
-SCENARIO = """
-name = "pond"
-version = 1
-title = "a minute on a pond"
-duration_s = 60.0
-[start]
-latitude_deg = 54.0
-longitude_deg = 8.0
-speed_m_s = 2.0
-[[manoeuvre]]
-kind = "hold"
-duration_s = 60.0
-[instruments.gnss_position]
-sigma_m = [1.0, 1.0, 2.0]
+SCENARIO = (
+    POND.replace("duration_s = 30.0", "duration_s = 60.0")
+    + """
 [[fault]]
 kind = "outage"
 instruments = ["gnss_position"]
 start_s = 20.0
 end_s = 40.0
 """
+)
 
 MINE = '''
 from simnav import Estimate, Estimator, UnsuitableScenario, register

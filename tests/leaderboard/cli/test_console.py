@@ -15,7 +15,7 @@ from simnav.leaderboard.cli.console import Output, ProgressBar
 
 
 def test_progress_without_a_terminal_says_how_long(capsys, monkeypatch):
-    monkeypatch.setattr(ProgressBar, "_PAUSE", 0.0)
+    monkeypatch.setattr(ProgressBar, "PAUSE", 0.0)
     with Output().progress("running") as progress:
         progress(1, 4, left=75.0)
         progress(4, 4)

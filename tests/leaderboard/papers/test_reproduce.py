@@ -530,7 +530,11 @@ def tiny(tmp_path, monkeypatch):
         notes=("One note.",),
     )
     monkeypatch.setattr("simnav.leaderboard.papers.paper.load", lambda key: paper)
-    monkeypatch.setattr("simnav.leaderboard.papers.page._stored", lambda folder, key: None)
+
+    def none_are_stored(paper: Paper) -> Reproduction:
+        raise ValueError
+
+    monkeypatch.setattr("simnav.leaderboard.papers.stored.load", none_are_stored)
     return tmp_path
 
 

@@ -148,7 +148,7 @@ def test_failing_a_sixth_of_the_runs_cannot_rank_first():
     assert [r.estimator for r in ranked(results).track("sea").rows][:2] == ["fair", "good"]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_nothing_that_makes_a_run_worse_improves_score_or_rank(data: Any):
     results = campaign(SIMPLE, seeds=6, spread=0.4)
@@ -232,7 +232,7 @@ def test_who_runs_the_easy_seeds_only_gains_nothing():
     assert row(fewer, "fair", "one-v1").worst == pytest.approx(max(row(fewer, "fair", "one-v1").ratios.values()))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     count=st.integers(1, 11),
     seed=st.integers(0, 10),

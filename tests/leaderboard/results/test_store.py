@@ -102,7 +102,7 @@ def test_more_results_than_are_held_in_memory(folder: Path, monkeypatch: pytest.
 
 
 def test_compaction_in_rounds_merges_parts(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store, "_MOST_PARTS", 3)
+    monkeypatch.setattr(store, "MOST_PARTS", 3)
     for seed in range(6):
         store.write(folder, result(seed))
         store.write(folder, result(0))  # again what is compacted already
@@ -116,7 +116,7 @@ def test_compaction_in_rounds_merges_parts(folder: Path, monkeypatch: pytest.Mon
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
 def test_compaction_killed_at_every_step(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Killed for good (no clean-up runs) before its n-th touch of the disk, for every n."""
-    monkeypatch.setattr(store, "_MOST_PARTS", 2)
+    monkeypatch.setattr(store, "MOST_PARTS", 2)
     for part in range(2):
         for seed in range(3):
             store.write(folder, result(3 * part + seed))

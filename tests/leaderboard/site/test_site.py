@@ -408,7 +408,7 @@ def test_charts_offer_only_rows_of_which_curves_are_kept(results, tmp_path):
 
 
 def test_two_processes_write_the_same_site_as_one(results, tmp_path, monkeypatch):
-    monkeypatch.setattr(site, "_WORTH_PROCESSES", 1)
+    monkeypatch.setattr(site, "WORTH_PROCESSES", 1)
     ranking = rank(results)
     written = []
     for workers in (1, 2):
@@ -423,7 +423,7 @@ def test_a_scenario_that_fails_in_another_process_ends_the_build(results, tmp_pa
     def fails(*_):
         raise RuntimeError("no page today")
 
-    monkeypatch.setattr(site, "_WORTH_PROCESSES", 1)
+    monkeypatch.setattr(site, "WORTH_PROCESSES", 1)
     monkeypatch.setattr(site, "scenario_data", fails)
     with pytest.raises(RuntimeError, match="no page today"):
         site.build(results, rank(results), tmp_path / "site", workers=2)

@@ -25,6 +25,7 @@ from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.submission import archive, source, verifying
 from simnav.leaderboard.submission.bundle import open_bundle
 from simnav.leaderboard.submission.repetition import Again, Asked, answer
+from tests.cases.packages import install
 
 PROFILE = """
 title = "two short voyages"
@@ -70,26 +71,17 @@ def last(measurements, otherwise):
 
 def written(folder: Path, *, package: str = "") -> Path:
     """The estimator as a file with what it needs, or as an installed package."""
+    beside = {"helper.py": HELPER, "gain.json": '{"gain": 0.5}'}
+    if package:
+        rows = MINE.replace("from helper", "from .helper").replace("my-last-fix", "packed-fix")
+        files = {"__init__.py": "", "rows.py": rows, **beside}
+        points = {"simnav.estimators": {"rows": f"{package}.rows"}}
+        install(folder, package, points, {f"{package}/{name}": text for name, text in files.items()})
+        return folder
     folder.mkdir(parents=True)
-    if not package:
-        (folder / "my_last_fix.py").write_text(MINE)
-        (folder / "helper.py").write_text(HELPER)
-        (folder / "gain.json").write_text('{"gain": 0.5}')
-        return folder / "my_last_fix.py"
-    inside = folder / package
-    inside.mkdir()
-    (inside / "__init__.py").write_text("")
-    (inside / "rows.py").write_text(MINE.replace("from helper", "from .helper").replace("my-last-fix", "packed-fix"))
-    (inside / "helper.py").write_text(HELPER)
-    (inside / "gain.json").write_text('{"gain": 0.5}')
-    info = folder / f"{package}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\nRequires-Dist: simnav\n")
-    (info / "WHEEL").write_text("Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
-    (info / "entry_points.txt").write_text(f"[simnav.estimators]\nrows = {package}.rows\n")
-    names = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()]
-    (info / "RECORD").write_text("".join(f"{n},,\n" for n in names))
-    return folder
+    for name, text in {"my_last_fix.py": MINE, **beside}.items():
+        (folder / name).write_text(text)
+    return folder / "my_last_fix.py"
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +107,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
         told = answer(Asked.read(asked.text()), lambda *_: None)
         return [Again(**run) for run in told["runs"]], Provenance.from_dict(told["provenance"])
 
-    monkeypatch.setattr(verifying, "_repeated", repeated)
+    monkeypatch.setattr(verifying, "repeat", repeated)
 
 
 def test_a_bundle_holds_what_is_needed_and_no_more(made: Path, tmp_path: Path) -> None:
@@ -153,7 +145,7 @@ def test_a_package_travels_as_a_wheel_and_is_never_imported_here(
 
     folder = written(tmp_path / "site", package="simnav_packed_fix")
     monkeypatch.syspath_prepend(str(folder))
-    monkeypatch.setattr(registry, "_discovered", False)
+    registry.discover_point("simnav_packed_fix.rows")
     (tmp_path / "short.toml").write_text(PROFILE.replace("runs = 2", "runs = 1"))
     done = publishing.submit("simnav-packed-fix", profile=tmp_path / "short.toml", output=tmp_path / "made.zip",
                              results=tmp_path / "results", workers=1)  # fmt: skip
@@ -320,7 +312,7 @@ def test_links_doubles_and_floods_are_refused(tmp_path: Path, monkeypatch: pytes
         file.writestr(entry("source/zeros"), bytes(2 << 20), zipfile.ZIP_DEFLATED)
     assert bad.stat().st_size < 10_000
     refused("more than 1 MiB when they are unpacked")
-    monkeypatch.setattr(archive, "_MOST_FILES", 3)
+    monkeypatch.setattr(archive, "MOST_FILES", 3)
     with zipfile.ZipFile(bad, "w") as file:
         for k in range(4):
             file.writestr(entry(f"source/{k}"), "1")

@@ -24,7 +24,7 @@ from simnav.log import LogError
 from simnav.recording import AidStream, Block, packets
 from simnav.scenario import load, parse
 from simnav.scenario.catalogue import headers
-from simnav.source import record
+from simnav.source import open_source, record
 from simnav.trial import run_trial
 from simnav.types import Datasheet, Estimate, ImuDatasheet, ImuSamples, Instruments, NavigationStates, TriadDatasheet
 
@@ -122,7 +122,7 @@ def assert_packets_equal(a, b):
 times = st.lists(st.floats(0.001, 10.0), max_size=30).map(sorted)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(imu=times, fixes=times, headings=st.lists(st.integers(1, 40).map(lambda k: k / 4), max_size=30).map(sorted))
 def test_an_observation_holds_the_packet_of_its_step_whatever_the_timing(imu, fixes, headings):
     rng = np.random.default_rng(0)
@@ -276,7 +276,7 @@ def test_what_the_reference_lacks_counts_nothing(scenario, monkeypatch):
             block.truth.position[block.truth.time == 3.0] = np.nan
             return block
 
-    monkeypatch.setattr(environment, "_open", lambda *args: (Gaps(simnav.open_source(*args)), ""))
+    monkeypatch.setattr("simnav.source.open_source", lambda *args: Gaps(open_source(*args)))
     plain = NavigationEnv(scenario, render_mode="rgb_array")
     weighted = NavigationEnv(scenario, reward={"horizontal": 1.0, "vertical": 1.0, "position": 1.0, "attitude": 1.0})
     _, rewards = play(plain, 1, steps=6)

@@ -10,29 +10,12 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from simnav.environment import NavigationEnv
 from simnav.environment.vector import NavigationVectorEnv, spawn_seeds
 from simnav.scenario import parse
-
-TOML = """
-name = "short"
-version = 1
-title = "twelve steps"
-duration_s = 12.0
-[start]
-latitude_deg = 50.0
-longitude_deg = -5.0
-speed_m_s = 5.0
-[instruments.imu]
-rate_hz = 20.0
-gyroscope = { random_walk_deg_sqrt_h = 0.05 }
-[instruments.gnss]
-kind = "gnss_position"
-rate_hz = 0.5
-sigma_m = [2.0, 2.0, 4.0]
-"""
+from tests.cases import SHORT
 
 
 @pytest.fixture(scope="module")
 def scenario():
-    return parse(TOML)
+    return parse(SHORT)
 
 
 def start_of(infos):

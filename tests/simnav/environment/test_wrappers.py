@@ -11,26 +11,16 @@ import simnav
 from simnav.environment import EstimatorAgent, NavigationEnv, NormaliseObservation, RelativeAction
 from simnav.geometry.earth import displace
 from simnav.scenario import parse
+from tests.cases import SHORT
 
-TOML = """
-name = "short"
-version = 1
-title = "a few steps"
-duration_s = 20.0
-[start]
-latitude_deg = 50.0
-longitude_deg = -5.0
-speed_m_s = 5.0
-[instruments.imu]
-rate_hz = 20.0
-[instruments.gnss]
-kind = "gnss_position"
-rate_hz = 0.5
-sigma_m = [2.0, 2.0, 4.0]
+TOML = (
+    SHORT.replace("duration_s = 12.0", "duration_s = 20.0")
+    + """
 [instruments.gyrocompass]
 rate_hz = 2.0
 sigma_deg = 0.5
 """
+)
 
 
 @pytest.fixture

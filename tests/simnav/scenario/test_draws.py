@@ -12,10 +12,12 @@ import simnav
 from simnav.environment import NavigationEnv
 from simnav.recording import Recording
 from simnav.scenario import TRAINING_ROOT, Scenario, parse
+from simnav.scenario.catalogue import headers
 from simnav.scenario.draws import Distribution, Template, has_draws, with_values
 from simnav.simulation.simulator import Simulator, ideal, simulate
 from simnav.spec import SpecError
 from simnav.streams import stream
+from tests.cases.packages import install_pack
 
 TOML = """
 name = "drawn-run"
@@ -252,15 +254,12 @@ def test_a_bad_distribution_gets_a_sentence(old: str, new: str, sentence: str):
     assert "\n" not in str(error.value)
 
 
-def test_the_head_of_a_file_with_a_drawn_duration(tmp_path):
-    from simnav.scenario.catalogue import _header
-
+def test_the_head_of_a_file_with_a_drawn_duration(tmp_path, monkeypatch):
     text = TOML.replace("duration_s = 40.0", "duration_s = { integers = [40, 60] }")
-    (tmp_path / "drawn-run.toml").write_text(
-        text.replace('title = "A test"', 'title = "A"\ndescription = """\n[x]\n"""')
-    )
-    header = _header(tmp_path / "drawn-run.toml")
-    assert header is not None
+    text = text.replace('title = "A test"', 'title = "A"\ndescription = """\n[x]\n"""')
+    install_pack(tmp_path, "mypack", {"mypack/__init__.py": "", "mypack/drawn-run.toml": text})
+    monkeypatch.syspath_prepend(tmp_path)
+    (header,) = (h for h in headers() if h.name == "drawn-run")
     assert (header.duration, header.title) == (50.0, "A")
     assert {parse(text).drawn(k).duration for k in range(30)} <= set(range(40, 61))
 

@@ -8,7 +8,6 @@ import sys
 import textwrap
 import tomllib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ import pytest
 from simnav.scenario import Scenario, load, names, parse
 from simnav.scenario.catalogue import ScenarioWarning, headers
 from simnav.spec import SpecError
+from tests.cases.packages import install_pack
 
 TOML = """
 name = "test-run"
@@ -366,21 +366,9 @@ def test_unknown_scenarios_name_the_nearest():
 # ------------------------------------------------------------------------------------------------ packs
 
 
-def _pack(folder: Path, name: str, files: dict[str, str], *, package: str | None = None) -> None:
-    """Install a scenario pack into a folder of sys.path, the way pip leaves it."""
-    info = folder / f"{name}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[simnav.scenarios]\n{name} = {package or name}\n")
-    for path, text in files.items():
-        target = folder / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text)
-
-
 def test_a_pack_adds_its_scenarios_and_the_newest_version_wins(tmp_path, monkeypatch):
     newer = TOML.replace("version = 3", "version = 4").replace("A test", "A newer test")
-    _pack(tmp_path, "mypack", {"mypack/__init__.py": "", "mypack/old.toml": TOML, "mypack/new.toml": newer})
+    install_pack(tmp_path, "mypack", {"mypack/__init__.py": "", "mypack/old.toml": TOML, "mypack/new.toml": newer})
     monkeypatch.syspath_prepend(tmp_path)
     assert "test-run" in names()
     assert load("test-run").version == 4
@@ -388,7 +376,7 @@ def test_a_pack_adds_its_scenarios_and_the_newest_version_wins(tmp_path, monkeyp
 
 
 def test_a_pack_is_read_without_running_it(tmp_path, monkeypatch):
-    _pack(tmp_path, "rude", {"rude/__init__.py": "raise SystemExit(1)", "rude/a.toml": TOML})
+    install_pack(tmp_path, "rude", {"rude/__init__.py": "raise SystemExit(1)", "rude/a.toml": TOML})
     monkeypatch.syspath_prepend(tmp_path)
     assert "test-run" in names()
 
@@ -409,7 +397,7 @@ def test_a_pack_is_read_without_running_it(tmp_path, monkeypatch):
 )
 def test_a_broken_pack_is_a_warning_and_harms_nobody(files, warning, tmp_path, monkeypatch):
     before = names()
-    _pack(tmp_path, "broken", files)
+    install_pack(tmp_path, "broken", files)
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.warns(ScenarioWarning, match=warning):
         assert names() == before
@@ -417,7 +405,7 @@ def test_a_broken_pack_is_a_warning_and_harms_nobody(files, warning, tmp_path, m
 
 def test_names_that_differ_only_in_hyphens_do_not_share_a_gymnasium_id(tmp_path, monkeypatch):
     one, two = TOML.replace("test-run", "run-a1"), TOML.replace("test-run", "run-a-1")
-    _pack(tmp_path, "mypack", {"mypack/__init__.py": "", "mypack/a.toml": one, "mypack/b.toml": two})
+    install_pack(tmp_path, "mypack", {"mypack/__init__.py": "", "mypack/a.toml": one, "mypack/b.toml": two})
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.warns(ScenarioWarning, match="b.toml: left out"):
         found = headers()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from simnav.recording import ImuLabels, Recording
 from simnav.scoring import badge, nees, nees_band, score
-from simnav.scoring.consistency import GROUPS, LARGEST, MARGIN, coverage
+from simnav.scoring.consistency import GROUPS, LARGEST, MARGIN, coverage, first_fault
+from simnav.types import ImuSamples
 
 N = 20_000
 
@@ -70,6 +74,38 @@ def test_consistency_scores_of_a_run(make_recording: Any, make_trial: Any, drawn
     assert twice["nees_velocity"] == pytest.approx(4.0 * s["nees_velocity"], rel=1e-6)
     singular = score(make_trial(recording, error, covariance=0.0 * covariance), recording)
     assert singular["nees_position"] == LARGEST
+
+
+def test_epochs_count_by_their_components(recording: Recording, make_trial: Any) -> None:
+    """Three errors of one sigma at half of the epochs, two of two sigmas at the others: (3 + 8) / (3 + 2)."""
+    error, estimated = np.ones((len(recording.data.truth), 9)), np.ones((len(recording.data.truth), 9), dtype=bool)
+    error[::2], estimated[::2, 2] = 2.0, False
+    covariance = np.tile(np.eye(9), (len(error), 1, 1))
+    s = score(make_trial(recording, error, covariance=covariance, estimated=estimated), recording)
+    assert s["nees_position"] == pytest.approx(11.0 / 5.0, rel=1e-6)
+    assert s["nees_horizontal"] == pytest.approx(2.5, rel=1e-6)
+
+
+def test_the_first_fault_is_that_of_any_instrument_or_of_the_imu(make_recording: Any) -> None:
+    assert first_fault(make_recording()) == math.inf
+    recording = make_recording(faulty=[(49, 5.0, 0)])
+    assert first_fault(recording) == 50.0
+    time, zeros = 0.5 * np.arange(1.0, 201.0), np.zeros((200, 3))
+    for first in (30.5, 70.5):
+        labels = ImuLabels((time >= first).astype(np.uint32), np.zeros((200, 6)))
+        data = replace(recording.data, imu=ImuSamples(time, np.full(200, 0.5), zeros, zeros), imu_labels=labels)
+        assert first_fault(replace(recording, data=data)) == min(first, 50.0)
+
+
+def test_what_an_estimator_reports_of_itself_is_scored_over_the_run_and_over_its_last_tenth(
+    recording: Recording, make_trial: Any
+) -> None:
+    reported = np.zeros(100)
+    reported[0] = math.nan  # nothing said
+    reported[-12:-4] = 1.0
+    s = score(make_trial(recording, np.zeros(9), diagnostics={"inconsistent": reported}), recording)
+    assert s["inconsistent"] == pytest.approx(8 / 99)
+    assert s["inconsistent_end"] == pytest.approx(5 / 9)
 
 
 def test_no_covariance_no_consistency(make_recording: Any, make_trial: Any) -> None:

@@ -75,6 +75,19 @@ def test_withholding_epochs_never_pays(recording):
     assert scores(recording, silent=[n - 1])["final_error"] > scores(recording)["final_error"]
 
 
+def test_horizontal_position_and_height_are_held_each_by_itself(make_recording, make_trial):
+    """For ten seconds at 5 m/s one of the two is missing; the other counts as it is given."""
+    recording, time = make_recording(), np.arange(1.0, 101.0)
+    error = np.zeros((100, 9))
+    error[:, 2] = 0.1 * time
+    for missing, expected in (((2,), (0.0, 10.0)), ((0, 1), (50.0, 10.0))):
+        estimated = np.ones((100, 9), dtype=bool)
+        estimated[50:60, missing] = False
+        found = score(make_trial(recording, error, estimated=estimated), recording)
+        assert (found["horizontal_max"], found["vertical_max"]) == pytest.approx(expected, abs=1e-3)
+    assert found["vertical_mae"] == pytest.approx(0.1 * time.mean())
+
+
 def test_what_is_never_estimated_is_not_held(recording):
     found = scores(recording, height=False)
     assert np.isnan(found["vertical_rmse"])

@@ -14,16 +14,13 @@ import pytest
 
 from simnav.plugins import PluginError, load_plugin
 from simnav.recording import Recording
-from simnav.scoring import SCORES, ScoreWarning, ScoringInput, register_score, registry, score
+from simnav.scoring import SCORES, ScoreWarning, ScoringInput, register_score, score
+from simnav.scoring.registry import Score
 
 PLUGIN = Path(__file__).parents[1] / "plugins" / "excursion.py"
 
 
-@pytest.fixture(autouse=True)
-def forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a test registers is forgotten afterwards."""
-    before = dict(SCORES)
-    monkeypatch.setattr(registry._REGISTRY, "_classes", before)
+pytestmark = pytest.mark.usefixtures("forget_scores")
 
 
 @pytest.fixture
@@ -65,7 +62,6 @@ def test_the_entry_points_of_packages_are_loaded(monkeypatch: pytest.MonkeyPatch
         return [Point()] if group == "simnav.scores" else []
 
     monkeypatch.setattr("simnav.plugins.entry_points", points)
-    monkeypatch.setattr(registry._REGISTRY, "_discovered", False)
     assert SCORES["theirs"].better is None
 
 
@@ -143,7 +139,7 @@ def test_what_several_scores_need_is_computed_once(recording: Recording, make_tr
 
 
 def test_a_score_reaches_another_process() -> None:
-    sent = pickle.loads(pickle.dumps(registry.Score(np.mean, "mine", "Mine", "m", "lower", True)))
+    sent = pickle.loads(pickle.dumps(Score(np.mean, "mine", "Mine", "m", "lower", True)))
     assert (sent.name, sent.unit, sent.better, sent.uses_covariance, sent([1.0, 3.0])) == (
         "mine",
         "m",

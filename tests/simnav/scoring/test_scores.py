@@ -21,7 +21,9 @@ def test_constant_errors(recording: Recording, make_trial: Any) -> None:
         "horizontal_rmse": 5.0, "horizontal_mae": 5.0, "horizontal_max": 5.0, "cep50": 5.0, "r95": 5.0,
         "north_rmse": 3.0, "north_mae": 3.0, "north_max": 3.0, "east_rmse": 4.0, "east_mae": 4.0, "east_max": 4.0,
         "vertical_rmse": 2.0, "vertical_mae": 2.0, "vertical_max": 2.0,
-        "velocity_horizontal_rmse": 0.5, "velocity_vertical_rmse": 0.1, "level_rmse": 0.005, "heading_rmse": 0.02,
+        "velocity_horizontal_rmse": 0.5, "velocity_horizontal_mae": 0.5, "velocity_north_rmse": 0.3,
+        "velocity_east_rmse": 0.4, "velocity_vertical_rmse": 0.1, "level_rmse": 0.005, "tilt_north_rmse": 0.003,
+        "tilt_east_rmse": 0.004, "heading_rmse": 0.02, "heading_mae": 0.02,
         "final_error": 5.0, "drift": 100.0 * 5.0 / 500.0, "availability": 1.0,
     }  # fmt: skip
     for name, value in expected.items():
@@ -93,6 +95,8 @@ def test_smoothed_scores(recording: Recording, make_trial: Any) -> None:
     s = score(trial, recording)
     assert s["smoothed_horizontal_rmse"] == pytest.approx(0.5, rel=1e-5)
     assert s["smoothed_horizontal_max"] == pytest.approx(0.5, rel=1e-5)
+    assert s["smoothed_north_rmse"] == pytest.approx(0.3, rel=1e-5)
+    assert s["smoothed_east_rmse"] == pytest.approx(0.4, rel=1e-5)
     assert s["smoothed_vertical_rmse"] == pytest.approx(0.1, rel=1e-5)
     assert s["smoothed_heading_rmse"] == pytest.approx(0.01, rel=1e-5)
     assert s["horizontal_rmse"] == pytest.approx(np.sqrt(2.0), rel=1e-5)
@@ -145,6 +149,16 @@ def test_no_recovery_before_the_next_outage(make_recording: Any) -> None:
     first, second = outages(error, recording)
     assert (first.recovered, first.recovery_time) == (False, 10.0)
     assert second.threshold == pytest.approx(29.0 - 1.0)  # the error at 59 s
+
+
+def test_several_outages_are_scored_by_their_means_and_the_largest(make_recording: Any, make_trial: Any) -> None:
+    recording = make_recording(outages=[(20.0, 30.0), (60.0, 80.0)])
+    error = ramp(recording, 20.0, 30.0, 1.0, 1.0) + ramp(recording, 60.0, 80.0, 2.0, 0.5)
+    s = score(make_trial(recording, error), recording)
+    assert [o.end_error for o in outages(error, recording)] == pytest.approx([9.0, 38.0])
+    assert [(o.recovery_time, o.recovered) for o in outages(error, recording)] == [(0.0, True), (20.0, False)]
+    assert (s["outage_end_error"], s["outage_end_error_max"]) == pytest.approx((23.5, 38.0))
+    assert (s["recovery_time"], s["recovered"]) == pytest.approx((10.0, 0.5))
 
 
 def test_an_outage_to_the_end_has_an_error_and_no_recovery(make_recording: Any, make_trial: Any) -> None:

@@ -71,7 +71,7 @@ def test_a_correlation_time_is_positive(correlation_time):
 
 
 @given(cuts=st.lists(st.integers(0, 50), max_size=6), infinite=st.booleans())
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_blocks_of_any_length_give_the_same_bits(cuts, infinite):
     time = np.cumsum(np.tile([0.1, 0.25, 0.0, 1.0, 0.1], 10))
     sigma, correlation_time = np.array([1.0, 0.5]), np.inf if infinite else 3.0

@@ -286,8 +286,21 @@ def through(layers, s: AidStream) -> AidStream:
     return s
 
 
+def test_faults_that_overlap_add_up_and_each_is_labelled():
+    s = stream("dvl")
+    steps = [
+        {"kind": "bias_step", "instruments": "dvl", "offset_m_s": offset, "start_s": start, "end_s": start + 30}
+        for offset, start in ((0.5, 10), (0.25, 25))
+    ]
+    after = through(build_layers(faults(*steps), 1), s)
+    first, second = (s.time >= 10) & (s.time < 40), (s.time >= 25) & (s.time < 55)
+    assert np.array_equal(after.faults, first + 2 * second)
+    assert after.fault_error == pytest.approx(np.tile(0.5 * first + 0.25 * second, (3, 1)).T)
+    assert_consistent(s, after)
+
+
 @given(cuts=st.lists(st.floats(0, 100), max_size=6), name=st.sampled_from(["gnss", "dvl"]))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_blocks_of_any_length_give_the_same_bits(cuts, name):
     s = stream(name)
     whole = through(build_layers(faults(*ALL), 3), s)

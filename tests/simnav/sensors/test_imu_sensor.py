@@ -164,7 +164,7 @@ def test_quantization_gives_whole_increments_and_a_bounded_integral():
 
 
 @given(cuts=st.lists(st.integers(0, 700), max_size=8))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_blocks_of_any_length_give_the_same_bits(cuts):
     ideal = samples(700, angular_rate=(0.1, 0.2, -0.1), specific_force=(0.1, 0.2, -9.8))
     build = ImuSpec.from_toml(NAVIGATION_GRADE).build

@@ -16,7 +16,7 @@ STEPS = 60
 
 @pytest.fixture
 def truth(monkeypatch: pytest.MonkeyPatch) -> NavigationStates:
-    monkeypatch.setattr("simnav.trial.log._CHUNK", 16)  # of covariances
+    monkeypatch.setattr("simnav.trial.log._CHUNK", 16)  # so that few epochs are several chunks; no user sets it
     time = np.arange(1.0, STEPS + 1.0)
     position = np.tile([0.9, 3.1415, 0.0], (STEPS, 1))
     position[10] = np.nan  # not known there

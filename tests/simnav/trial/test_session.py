@@ -443,7 +443,7 @@ def test_an_earlier_bad_covariance_outranks_a_later_exception(recording: Recordi
 
 
 def test_many_epochs_are_checked_in_chunks(recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simnav.trial.log._CHUNK", 4)
+    monkeypatch.setattr("simnav.trial.log._CHUNK", 4)  # so that few epochs are several chunks; no user sets it
     trial = run_trial(failing(with_(covariance=2.0 * np.eye(9))), recording)
     assert trial.status == "ok"
     assert trial.covariance is not None

@@ -58,7 +58,7 @@ def test_hour_of_manoeuvring_in_a_seaway_returns_to_the_truth():
     assert np.abs(rotation_vector_from_dcm(turned)).max() < 1e-7
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.lists(st.integers(1, 400), min_size=1, max_size=12), st.integers(0, 2**40))
 def test_blocks_of_any_length_give_the_same_bits(lengths, seed):
     def world():
