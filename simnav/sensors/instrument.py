@@ -418,6 +418,15 @@ class Instrument(ABC):
         """The (n, 3) north-east-down offset [m] of the instrument from the reference point."""
         return turn_to_ned(tap.attitude, self.lever_arm)
 
+    def lever_velocity(self, tap: TapStates) -> Array:
+        """The (n, 3) velocity [m/s] of the instrument relative to the reference point, body axes: omega x l."""
+        w, (x, y, z) = tap.angular_rate, self.lever_arm
+        velocity = np.empty((len(w), 3))
+        velocity[:, 0] = w[:, 1] * z - w[:, 2] * y
+        velocity[:, 1] = w[:, 2] * x - w[:, 0] * z
+        velocity[:, 2] = w[:, 0] * y - w[:, 1] * x
+        return velocity
+
     def ahead(self, time: Array) -> tuple[Array, Array]:
         """What `sense` draws for the next n samples, whose times are enough for that.
 
