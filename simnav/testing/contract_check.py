@@ -322,7 +322,7 @@ def _determinism(candidate: Candidate, recording: Recording) -> tuple[bool, str]
 
 @_demand("reset")
 def _reset(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """After a run, `reset` leaves nothing behind: the next run is that of a new instance."""
+    """After a run, `reset` restores the initial behaviour: the next run gives the estimates of a new instance."""
     fresh = _run(candidate.factory(), recording)
     used = candidate.factory()
     _run(used, contract_recording(1))
@@ -335,7 +335,7 @@ def _reset(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
 @_demand("causality")
 def _causality(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """An estimate depends on nothing that comes after it.
+    """An estimate does not depend on later measurements.
 
     All that comes after half of the run is changed; the estimates before it must stay.
     """
@@ -371,7 +371,7 @@ def _aliasing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
 @_demand("silence")
 def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """The estimator goes on when instruments fall silent.
+    """The estimator continues when instruments stop delivering measurements.
 
     Every aiding instrument falls silent at half of the run; then the IMU does, too.
     """
