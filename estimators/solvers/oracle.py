@@ -1,4 +1,4 @@
-"""The Kalman filter of the oracles: it knows the point of linearisation, the noise of each measurement and the faults."""
+"""The Kalman filter of the oracles. It is linearised at the truth, and knows the noise and the faults."""
 
 from __future__ import annotations
 
