@@ -74,34 +74,34 @@ class WindowEstimator(Solver):
     Parameters
     ----------
     model : ErrorModel, ModelChoice or Chain
-        One for which `simnav.estimators.models.chain.chain_of` knows a chain.
+        A model with a chain (`simnav.estimators.models.chain.chain_of`), or the chain itself.
     adaptation : Adaptation, optional
-        None: every measurement counts with its nominal noise. Not one that ``inflates``.
+        Chooses the noise of each measurement; None: the nominal noise. An adaptation that ``inflates`` is refused.
     weighting : Weighting, optional
-        None: every factor counts in full.
+        Sets the weight of each factor; None: every factor has the weight 1.
     isolation : Isolation, optional
-        Changes the weights where it finds out which factors are at fault; it needs a weighting.
+        Decides which factors are faulty, and changes their weights; it needs a weighting.
     window : int or None
-        Epochs (steps that bring measurements) in the window; None: all of them.
+        Number of epochs (steps with measurements) in the window; None: all of them.
     tolerance : float
-        Largest component of a step, in its sigmas, at which the nodes have converged; the step need not be taken where
-        the contraction from step to step, also of the epochs before, says that it would be smaller. Likewise the
-        largest change of a weight, and of the weight times the norm of a whitened residual, that does not count.
+        Largest component of a step, in its sigmas, at which the nodes have converged. The step is not computed if the
+        contraction from step to step, also of earlier epochs, predicts that it would be smaller. It is also the largest
+        change of a weight, and of the weight times the norm of a whitened residual, that is ignored.
     iterations : int
-        Most steps an epoch.
+        Largest number of steps in an epoch.
     spacing : float
-        Measurements at times closer to the newest node than this [s] get no node of their own (`Chain`, folds), unless
+        Measurements at times closer to the newest node than this [s] have no node of their own (`Chain`, folds), unless
         they are the last of their step. 0, and with ``every_sample``: every time of a measurement is a node.
     every_sample : bool
-        A node for every IMU sample, instead of one preintegrated factor between measurements: the graph of the
-        post-processing paper without its equivalent IMU factor.
+        True: a node for every IMU sample, instead of one preintegrated factor between measurements. This is the graph
+        of the AUV smoothing paper (2022) without its equivalent IMU factor.
 
     Attributes
     ----------
     chain : Chain
-        From `reset` on.
+        The nodes and factors of the window, from `reset` on.
     covariance : (n, n) array
-        Of the newest node.
+        Covariance of the newest node.
     """
 
     pieces = ("model", "adaptation", "weighting", "isolation")
@@ -273,23 +273,23 @@ class WindowEstimator(Solver):
             diagnostics["weight.motion"] = float(chain.motions["weight"][-1])
 
     def _converge(self, attached: int) -> tuple[int, float, Array, int]:
-        """Move the nodes to the least cost.
+        """Move the nodes to the minimum of the cost.
 
         Parameters
         ----------
         attached : int
-            New aiding factors: they are taken off again if there is no finite solution with them.
+            Number of new aiding factors. They are removed if there is no finite solution with them.
 
         Returns
         -------
         solved : int
-            Linear systems.
+            Number of linear systems that were solved.
         cost : float
             Half the weighted sum of squares at the solution.
         moved : (n,) array
-            By how much the newest node was moved.
+            Shift of the newest node.
         attached : int
-            New factors that are left.
+            Number of remaining new factors.
         """
         chain, nodes = self.chain, self.chain.nodes
         now = _Progress(np.zeros(chain.size), self._first_new(attached), min(1.0, 2.0 * self._contraction))
@@ -476,20 +476,20 @@ class WindowEstimator(Solver):
 
 @dataclass(slots=True)
 class _Progress:
-    """How far the nodes have converged in an epoch.
+    """The progress of the iteration in an epoch.
 
     Attributes
     ----------
     moved : (n,) array
-        By how much the newest node has been moved.
+        Shift of the newest node so far.
     first : int
-        First node that is to be eliminated anew.
+        First node that must be eliminated again.
     contraction : float
-        Size of the step that linearising anew leads to, over those before it.
+        Ratio of the size of the step after a new linearisation to the size of the steps before it.
     solved : int
-        Linear systems.
+        Number of linear systems that were solved.
     damping : float
-        lambda of the next step.
+        Damping lambda of the next step.
     latest : float
         Size of the last step.
     since : float
