@@ -1,4 +1,4 @@
-"""Calls about results that others are to rely on: submissions, and the standard result that comes with simnav.
+"""Calls for published results: submissions, and the standard result that comes with simnav.
 
 `simnav.leaderboard.interface` has the calls that compute and compare; these build on them.
 """
@@ -181,18 +181,19 @@ def verify_bundle(
     tolerance: float | None = None,
     progress: Callable[..., None] | None = None,
 ) -> SubmissionReport:
-    """Check a submission, and repeat a sample of its runs where it can do no harm.
+    """Check a submission, and repeat a sample of its runs in confined processes.
 
     Parameters
     ----------
     bundle : path
-        That `submit` wrote.
+        Bundle that `submit` wrote.
     key : path, optional
         File of a secret key: the estimators also run on seeds that are derived from it.
     sample : int
-        Runs that are repeated at most.
+        Largest number of runs that are repeated.
     present : bool
-        Use the packages of this environment, which is quick and needs no network. By default a new environment is made.
+        True: use the packages of this environment, which is quick and needs no network. By default a new environment is
+        made.
     tolerance : float, optional
         Largest relative difference of a score that counts as the same; default: 1e-6. Differences of bits are counted.
     progress : callable, optional
@@ -226,9 +227,9 @@ def run_standard(
     workers: int = 2,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
-    """Run what is missing of the standard result, for some time. The same call continues.
+    """Run the missing and outdated parts of the standard result, for a limited time. The same call continues.
 
-    A new folder starts with the results that come with simnav. So only what has changed since is run.
+    A new folder starts with the results that come with simnav. So only rows and scenarios that have changed are run.
 
     Parameters
     ----------
@@ -261,7 +262,7 @@ def run_standard(
 
 
 def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
-    """Whether the standard result is what the code of today gives; nothing is run.
+    """Whether the standard result belongs to the present code, by its keys; nothing is run.
 
     Parameters
     ----------

@@ -37,14 +37,14 @@ class _Features(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    train = typer.Typer(no_args_is_help=True, help="Learn the parameters of an estimator anew.")
+    train = typer.Typer(no_args_is_help=True, help="Train the parameters of an estimator.")
     train.callback()(_root)
     train.command("anfis")(_command)
     app.add_typer(train, name="train")
 
 
 def _root() -> None:
-    """Learn the parameters of an estimator anew."""
+    """Train the parameters of an estimator."""
 
 
 def _command(
