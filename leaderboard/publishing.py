@@ -41,17 +41,17 @@ class Submission:
     Attributes
     ----------
     path : Path
-        The file.
+        Path of the bundle.
     digest : str
-        Its SHA-256.
+        SHA-256 digest of the bundle.
     estimators : tuple of str
-        Labels.
+        Labels of the estimators in the bundle.
     profile : str
         Name of the profile that was run.
     results, failed : int
-        Results in it, and how many of them are failures.
+        Number of results in the bundle, and number of failures among them.
     remarks : tuple of str
-        What others will see as a lack.
+        Weaknesses of the bundle that readers will notice.
     """
 
     path: Path
@@ -86,9 +86,9 @@ def submit(
     estimator : str
         A file, an installed package that registers estimators, or the name of one of its estimators.
     profile : str or path
-        Which scenarios and seeds are run.
+        Profile that names the scenarios and seeds.
     parameters : mapping, optional
-        Of the estimators.
+        Parameters of the estimators.
     requires : sequence of str
         Packages that a file needs beside simnav, as pip takes them. Those of a package are known.
     output : path, optional
@@ -236,7 +236,7 @@ def run_standard(
     minutes : float or None
         Time after which no further run is started; None for no end.
     profile : str or path
-        What is run.
+        Name of a profile, or the file of one.
     results : path
         Folder to work in.
     shipped : path, optional
@@ -352,7 +352,7 @@ def publish_standard(
     results : path
         Folder of the results. If it is not there, the results that come with simnav are taken.
     profile : str or path
-        That the results should hold as a whole.
+        Profile that the results should contain completely.
     shipped, history : path, optional
         Folder of the packed results, and file of the editions; default: those that come with simnav.
     readme : path, optional
@@ -360,7 +360,7 @@ def publish_standard(
     site : path, optional
         Folder of a site that is drawn; default: none.
     workers : int
-        Processes that draw.
+        Number of processes that draw the charts.
     preliminary : bool
         Also if runs are missing; the tables say so, and there is no edition.
     progress : callable, optional

@@ -43,9 +43,9 @@ def try_estimator(
     confinement : {"bubblewrap", "process", "none"}
         What separates it from the recording (`simnav.leaderboard.campaign.confinement`).
     hidden : sequence of Path
-        What it must not read.
+        Paths that the estimator must not read.
     sealed : bool
-        Of a sealed campaign.
+        Whether the run belongs to a sealed campaign.
 
     Raises
     ------

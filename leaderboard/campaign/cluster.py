@@ -90,7 +90,7 @@ def run_on_cluster(
     scheduler : str or None
         Address; None starts a cluster of processes on this machine.
     workers : int
-        Of a cluster on this machine.
+        Number of workers of a cluster on this machine.
 
     Raises
     ------

@@ -26,11 +26,11 @@ class Entrant:
     parameters : mapping
         Parameters of its constructor that are set, by name.
     label : str
-        What results call it.
+        Name of the estimator in the results.
     reference : bool
-        One of simnav's own references: it is told the truth.
+        Whether it is one of simnav's references, which receive the truth.
     source : str
-        Digest.
+        Digest of the source of the estimator.
     code : bytes
         The class itself, where no other process can import it.
     point : str

@@ -48,7 +48,7 @@ class Outcome:
     reason : str
         One sentence; empty if ok.
     value : object
-        What the function returned; None unless ok.
+        Value that the function returned; None unless the status is ok.
     seconds : float
         Wall-clock time.
     peak_memory : int

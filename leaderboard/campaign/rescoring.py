@@ -80,15 +80,15 @@ def rescore_results(
     folder : path
         Folder of the results.
     names : iterable of str
-        Of scores; default: those that a result lacks, and those of simnav whose code has changed since.
+        Scores to compute. Default: missing scores, and scores of simnav whose code has changed since.
     scenarios : iterable of Scenario
         Those that are not in the catalogue.
     progress : callable, optional
         Called with how many of how many runs are done, and ``note=`` the next.
     keys : collection of str, optional
-        Of the results; default: all that have a trial.
+        Keys of the results. Default: all results that have a stored trial.
     seal : Seal, optional
-        Of results with sealed seeds; then only these are scored.
+        Seal of results with sealed seeds; only these results are then scored.
 
     Returns
     -------

@@ -38,7 +38,7 @@ class Verification:
     folder : str
         Folder of the results.
     results : int
-        In the folder.
+        Number of results in the folder.
     seal : str
         Hash of the key; empty for public seeds.
     other_seals : int
@@ -90,13 +90,13 @@ def verify_results(
     Parameters
     ----------
     folder : Path
-        Of the results.
+        Folder of the results.
     seal : Seal, optional
-        Of the published key; none for public seeds.
+        Seal of the published key; none for public seeds.
     sample : int
-        How many runs are repeated at most.
+        Largest number of runs that are repeated.
     scenarios, estimators : sequence
-        That are not in the catalogue or not registered.
+        Scenarios outside the catalogue, and estimators that are not registered.
     progress : callable, optional
         Called with how many of how many runs are done, and ``note=`` the next.
 

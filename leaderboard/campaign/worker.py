@@ -46,15 +46,15 @@ class Unit:
     seed : int
         The seed.
     entrants : tuple of (Entrant, str)
-        With the keys of their results.
+        Estimators, each with the key of its result.
     recording, simulator : str
         As in `Result`.
     folder : Path
         Folder of the results.
     timeout : float
-        Of an estimator [s].
+        Largest time that an estimator may take [s].
     memory : int
-        Of an estimator [bytes].
+        Largest memory that an estimator may take [bytes].
     scores : OwnScores
         Scores of others that workers must be sent.
     scoring : str
@@ -66,7 +66,7 @@ class Unit:
     confinement : str
         ``process``, ``bubblewrap`` or ``none``.
     seal : Seal, optional
-        From which the seed is derived; `seed` is then the number of the run.
+        Seal from which the seed is derived; `seed` is then the number of the run.
     """
 
     scenario: Scenario

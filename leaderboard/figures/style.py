@@ -159,7 +159,7 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png"), dp
     formats : sequence of str
         Endings of the files, such as ``png``.
     dpi : int
-        Of pixel formats.
+        Resolution of the pixel formats [dots per inch].
 
     Returns
     -------

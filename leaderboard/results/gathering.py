@@ -33,7 +33,7 @@ def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[s
     Returns
     -------
     Path
-        Of the output.
+        Path of the output.
 
     Raises
     ------

@@ -50,7 +50,7 @@ class Attempt:
     Attributes
     ----------
     status, reason : str
-        As of a trial, and what ended the process.
+        Status and reason as in a trial, or the cause that ended the process.
     trial : Trial or None
         None where the process ended before the trial did.
     seconds : float
@@ -58,7 +58,7 @@ class Attempt:
     peak_memory : int
         Beyond what the process started with [bytes].
     confinement : str
-        What was in force.
+        Confinement that was in force.
     """
 
     status: str
@@ -102,11 +102,11 @@ def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, se
     confinement : {"process", "bubblewrap"}
         A process of its own, or that in a sandbox of bubblewrap.
     hidden : sequence of Path
-        What estimators must not read.
+        Paths that estimators must not read.
     loaded : bool
-        With kernels; False will do for looking at estimators.
+        Whether the kernels are loaded; False is enough to inspect estimators.
     sealed : bool
-        Of a sealed campaign.
+        Whether the run belongs to a sealed campaign.
     """
     global _server, _owner
     if _server is not None and _owner != os.getpid():

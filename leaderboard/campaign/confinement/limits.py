@@ -36,7 +36,7 @@ def limit(seconds: float, memory: int) -> None:
     seconds : float
         Wall-clock limit of which the CPU time allows four times as much, and a minute [s].
     memory : int
-        That it may take beyond what it has now [bytes].
+        Memory that the process may take in addition to its present memory [bytes].
     """
     import resource
 
