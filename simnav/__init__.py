@@ -196,12 +196,12 @@ def _register_scenarios() -> None:
         _register_tasks(header.gym_id, header.id, recorded=header.recorded)
 
 
-# Learning tasks are on the second floor: their entry points are strings, so that the library does not import them.
+# The library must not import the learning tasks (they belong to simnav.estimators): their entry points are strings.
 _LEARNING = "simnav.estimators.learning"
 
 
 def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
-    """Give the learning tasks over a scenario their Gymnasium ids."""
+    """Register the learning tasks over a scenario with Gymnasium."""
     name, _, version = gym_id.rpartition("-v")
     for task in ("Tuning", "Detection", "Correction"):
         task_id = f"{name}-{task}-v{version}"

@@ -269,7 +269,7 @@ class SolutionSeparation(Solver):
 
     @property
     def excluded(self) -> frozenset[str]:
-        """The instruments that are excluded now, with the IMU where it is not believed."""
+        """The instruments that are excluded now; the IMU is among them while it is disturbed."""
         return frozenset(self._exclusion.excluded | ({_IMU} if self._disturbed else set()))
 
     def update(self, measurements: Measurements) -> Estimate:

@@ -29,9 +29,9 @@ a filter; a `Weighting` receives all factors of the window at every iteration.
 
 Sources: Guo et al. (2026), section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); Mao, Wang and
 Fu (2025), section 2;
-for the test of convergence by contraction (the step that linearising anew leads to over those before it; an epoch
-inherits it, with a doubt: a factor of 2), E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996,
-section IV.8.
+for the test of convergence by contraction (ratio of the step after a new linearisation to the steps before it; an
+epoch starts from twice the ratio of the epoch before it, at most 1),
+E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996, section IV.8.
 Eq. 15 of Mao, Wang and Fu (2025) takes the inverse of the window's prior for the newest covariance; it is that of the
 oldest state. The newest one is the last block of the elimination.
 """

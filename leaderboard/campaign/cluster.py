@@ -81,7 +81,7 @@ def _keep(folder: Path, files: Mapping[str, bytes]) -> None:
 def run_on_cluster(
     units: Iterator[tuple[int, Unit]], scheduler: str | None, workers: int
 ) -> Iterator[tuple[int, Counter[str]]]:
-    """Run units on a Dask cluster, and yield what became of them as they end; their results are on disk then.
+    """Run units on a Dask cluster, and yield the outcome of each when it ends; its results are then on disk.
 
     Parameters
     ----------

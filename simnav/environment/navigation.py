@@ -45,7 +45,7 @@ Observation = dict[str, Any]
 #: [m/s], angle of the attitude error [rad].
 REWARDS: tuple[str, ...] = ("horizontal", "vertical", "position", "velocity", "attitude")
 
-#: Bound of every observed quantity. Gymnasium asks for finite bounds; no instrument reaches this one.
+#: Bound of every observed quantity. Gymnasium requires finite bounds; no instrument reaches this value.
 _LIMIT = 1e9
 _ACTION_LIMIT = np.array([[np.pi / 2, np.pi, 1e5], [100.0, 100.0, 100.0], [np.pi, np.pi, 2 * np.pi]])
 

@@ -57,7 +57,7 @@ def held_errors(trial: Trial, recording: Recording) -> Array:
 def _held(
     states: NavigationStates, estimated: NDArray[np.bool_], start: Array
 ) -> tuple[NavigationStates, NDArray[np.bool_]]:
-    """States without gaps in the position, and the mask of the components that they hold."""
+    """States without gaps in the position, and the mask of the components that are estimated."""
     position, estimated = states.position.copy(), estimated.copy()
     for part in (slice(0, 2), slice(2, 3)):
         given: NDArray[np.bool_] = np.asarray((estimated[:, part] & np.isfinite(position[:, part])).all(axis=1))

@@ -381,8 +381,8 @@ def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     for what, imu in (("every aiding instrument", True), ("every instrument", False)):
         trial = run_trial(candidate.factory(), _silenced(recording, _HALF, imu))
         if trial.status != "ok":
-            return False, f"when {what} falls silent: {trial.status}: {trial.reason}"
-    return True, "it carries on when the instruments fall silent"
+            return False, f"after {what} stopped: {trial.status}: {trial.reason}"
+    return True, "it continues when the instruments deliver no more measurements"
 
 
 @_demand("missing instruments")

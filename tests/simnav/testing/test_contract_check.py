@@ -148,7 +148,7 @@ def test_a_good_one_passes():
         (Prophet, "causality", "position differs at 1 s"),
         (Vandal, "input", "the measurements of depth"),
         (Aliasing, "estimates", "copy it"),
-        (NeedsData, "silence", "every aiding instrument falls silent: error"),
+        (NeedsData, "silence", "after every aiding instrument stopped: error"),
         (NeedsDvl, "missing instruments", "without dvl: error"),
         (Picky, "missing instruments", "without dvl: error: reset(): it refuses a scenario that has all instruments"),
     ],
