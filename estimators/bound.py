@@ -1,32 +1,32 @@
 """The posterior Cramer-Rao bound of a scenario: the best possible accuracy of a real-time estimator, by epoch.
 
-For a state that moves with Phi and Q and is measured with H and R, Jacobians at the truth, the information obeys ::
+For a state with the transition matrix Phi, the process noise Q, the measurement Jacobian H and the measurement noise R,
+with Jacobians at the truth, the information matrix J follows ::
 
     J+ = (Phi J^-1 Phi' + Q)^-1 + H' R^-1 H
 
-which is what a Kalman filter's covariance does on inputs without noise. So the oracle's own filter runs over
-`simnav.simulation.simulator.ideal`, which gives it the truth as measured, and its covariance is read.
+J^-1 is the covariance of a Kalman filter with noise-free inputs. So the filter of the oracle runs over
+`simnav.simulation.simulator.ideal`, whose measurements are the truth, and its covariance is the bound.
 
-Kinds, and the oracle that each belongs to:
+There are three kinds of bounds, each with its oracle:
 
-- ``clean``: every measurement that is delivered counts with its noise without faults (``oracle-clairvoyant``)
-- ``flags``: each counts with the noise that it really had; one that a gross error hit, a frozen or a missing one does
-  not count (``oracle``)
-- ``mix``: for those who do not know which measurements a gross error hits. Each counts with the Fisher information of
-  the density of its noise, ``J = integral of (p')^2 / p`` (``oracle-mixture``)
+- ``clean``: every delivered measurement has its noise without faults (``oracle-clairvoyant``)
+- ``flags``: every measurement has its true noise; measurements with a gross error, frozen or missing ones are not used
+  (``oracle``)
+- ``mix``: it is not known which measurements have a gross error. Each measurement has the Fisher information of the
+  density p of its noise, ``J = integral of (p')^2 / p`` (``oracle-mixture``)
 
-Errors that last (multipath, a bias step, a ramp) are states of the model, so that their correlation is in the bound.
-Each run has a trajectory, faults and magnitudes of its own. The covariance of the nine navigation errors is that of the
-run, and the bound of a scenario is its mean over the runs. (The information averaged over runs, then inverted, is a
-lower bound, too, for those who do not know what was drawn. It is never above, and far below where runs differ.) It
-bounds the mean square error over runs, whose initial errors and biases are drawn from the initial covariance; a single
-run may be better.
+Lasting errors (multipath, a bias step, a ramp) are states of the model, so the bound includes their correlation. Each
+run has its own trajectory, faults and magnitudes, and so its own covariance of the nine navigation errors. The bound of
+a scenario is the mean of these covariances over the runs. (The inverse of the mean information is also a lower bound,
+without knowledge of the drawn values. It is never larger, and much smaller if runs differ.) It bounds the mean square
+error over runs whose initial errors and biases are drawn from the initial covariance. A single run may be better.
 
-What it is not: a bound beyond the model (`simnav.estimators.models.about_truth`). A disturbance of the IMU, the motion
-of a vessel without an IMU and the velocity of the water count as known. So do the times of outages.
+The bound is that of the model (`simnav.estimators.models.about_truth`). A disturbance of the IMU, the motion of a
+vessel without an IMU and the velocity of the water count as known, and so do the times of outages.
 
-Smoothed output, which has seen what comes after, has a bound of its own (``smoothed``): the covariance that a
-Rauch-Tung-Striebel smoother behind the same filter ends with (``oracle-rts`` for ``flags``).
+Smoothed output uses later measurements and has a bound of its own (``smoothed``): the covariance of a
+Rauch-Tung-Striebel smoother after the same filter (``oracle-rts`` for ``flags``).
 
 Source: P. Tichavsky, C. H. Muravchik and A. Nehorai, "Posterior Cramer-Rao bounds for discrete-time nonlinear
 filtering", IEEE Trans. Signal Processing 46(5), 1998.
@@ -63,17 +63,17 @@ class Bound:
     Attributes
     ----------
     scenario : str
-        Its id.
+        Id of the scenario.
     kind : str
-        Which bound it is.
+        Kind of the bound: ``clean``, ``flags`` or ``mix``.
     runs : int
-        Number of simulated runs that it is the mean of.
+        Number of simulated runs over which it is the mean.
     time : (T,) array
         Ends of the steps [s].
     covariance : (T, 9, 9) array
-        Over `simnav.types.COMPONENTS`; NaN for what the model does not estimate.
+        Covariances over `simnav.types.COMPONENTS`; NaN for components that the model does not estimate.
     smoothed : bool
-        Of smoothed output; False: of output in real time.
+        True: bound of smoothed output; False: of real-time output.
     """
 
     scenario: str
@@ -118,7 +118,7 @@ class Bound:
         }
 
 
-#: What the estimator of each bound is told of the noise.
+#: The adaptation of the estimator of each bound: its knowledge of the noise.
 _KNOWLEDGE: dict[str, type[TrueNoise]] = {"clean": NominalNoise, "flags": TrueNoise, "mix": FisherNoise}
 
 
@@ -128,16 +128,16 @@ def bound_of_run(recording: Recording, kind: Kind = "flags", smoothed: bool = Fa
     Parameters
     ----------
     recording : Recording
-        From `simnav.simulation.simulator.ideal`.
+        A recording of `simnav.simulation.simulator.ideal`.
     kind : str
-        Which bound is computed.
+        Kind of the bound: ``clean``, ``flags`` or ``mix``.
     smoothed : bool
-        What all measurements say, not only those so far.
+        True: the bound with all measurements of the run, also later ones.
 
     Returns
     -------
     (T, 9, 9) array
-        Covariances; NaN for what the model does not estimate.
+        Covariances; NaN for components that the model does not estimate.
 
     Raises
     ------
@@ -161,24 +161,25 @@ def bound(scenario: Scenario, seeds: Iterable[int], kind: Kind = "flags", smooth
     Parameters
     ----------
     scenario : Scenario
-        A simulated one.
+        A simulated scenario, not a recorded one.
     seeds : iterable of int
-        Of the runs over which it is averaged; a dozen will do.
+        Seeds of the runs over which it is averaged; a dozen are enough.
     kind : str
-        ``clean``, ``flags`` or ``mix``, as the module says.
+        Kind of the bound: ``clean``, ``flags`` or ``mix`` (see the module).
     smoothed : bool
         True: the bound of smoothed output.
 
     Returns
     -------
     Bound
+        The mean over the runs.
 
     Raises
     ------
     SpecError
-        On a recorded scenario, an unknown kind, or instruments that no model fits.
+        If the scenario is a recorded one, the kind is unknown, or no model fits the instruments.
     ValueError
-        Without seeds.
+        If there are no seeds.
 
     Examples
     --------

@@ -6,9 +6,9 @@ A row is a class without a body::
     class GatedUkf(Row, solver=SigmaPointEstimator, model=InertialPoints, adaptation=ChiSquareGate):
         \"\"\"Unscented Kalman filter that leaves out measurements whose innovation is improbable.\"\"\"
 
-Every piece is a class, or a function that makes one; its constructor says the parameters, and its docstring what they
-mean. Both are written there and nowhere else. `piece` changes what a row takes of one: it fixes parameters, and gives
-others a default or a name of the row's own.
+Every piece is a class, or a function that makes one. Its constructor defines the parameters, and its docstring
+documents them, in this one place only. `piece` changes a piece for a row: it fixes parameters, or gives parameters
+another default or another name.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class Solver(Estimator):
     pieces : tuple of str
         Parameters of the constructor that are pieces.
     refuses : mapping of str to str
-        Pieces of other solvers that this one cannot work with, and why.
+        Pieces with which this solver cannot work, with the reason.
     row : str
-        Name of the row that it works for, for messages; a solver that is registered itself has its own.
+        Name of the row that uses the solver, for messages. A solver that is registered itself has its own name.
     """
 
     pieces: ClassVar[tuple[str, ...]] = ()
@@ -65,12 +65,12 @@ class Solver(Estimator):
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Name of the solver in messages."""
         return self.row or self.name
 
     @property
     def needs(self) -> Needs:
-        """What its model needs."""
+        """The instruments that its model needs."""
         own = vars(self)
         model = own.get("_choice", own.get("model"))
         found: Needs = () if model is None else model.needs
@@ -86,11 +86,11 @@ class Piece:
     make : callable
         The class of the piece, or a function that returns one.
     fixed : mapping
-        Parameters that the row sets, and does not have.
+        Parameters with a value that the row fixes; they are not parameters of the row.
     defaults : mapping
-        Defaults of the row's own.
+        Defaults of the row, in place of those of the constructor.
     rename : mapping of str to str
-        The name of a parameter in the row, by that of the constructor.
+        Names of parameters in the row, by their names in the constructor.
     """
 
     make: Callable[..., Any]
@@ -154,11 +154,11 @@ def piece(
     make : callable
         The class of the piece, or a function that returns one.
     defaults : mapping, optional
-        Defaults of the row's own, by the names of the constructor's parameters.
+        Defaults of the row, by the names of the constructor's parameters.
     rename : mapping, optional
-        Names of the row's own, likewise; for two pieces that have a parameter of one name.
+        Names of parameters in the row, by their names in the constructor; for two pieces with a common parameter name.
     **fixed
-        Parameters that the row sets, and does not have.
+        Parameters with a value that the row fixes; they are not parameters of the row.
 
     Examples
     --------
@@ -173,15 +173,15 @@ def piece(
 class Row(Estimator):
     """Base of the rows: an estimator that is a solver with its pieces, named as keywords of the class.
 
-    A subclass that names pieces again is the row with those pieces exchanged. The class's docstring says what the row
-    is and whose it is; what the parameters mean is added from the docstrings of the pieces.
+    A subclass of a row that names pieces is the same row with these pieces replaced. The docstring of the class says
+    what the row is, and its source; the documentation of the parameters is added from the docstrings of the pieces.
 
     Attributes
     ----------
     recipe : mapping of str to Piece
-        The pieces: ``solver``, and those that the solver takes.
+        The pieces: ``solver``, and the pieces of the solver.
     solver : Estimator
-        Does the work. What a row does not have itself, it has of its solver: ``row.model``, ``row.covariance``.
+        The solver with its pieces. Its attributes are also attributes of the row: ``row.model``, ``row.covariance``.
 
     Raises
     ------
@@ -220,7 +220,7 @@ class Row(Estimator):
 
     @property
     def needs(self) -> Needs:
-        """What its solver needs."""
+        """The instruments that its solver needs."""
         return self.solver.needs
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -255,7 +255,7 @@ def _require_fit(cls: type[Row], keyword: str, made: Any) -> None:
 
 
 def _equip(cls: type[Row]) -> None:
-    """Give a row its constructor, and the documentation of its parameters."""
+    """Add the constructor to a row, and the documentation of its parameters."""
     recipe = cls.recipe
     order = [name for name in ("adaptation", "weighting", "isolation") if name in recipe]
     order += [name for name in recipe if name not in (*order, "solver")]
@@ -329,7 +329,7 @@ def _hints(make: Callable[..., Any]) -> dict[str, Any]:
 
 @cache
 def documented(make: Callable[..., Any]) -> dict[str, tuple[str, str]]:
-    """What numpydoc docstrings say of parameters: type and meaning by name, a class's own before its bases'.
+    """Type and meaning of parameters from numpydoc docstrings, by name; those of a class before those of its bases.
 
     An entry without a type, as "window, tolerance / As for `WindowEstimator`.", refers to the documentation of a base,
     and counts where there is none.

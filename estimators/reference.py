@@ -1,12 +1,12 @@
-"""What the oracle makes of a scenario over many runs, and whether the oracle is right.
+"""The error of the oracle on a scenario over many runs, and tests of the oracle.
 
-The errors of the rows are compared with the oracle's, so it must not depend on the few runs of a campaign, and the
-oracle behind it must be right: its covariance true (a mean normalised error squared of 1 by degree of freedom), and its
-error that of the Cramer-Rao bound of its model.
+The errors of the rows are divided by the error of the oracle. So this figure must not depend on the few runs of a
+campaign, and the oracle must be correct: its covariance must agree with its errors (a mean normalised estimation error
+squared of 1 per degree of freedom), and its error with the Cramer-Rao bound of its model.
 
 The covariance of an oracle is the bound of its run: both are linearised about the truth, and do not depend on the
 errors (`simnav.estimators.bound`; a test compares the two). So one pass over a run gives error, bound and consistency,
-and, with the smoother behind the oracle, those of smoothed output, too.
+and, with a smoother after the oracle, those of smoothed output, too.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _HORIZONTAL = (0, 1)
 
 @dataclass(frozen=True)
 class OracleRun:
-    """What the oracle makes of one run.
+    """Error, bound and consistency of the oracle on one run.
 
     Attributes
     ----------
@@ -45,9 +45,9 @@ class OracleRun:
     rms, smoothed_rms : float
         Root of the mean over the epochs of the squared horizontal error, in real time and smoothed [m].
     bound, smoothed_bound : float
-        Of the same, the Cramer-Rao bound [m].
+        Cramer-Rao bound of the same figures [m].
     nees, smoothed_nees : float
-        Mean normalised estimation error squared of the horizontal position, by degree of freedom.
+        Mean normalised estimation error squared of the horizontal position, divided by the degrees of freedom.
     """
 
     seed: int
@@ -65,14 +65,14 @@ def oracle_run(scenario: Scenario, seed: int) -> OracleRun:
     Parameters
     ----------
     scenario : Scenario
-        A simulated one.
+        A simulated scenario, not a recorded one.
     seed : int
         Seed of the run.
 
     Raises
     ------
     SpecError
-        On a recorded scenario, or where the oracle fails.
+        If the scenario is a recorded one, or the oracle fails.
     """
     if scenario.recorded:
         raise SpecError(f"{scenario.id} is a recorded run; its noise is not known, and so it has no reference figure")
@@ -98,23 +98,24 @@ def _summary(error: Array, covariance: Array) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class ReferenceFigure:
-    """What the oracle makes of a scenario, in real time or smoothed.
+    """Error, bound and consistency of the oracle on a scenario, in real time or smoothed.
 
     Attributes
     ----------
     scenario : str
-        Its id.
+        Id of the scenario.
     runs : int
-        Number of runs.
+        Number of runs of the figure.
     horizontal_rms : float
         Root of the mean over runs and epochs of the squared horizontal error [m].
     bound : float
         Cramer-Rao bound of the same figure on the same runs [m].
     ratio, ratio_standard_error : float
-        Root of the mean over runs of (error / bound) squared, each run with its own bound: so runs with large errors
-        do not decide alone.
+        Root of the mean over runs of (error / bound) squared, with the bound of each run, and its standard error. So
+        runs with large errors do not dominate.
     nees, nees_standard_error : float
-        Mean normalised estimation error squared of the horizontal position, by degree of freedom.
+        Mean normalised estimation error squared of the horizontal position, divided by the degrees of freedom, and its
+        standard error.
     """
 
     scenario: str
@@ -149,20 +150,21 @@ def reference_figure(scenario: Scenario, seeds: Iterable[int]) -> ReferenceFigur
     Parameters
     ----------
     scenario : Scenario
-        A simulated one.
+        A simulated scenario, not a recorded one.
     seeds : iterable of int
-        Of the runs; 200 give a standard error of a few per cent.
+        Seeds of the runs; 200 runs give a standard error of a few per cent.
 
     Returns
     -------
     ReferenceFigure
+        The figure over all runs.
 
     Raises
     ------
     SpecError
-        On a recorded scenario, or where the oracle fails on a run.
+        If the scenario is a recorded one, or the oracle fails on a run.
     ValueError
-        With fewer than two seeds.
+        If there are fewer than two seeds.
 
     Examples
     --------

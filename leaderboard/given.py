@@ -110,7 +110,7 @@ def results_of(
     folder : path
         Folder that a campaign wrote.
     series : bool
-        With the series that charts need; they stay on disk until they are asked for.
+        Whether to include the series that charts need; they stay on disk until they are read.
     scores : collection of str, optional
         Only these scores. Default: all.
     """

@@ -1,6 +1,6 @@
-"""What is asked of scenarios and of results that are there: rankings, bounds, scores, seals, citations, papers.
+"""Calls that run no estimator of the user: rankings, bounds, scores, seals, citations, the papers' comparisons.
 
-These are calls of `simnav.leaderboard.interface`, which has them under its own name, too.
+`simnav.leaderboard.interface` has these calls, too.
 """
 
 from __future__ import annotations
@@ -81,22 +81,22 @@ def rescore(
 ) -> Rescored:
     """Compute scores from the trials that a campaign kept; no estimator runs.
 
-    A trial is kept in single precision, so that a score that is computed again agrees to about seven digits. What a
-    result has stays therefore, unless it is asked for by name, or its code has changed.
+    A trial is kept in single precision, so a score that is computed again agrees to about seven digits. Therefore
+    existing scores are not changed, unless they are named, or their code has changed.
 
     Parameters
     ----------
     results : path
         Folder that a campaign wrote with ``keep_trials``. Its results get the scores.
     scores : str or iterable of str
-        Keys of `simnav.scoring.SCORES`; default: those that a result lacks, and those of simnav whose code has changed
-        since.
+        Names of scores, keys of `simnav.scoring.SCORES`; default: missing scores, and scores of simnav whose code has
+        changed.
     scenarios : scenarios, optional
-        That are not in the catalogue.
+        Scenarios that are not in the catalogue.
     key : path, optional
-        File of the key, where the seeds are sealed.
+        File of the key, if the seeds are sealed.
     progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the last.
+        Called with the number of finished runs, the number of all runs, and the last run as ``note=``.
 
     Returns
     -------
@@ -122,14 +122,15 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     Parameters
     ----------
     folders : iterable of path
-        One or several. They stay as they are. A bundle of `simnav.submit` stands for its results; verify it first.
+        Folders of results, one or several, which are not changed; or bundles of `simnav.submit`, which should be
+        verified first.
     output : path
-        A new or empty folder, or one of results, which are kept.
+        A new or empty folder, or a folder of results, which are kept.
 
     Returns
     -------
     list of Result
-        All that the output holds.
+        All results in the output folder.
 
     Raises
     ------
@@ -190,9 +191,9 @@ def bound(
     runs : int
         Seeds over which it is averaged.
     smoothed : bool
-        The bound of smoothed output; default: of output in real time.
+        True: the bound of smoothed output; False: of real-time output.
     progress : callable, optional
-        Called with how many of how many kinds are done, and ``note=`` the next.
+        Called with the number of finished kinds, the number of all kinds, and the next one as ``note=``.
 
     Returns
     -------
@@ -212,7 +213,7 @@ def verify(
     estimators: Estimators = None,
     progress: Callable[..., None] | None = None,
 ) -> Verification:
-    """Check the seal of results, and repeat a sample of them: they should be the same to the bit.
+    """Check the seal of results, and repeat a sample of them, which should be equal bit for bit.
 
     Parameters
     ----------
@@ -221,11 +222,11 @@ def verify(
     key : path, optional
         Published key of a sealed campaign.
     sample : int
-        Runs that are repeated at most.
+        Largest number of runs that are repeated.
     scenarios, estimators : optional
-        That are not in the catalogue or not registered.
+        Scenarios that are not in the catalogue, and estimators that are not registered.
     progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
+        Called with the number of finished runs, the number of all runs, and the next run as ``note=``.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Everything that the `simnav` command does, as Python calls: `import simnav` gives them under their own names.
+"""All commands of `simnav` as Python calls, which are also attributes of the package: ``simnav.evaluate(...)``.
 
 An **estimator** is a class, a registered name, a file (``my.py``, ``my.py:MyFilter``), any of these with parameters
 (``"sw-fgo:window=10"``, ``(MyFilter, {"gain": 0.5})``); several are a list, or a text with commas. A **scenario** is a
@@ -7,7 +7,7 @@ back is typed. Reports have ``to_dict()`` (what the command prints with ``--json
 rankings and bounds, also have ``to_frame()`` (a ``pandas.DataFrame`` where pandas is installed, otherwise a
 ``pyarrow.Table``) and ``plot()`` (a matplotlib ``Figure``).
 
-What cannot be done raises `RequestError`, a `ValueError` whose message is one sentence.
+Mistakes in arguments raise `RequestError`, a `ValueError` whose message is one sentence.
 """
 
 from __future__ import annotations
@@ -88,12 +88,12 @@ def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
     estimator : str, Path, type or pair
         Name, file or class, also with parameters.
     **parameters
-        Of its constructor; texts are converted as on the command line.
+        Parameters of its constructor; texts are converted as on the command line.
 
     Raises
     ------
     ValueError
-        On an unknown estimator or parameter, or a value that does not fit: one sentence.
+        If the estimator or a parameter is unknown, or a value is not valid: one sentence.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     Parameters
     ----------
     estimator, **parameters
-        As for `make`.
+        The estimator and its parameters, as for `make`.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     Raises
     ------
     ValueError
-        If there is no such estimator, or it cannot be made.
+        If there is no such estimator, or it cannot be constructed.
     """
     from simnav.testing.contract_check import check
 
@@ -164,38 +164,38 @@ def bench(
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> CostReport:
-    """Measure time and memory of an epoch, in this process, beside estimators that come with simnav.
+    """Measure time and memory of an epoch, in this process, together with estimators that come with simnav.
 
-    All take turns, so that what else the machine does slows all of them; see `simnav.testing.cost`.
+    All estimators run in turn, so that other work of the machine slows all of them alike; see `simnav.testing.cost`.
 
     Parameters
     ----------
     estimators : estimators
-        Those in question.
+        The estimators under test.
     against : estimators, optional
-        Rows beside them; default: one of each family.
+        Rows for comparison; default: one of each family.
     scenario : str, Path or Scenario
-        What is recorded and run.
+        Scenario of the recording.
     seed : int
         Seed of the recording.
     epochs : int
-        Epochs that are run, from the start; fewer if the scenario has fewer.
+        Number of epochs that are run, from the start; fewer if the scenario has fewer.
     rounds : int
-        Runs over them; an epoch counts with its least time.
+        Number of runs over the epochs; the smallest time of an epoch counts.
     parameters : mapping, optional
-        Parameters of those in question; of several each gets those that it has.
+        Parameters of the estimators under test; each estimator gets the parameters that it has.
     progress : callable, optional
-        Called with how many of how many parts are done, and ``note=`` what is next.
+        Called with the number of finished parts, the number of all parts, and the next part as ``note=``.
 
     Returns
     -------
     CostReport
-        With a reason in place of figures for each estimator that fails or does not suit the scenario.
+        Figures, or a reason for each estimator that fails or does not suit the scenario.
 
     Raises
     ------
     ValueError
-        On an unknown estimator, parameter or scenario, or too few epochs.
+        If an estimator, parameter or scenario is unknown, or there are too few epochs.
     """
     from simnav.leaderboard.ranking.costs import BESIDE, costs_of
 
@@ -226,18 +226,18 @@ def run(
     scenario : str, Path or Scenario
         Name, file or the scenario itself.
     estimators : estimators, optional
-        Default: all registered ones.
+        The estimators that run; default: all registered ones.
     seed : int
         Seed of the run.
     parameters : mapping, optional
-        Of the estimators; of several each gets those that it has.
+        Parameters of the estimators; each estimator gets the parameters that it has.
     progress : callable, optional
-        Called with how many of how many estimators are done, and ``note=`` the label of the next.
+        Called with the number of finished estimators, the number of all, and the label of the next one as ``note=``.
 
     Returns
     -------
     RunReport
-        With the recording and all trials.
+        The recording, all trials and their scores.
     """
     from simnav.leaderboard.campaign.single_run import run_once
 
@@ -264,31 +264,32 @@ def evaluate(
     Parameters
     ----------
     estimators : estimators
-        Those in question.
+        The estimators under test.
     scenarios : scenarios
-        One scenario or several, by name, file or themselves.
+        One or several scenarios, by name, file or as objects.
     runs : int
-        Seeds a scenario.
+        Number of seeds of each scenario.
     seed : int
-        The first; the others count up.
+        First seed; the others follow it.
     against : estimators, optional
         Baselines; default: all registered ones.
     parameters : mapping, optional
-        Of those in question.
+        Parameters of the estimators under test.
     workers : int
-        Processes.
+        Number of processes.
     time_limit : float, optional
-        That an estimator may take for a run [s]; default: a fifth of real time, at least a minute.
+        Longest time of an estimator for a run [s]; default: a fifth of real time, at least a minute.
     memory_limit : float
-        That an estimator may take beyond the recording [MiB].
+        Largest memory of an estimator, without the recording [MiB].
     results : path, optional
-        Folder to keep the results in; default: they are thrown away.
+        Folder in which the results are kept; default: they are not kept.
     progress : callable, optional
-        Called with a `simnav.leaderboard.campaign.campaign.Progress` now and then.
+        Called with a `simnav.leaderboard.campaign.campaign.Progress` from time to time.
 
     Returns
     -------
     EvaluationReport
+        The place of each estimator, and its differences from the baselines.
     """
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import EvaluationReport
@@ -346,42 +347,42 @@ def campaign(
     Parameters
     ----------
     scenarios, estimators : optional
-        What is run; default: all.
+        The scenarios and estimators that are run; default: all.
     runs : int, optional
-        Seeds a scenario; default: 50, or as the profile says.
+        Number of seeds of each scenario; default: 50, or that of the profile.
     output : path
         Folder of the results.
     profile : str or path, optional
-        A profile (`simnav.leaderboard.profiles`): what is run, where ``scenarios``, ``estimators`` and ``runs`` do not
-        say otherwise.
+        A profile (`simnav.leaderboard.profiles`) with the scenarios, estimators and number of runs. The arguments
+        ``scenarios``, ``estimators`` and ``runs`` replace those of the profile.
     seed, parameters, workers, time_limit, memory_limit, progress
-        As for `evaluate`.
+        First seed, parameters of the estimators, processes and limits, as for `evaluate`.
     retry : bool
-        Run failures again that are in the folder (errors, timeouts, out of memory, diverged, invalid output). A run
-        that could not be recorded, or that a shorter time limit or a smaller memory limit than today's ended, is run
-        again in any case.
+        True: run the failed runs of the folder again (errors, timeouts, out of memory, diverged, invalid output). A
+        run that could not be recorded, or that ended because of a shorter time limit or a smaller memory limit, is
+        always run again.
     keep_trials : bool
-        Keep the estimates, covariances, diagnostics and flags, for `rescore`: about 190 bytes an epoch and run.
+        True: keep the estimates, covariances, diagnostics and flags, for `rescore`: about 190 bytes an epoch and run.
     covariance_interval : float
-        Least time between two covariances that are kept [s]; 0 keeps all. With fewer, `rescore` leaves scores that use
-        the covariance as they are.
+        Smallest time between two kept covariances [s]; 0 keeps all. With fewer, `rescore` does not compute scores that
+        use the covariance.
     backend, scheduler, shard
-        As for `simnav.leaderboard.campaign.campaign.run_campaign`: processes of this machine or a Dask cluster, its
-        address, and which of how many parts of the runs to do.
+        As for `simnav.leaderboard.campaign.campaign.run_campaign`: processes of this machine or a Dask cluster; address
+        of its scheduler; number of a part of the runs, and number of all parts.
     confinement : {"auto", "bubblewrap", "process", "none"}
         How estimators are kept apart from the recording, see docs/explanation/security.md; default: the strongest
         that works here.
     sealed : path, optional
         File of a secret key from which the seeds are derived; results carry its hash, and `verify` repeats them.
     oracle : bool
-        Run the oracles on simulated scenarios, too: what is best there, not ranked.
+        True: also run the oracles on simulated scenarios; they are not ranked.
     minutes : float, optional
         Time after which no further run is started. The same call continues.
 
     Returns
     -------
     CampaignReport
-        Of all that is in the folder.
+        A summary of all results in the folder.
     """
     from simnav.leaderboard.campaign.campaign import RUNS, combined
     from simnav.leaderboard.campaign.oracles import beside_oracles
@@ -429,31 +430,32 @@ def sweep(
     progress: CampaignProgress = None,
     **options: Any,
 ) -> Sweep:
-    """Turn a dial of a scenario, or two: error against the dial, and where each estimator breaks.
+    """Vary one or two quantities (dials) of a scenario, and find the breaking point of each estimator.
 
-    Every value has the same seeds: the same draws and noise, but for the dial. Started again, it goes on where it was.
+    All values use the same seeds, so only the dial differs. Started again, the sweep continues where it stopped.
 
     Parameters
     ----------
     scenario, estimators, parameters
-        As for `run`.
+        The scenario, and the estimators with their parameters, as for `run`.
     dials : mapping of str to sequence of float, or str
-        A dial of the scenario (``[[dial]]``), or a key path in its file, to values in the unit of the key; or as on the
-        command line, ``"multipath=0,1,2,4"``. Without values: seven over the range. The clean value is always added.
+        A dial of the scenario (``[[dial]]``), or a key path in its file, with values in the unit of the key; or as on
+        the command line, ``"multipath=0,1,2,4"``. Default: seven values over the range. The clean value is added.
     runs : int
-        Seeds a value.
+        Number of seeds of each value.
     score : str
-        Key of `simnav.scoring.SCORES`, one that is better when lower.
+        Name of a score whose lower values are better, a key of `simnav.scoring.SCORES`.
     limit : float, optional
-        An error that must not be passed, in the unit of the score.
+        Threshold of the error for a second breaking point, in the unit of the score.
     output : path, optional
         Folder of the results; default: ``results/sweep-SCENARIO``.
     seed, progress, **options
-        As for `evaluate`: ``workers``, ``time_limit``, ``memory_limit``.
+        First seed, progress, ``workers``, ``time_limit`` and ``memory_limit``, as for `evaluate`.
 
     Returns
     -------
     Sweep
+        Errors at all values, and the breaking points.
     """
     from simnav.leaderboard.site.sweeps import write
     from simnav.leaderboard.sweep.report import Sweep
@@ -494,28 +496,29 @@ def tune(
     Parameters
     ----------
     estimator : str, Path, type or pair
-        Parameters that it sets hold.
+        The estimator. Parameters that are given with it are not varied.
     families : scenarios
-        Training families; their voyages share no random stream with any other scenario's.
+        Training families; their voyages share no random stream with any other scenario.
     vary : sequence of str or Range, or str, optional
-        What is varied, like ``"dof=2:50:log"``; several are a list, or a text with commas. Default: what was varied
-        for the file that ships with the row (``estimators/tuned``).
+        Parameters with their bounds, like ``"dof=2:50:log"``; several are a list, or a text with commas. Default: those
+        of the stored tuning of the row (``estimators/tuned``).
     runs, unseen : int
-        Voyages of each family for the search, and for the comparison afterwards.
+        Number of voyages of each family for the search, and for the comparison afterwards.
     seed : int
-        Of the first voyage; those for the comparison follow upon those for the search.
+        Seed of the first voyage; the voyages of the comparison have the seeds after those of the search.
     evaluations : int
-        Of the objective.
+        Number of evaluations of the objective.
     method : str
         ``differential-evolution`` or ``nelder-mead``.
     search_seed : int
-        Of the search's own random numbers.
+        Seed of the random numbers of the search.
     progress : callable, optional
-        Called with how many of how many parts are done, and ``note=`` what is next.
+        Called with the number of finished parts, the number of all parts, and the next part as ``note=``.
 
     Returns
     -------
     Tuning
+        The chosen values, and the objective before and after, on the voyages of the search and on unseen ones.
 
     Raises
     ------

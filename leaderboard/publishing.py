@@ -1,4 +1,4 @@
-"""Calls about results that others are to see: sites, submissions, and the standard result that comes with simnav.
+"""Calls for published results: sites, submissions, and the standard result that comes with simnav.
 
 `simnav.leaderboard.interface` has the calls that compute and compare; these build on them.
 """
@@ -107,17 +107,17 @@ class Submission:
     Attributes
     ----------
     path : Path
-        The file.
+        Path of the bundle.
     digest : str
-        Its SHA-256.
+        SHA-256 digest of the bundle.
     estimators : tuple of str
-        Labels.
+        Labels of the estimators in the bundle.
     profile : str
         Name of the profile that was run.
     results, failed : int
-        Results in it, and how many of them are failures.
+        Number of results in the bundle, and number of failures among them.
     remarks : tuple of str
-        What others will see as a lack.
+        Weaknesses of the bundle that readers will notice.
     """
 
     path: Path
@@ -152,9 +152,9 @@ def submit(
     estimator : str
         A file, an installed package that registers estimators, or the name of one of its estimators.
     profile : str or path
-        Which scenarios and seeds are run.
+        Profile that names the scenarios and seeds.
     parameters : mapping, optional
-        Of the estimators.
+        Parameters of the estimators.
     requires : sequence of str
         Packages that a file needs beside simnav, as pip takes them. Those of a package are known.
     output : path, optional
@@ -245,19 +245,20 @@ def verify_bundle(
     tolerance: float | None = None,
     progress: Callable[..., None] | None = None,
 ) -> SubmissionReport:
-    """Check a submission, and repeat a sample of its runs where it can do no harm.
+    """Check a submission, and repeat a sample of its runs in confined processes.
 
     Parameters
     ----------
     bundle : path
-        That `submit` wrote.
+        Bundle that `submit` wrote.
     key : path, optional
         File of a secret key. The estimators also run on seeds that are derived from it, which the submission cannot
         know, and should be no worse there.
     sample : int
-        Runs that are repeated at most.
+        Largest number of runs that are repeated.
     present : bool
-        Use the packages of this environment, which is quick and needs no network. By default a new environment is made.
+        True: use the packages of this environment, which is quick and needs no network. By default a new environment is
+        made.
     tolerance : float, optional
         Largest relative difference of a score that counts as the same; default: 1e-6. Differences of bits are counted.
     progress : callable, optional
@@ -291,16 +292,16 @@ def run_standard(
     workers: int = 2,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
-    """Run what is missing of the standard result, for some time. The same call continues.
+    """Run the missing and outdated parts of the standard result, for a limited time. The same call continues.
 
-    A new folder starts with the results that come with simnav. So only what has changed since is run.
+    A new folder starts with the results that come with simnav. So only rows and scenarios that have changed are run.
 
     Parameters
     ----------
     minutes : float or None
         Time after which no further run is started; None for no end.
     profile : str or path
-        What is run.
+        Name of a profile, or the file of one.
     results : path
         Folder to work in.
     shipped : path, optional
@@ -325,7 +326,7 @@ def run_standard(
 
 
 def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
-    """Whether the standard result is what the code of today gives; nothing is run.
+    """Whether the standard result belongs to the present code, by its keys; nothing is run.
 
     Parameters
     ----------
@@ -425,7 +426,7 @@ def publish_standard(
         Folder of the results, which may be the one that is written. If it is not there, the results that come with
         simnav are taken.
     profile : str or path
-        That the results should hold as a whole.
+        Profile that the results should contain completely.
     shipped, history : path, optional
         Folder of the packed results, and file of the editions; default: those that come with simnav.
     readme : path, optional
@@ -433,7 +434,7 @@ def publish_standard(
     site : path, optional
         Folder of a site that is drawn; default: none.
     workers : int
-        Processes that draw.
+        Number of processes that draw the charts.
     preliminary : bool
         Also if runs are missing. The tables then say how many are there, and there is no edition.
     progress : callable, optional

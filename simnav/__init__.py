@@ -1,8 +1,8 @@
 """simnav: the open benchmark for marine integrated navigation.
 
 Importing it registers every scenario of the catalogue with Gymnasium, so that
-``gymnasium.make("simnav:simnav/OpenSea-v1")`` works. The public names load with their first use, so that the import
-itself stays quick.
+``gymnasium.make("simnav:simnav/OpenSea-v1")`` works. Each public name is loaded when it is first used, so that the
+import itself is quick.
 """
 
 from __future__ import annotations
@@ -128,8 +128,8 @@ __all__ = [
     "verify_bundle",
 ]
 
-# Modules, loaded when one of their names is first used. The last is on the third floor: its name is a text, so that
-# the library does not import what is above it, and import-linter does not see what is not there.
+# Modules, loaded when one of their names is first used. The last one is on the third floor: it is named by a string,
+# because the library must not import a floor above it.
 _HOMES = {
     "environment": ("EstimatorAgent", "NavigationEnv", "NavigationVectorEnv"),
     "estimator": ("Estimator", "UnsuitableScenario", "names", "register"),
@@ -215,12 +215,12 @@ def _register_scenarios() -> None:
         _register_tasks(header.gym_id, header.id, recorded=header.recorded)
 
 
-# Learning tasks are of the second floor: their entry points are texts, so that the library does not import them.
+# The library must not import the learning tasks (they belong to simnav.estimators): their entry points are strings.
 _LEARNING = "simnav.estimators.learning"
 
 
 def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
-    """Give the learning tasks over a scenario their Gymnasium ids."""
+    """Register the learning tasks over a scenario with Gymnasium."""
     name, _, version = gym_id.rpartition("-v")
     for task in ("Tuning", "Detection", "Correction"):
         task_id = f"{name}-{task}-v{version}"

@@ -1,10 +1,10 @@
-"""The `kernel` decorator: Numba kernels that load late and whose cache is never stale.
+"""The `kernel` decorator: Numba kernels that are loaded when first called, with a cache that is never out of date.
 
-Importing a module with kernels costs nothing: Numba itself is imported, and a kernel compiled or
-loaded from the cache, when the first kernel is called. Numba's own cache notices an edit of the
-file that holds a kernel, but not of a kernel that it calls in another file. Here every kernel's cache
-directory is named after a hash of its code, of all kernels and constants that it uses, directly
-or not, and of the versions of Python, Numba and NumPy; an edit anywhere in that tree opens a new one.
+The import of a module with kernels is quick: Numba is imported, and a kernel is compiled or loaded from the cache,
+only when the kernel is first called. Numba's own cache detects an edit of the file that holds a kernel, but not an edit
+of a kernel in another file that it calls. Therefore the cache directory of a kernel is named after a hash of its code,
+of all kernels and constants that it uses, directly or indirectly, and of the versions of Python, Numba and NumPy. An
+edit of any of these gives a new directory.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 __all__ = ["Array", "Flags", "Integers", "Kernel", "cache_directory", "kernel", "kernels", "prune"]
 
-#: What kernels, and everything else in simnav, work on.
+#: The array type of kernels, and of everything else in simnav: float64.
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -42,7 +42,7 @@ Returned = TypeVar("Returned")
 #: Cache directories that were not used for this long are deleted by `prune` [s].
 KEEP = 60 * 86400.0
 
-#: What loading a truncated or empty file of the cache raises.
+#: The exceptions that the loading of a truncated or empty cache file may raise.
 _DAMAGED = (EOFError, pickle.UnpicklingError, UnicodeDecodeError, IndexError, KeyError, struct.error)
 
 _kernels: list[Kernel[..., Any]] = []
@@ -50,14 +50,15 @@ _compiling = threading.RLock()  # Numba takes the cache directory from a global 
 
 
 def cache_directory() -> Path | None:
-    """Where compiled kernels are kept: the first of these that can be written to.
+    """The directory of compiled kernels.
 
-    ``$SIMNAV_CACHE_DIR``; the user's cache directory; a private directory among the temporary files.
+    It is the first of these that can be written to: ``$SIMNAV_CACHE_DIR``; the user's cache directory; a private
+    directory among the temporary files.
 
     Returns
     -------
     Path or None
-        None where nothing can be written at all: kernels are then compiled in every process.
+        None if none of them can be written to: kernels are then compiled in every process.
     """
     return _cache_directory(os.environ.get("SIMNAV_CACHE_DIR", ""), os.environ.get("XDG_CACHE_HOME", ""))
 
@@ -94,10 +95,10 @@ class Kernel(Generic[Parameters, Returned]):
     function : callable
         The plain Python function that is compiled.
     signature : str or None
-        Numba signature; with it the kernel is compiled for these types and no others, ahead of
+        Numba signature; with it the kernel is compiled for these types only, and can be compiled before
         its first call. Small helpers that only other kernels call have none.
     fastmath : bool or set of str
-        Liberties with floating-point arithmetic, handed to Numba.
+        Permitted changes of floating-point arithmetic; passed to Numba.
     """
 
     def __init__(self, function: Callable[Parameters, Returned], signature: str | None, fastmath: bool | set[str]):
@@ -119,7 +120,7 @@ class Kernel(Generic[Parameters, Returned]):
         return self.__qualname__  # pickled by name, like a function
 
     def tree(self) -> list[Kernel[..., Any]]:
-        """This kernel and all that it calls, directly or not."""
+        """This kernel and all kernels that it calls, directly or indirectly."""
         found: list[Kernel[..., Any]] = []
         todo: list[Kernel[..., Any]] = [self]
         while todo:
@@ -130,7 +131,7 @@ class Kernel(Generic[Parameters, Returned]):
         return found
 
     def fingerprint(self) -> str:
-        """Hash of all that decides what this kernel computes (see the module)."""
+        """Hash of the code and the constants that decide what this kernel computes (see the module)."""
         import numba
         import numpy as np
 
@@ -148,7 +149,7 @@ class Kernel(Generic[Parameters, Returned]):
         return hashlib.blake2b("\0".join(text).encode(errors="replace"), digest_size=8).hexdigest()
 
     def directory(self) -> Path | None:
-        """The cache directory of this kernel as it is now, or None if there is no cache."""
+        """The cache directory of this kernel with its present code, or None if there is no cache."""
         root = cache_directory()
         # Without a file (a notebook, a console) Numba would fall back on a cache that we do not control.
         if root is None or not os.path.exists(self.function.__code__.co_filename):
@@ -156,12 +157,12 @@ class Kernel(Generic[Parameters, Returned]):
         return root / self.fingerprint()
 
     def cached(self) -> bool:
-        """Whether the cache holds this kernel (it has a signature)."""
+        """Whether the cache holds this kernel. It must have a signature."""
         directory = self.directory()
         return directory is not None and any(directory.glob("*/*.nbi"))
 
     def compile(self) -> Callable[..., Any]:
-        """Compile, or load from the cache, once; return the compiled function."""
+        """Compile the kernel, or load it from the cache, once. Return the compiled function."""
         with _compiling:
             if self._dispatcher is None:
                 directory = self.directory()
@@ -177,7 +178,7 @@ class Kernel(Generic[Parameters, Returned]):
             return self._dispatcher
 
     def _from_cache(self, directory: str) -> Callable[..., Any]:
-        """Compile or load; where files of the cache are damaged, delete them, and compile."""
+        """Compile or load the kernel. Damaged files of the cache are deleted, and the kernel is compiled."""
         try:
             return self._jit(directory)
         except _DAMAGED as error:
@@ -217,10 +218,10 @@ class Kernel(Generic[Parameters, Returned]):
         options: dict[str, Any] = {"nopython": True, "cache": directory is not None, "error_model": "numpy"}
         options["fastmath"] = self.fastmath
         if self.signature is None:
-            # A helper is inlined: it is a sixth faster, and it keeps runs the same to the last bit. A helper that is
-            # called would exist once in its own library and again in each caller's, optimized differently, and the
-            # linker takes the one that is loaded first: with fast arithmetic a run would then depend on whether its
-            # kernels came from the cache.
+            # A helper is inlined: this is faster by a sixth, and keeps results equal to the last bit. Without inlining
+            # a helper would exist once in its own library and again in the library of each caller, optimised
+            # differently, and the linker uses the copy that is loaded first. With fast arithmetic a result would then
+            # depend on whether its kernels came from the cache.
             options["forceinline"] = True
         decorate = numba.jit(**options) if self.signature is None else numba.jit(self.signature, **options)
         previous = config.CACHE_DIR
@@ -250,7 +251,7 @@ def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
 
 
 def _code_text(code: types.CodeType) -> Iterator[str]:
-    """All of a code object that decides what it does: not its lines, not its file."""
+    """The parts of a code object that decide what it computes: not its line numbers, not its file."""
     for c in _codes(code):
         yield c.co_code.hex()
         yield repr((c.co_argcount, c.co_names, c.co_varnames, c.co_freevars, c.co_cellvars))
@@ -278,7 +279,7 @@ def _uses(function: types.FunctionType) -> Iterator[tuple[str, Any]]:
 
 
 def _value_text(value: Any) -> list[str]:
-    """A constant as text, whatever of it a compiled function freezes."""
+    """A constant as text: the parts of it that become constants of a compiled function."""
     import numpy as np
 
     if isinstance(value, np.ndarray):
@@ -305,9 +306,9 @@ def kernel(
     ----------
     signature : str, optional
         Numba signature (``"void(f8[:, ::1], f8)"``). Every kernel that Python calls has one, so that
-        `simnav warmup` can compile it ahead; helpers that only kernels call may go without.
+        `simnav warmup` can compile it in advance. Helpers that only kernels call need none.
     fastmath : bool or set of str
-        Handed to Numba.
+        Permitted changes of floating-point arithmetic; passed to Numba.
     """
 
     def wrap(function: Callable[Parameters, Returned]) -> Kernel[Parameters, Returned]:
@@ -319,12 +320,12 @@ def kernel(
 
 
 def kernels() -> list[Kernel[..., Any]]:
-    """All kernels of the modules imported so far that can be compiled ahead."""
+    """All kernels with a signature in the modules that are imported at this time."""
     return [k for k in _kernels if k.signature is not None]
 
 
 def prune() -> int:
-    """Delete the cached kernels that no process has used for `KEEP`; return how many."""
+    """Delete the cached kernels that no process has used for `KEEP` seconds. Return their number."""
     root = cache_directory()
     count = 0
     for directory in [] if root is None else root.iterdir():

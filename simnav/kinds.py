@@ -1,8 +1,8 @@
-"""Kinds of aiding instruments, and their datasheets: what each measures, and what follows from that for everybody else.
+"""Kinds of aiding instruments, and their datasheets: what each kind measures, and all properties that depend on it.
 
 A kind is declared once, beside the instrument of its name (``simnav/sensors/gnss.py`` and others, or a file of a third
-party; see ``docs/how-to/add-an-instrument.md``). Whatever depends on the kind of an instrument asks `KINDS`: how an
-error is added to a value, what is plausible, which role the instrument has, and how a navigation filter predicts its
+party; see ``docs/how-to/add-an-instrument.md``). All other code reads these properties from `KINDS`: how an error is
+added to a value, which values are plausible, which role the instrument has, and how a navigation filter predicts its
 reading.
 """
 
@@ -45,13 +45,13 @@ __all__ = [
     "speed_components",
 ]
 
-#: What an instrument is to a navigator. "other": none of these.
+#: The role of an instrument in navigation. "other": none of these.
 Role = Literal["fix", "velocity", "heading", "range", "depth", "other"]
 
-#: Measurement equations that come compiled; `Kind.equation` names one of them, or is a function.
+#: The compiled measurement equations; `Kind.equation` names one of them, or is a function.
 POSITION, HORIZONTAL_POSITION, VELOCITY = "position", "horizontal_position", "velocity"
 BODY_VELOCITY, WATER_SPEED, HEADING, DEPTH = "body_velocity", "water_speed", "heading", "depth"
-#: What each of them predicts, for an instrument with a lever arm ``l`` in body axes.
+#: The quantity that each equation predicts, for an instrument with the lever arm ``l`` in body axes.
 EQUATIONS: Mapping[str, str] = {
     POSITION: "latitude, longitude and height of the instrument",
     HORIZONTAL_POSITION: "latitude and longitude of the instrument",
@@ -65,7 +65,7 @@ _COMPONENTS_OF = {
     POSITION: 3, HORIZONTAL_POSITION: 2, VELOCITY: 3, BODY_VELOCITY: 3, WATER_SPEED: 1, HEADING: 1, DEPTH: 1,
 }  # fmt: skip
 
-#: Bounds of what a measurement is believed to mean: speed [m/s], height and depth [m].
+#: Limits of plausible measurements: speed [m/s], height and depth [m].
 LARGEST_SPEED, LARGEST_HEIGHT = 200.0, 20000.0
 #: What the name of a component looks like: it is a column of files, and the end of a field of a specification.
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -85,7 +85,7 @@ class NavigationPoint(NamedTuple):
     velocity : (3,) array
         North-east-down [m/s].
     dcm : (3, 3) array
-        Turns body vectors into north-east-down.
+        Direction cosine matrix from body axes to north-east-down.
     angular_rate : (3,) array
         Angular rate of the body relative to the Earth, body axes [rad/s].
     """
@@ -99,19 +99,22 @@ class NavigationPoint(NamedTuple):
 
 @kernel()
 def add_error_scalar(positions: int, cyclic: int, value: Array, error: Array) -> None:
-    """Add an error to one measurement, in place; as `Kind.add_error`.
+    """Add an error to one measurement, in place. This is the compiled form of `Kind.add_error`.
 
     Parameters
     ----------
     positions, cyclic : int
-        As of `Kind.layout`.
-    value, error : (d,) array
-        SI units and radians.
+        The two numbers of `Kind.layout`: how many components are a geodetic position, and one bit for each cyclic
+        component.
+    value : (d,) array
+        The measurement, updated: SI units and radians.
+    error : (d,) array
+        The error: for a geodetic position in metres north, east, down, otherwise in the units of ``value``.
     """
     if positions == 3:
         value[0], value[1], value[2] = displace_scalar(value[0], value[1], value[2], error[0], error[1], error[2])
     elif positions == 2:
-        # The radii are those at the sea surface: at 100 m depth the error of the error is 2e-5 of it.
+        # The radii of curvature are those at the sea surface: at 100 m depth this changes the error by 2e-5 of itself.
         value[0], value[1], _ = displace_scalar(value[0], value[1], 0.0, error[0], error[1], 0.0)
     for i in range(positions, value.size):
         value[i] += error[i]
@@ -121,14 +124,15 @@ def add_error_scalar(positions: int, cyclic: int, value: Array, error: Array) ->
 
 @kernel("void(i8, i8, f8[:, ::1], f8[:, ::1])")
 def _add_errors(positions: int, cyclic: int, values: Array, errors: Array) -> None:
-    """`add_error_scalar` for n measurements."""
+    """Apply `add_error_scalar` to each of n measurements."""
     for i in range(values.shape[0]):
         add_error_scalar(positions, cyclic, values[i], errors[i])
 
 
-#: An observation model: the (d,) reading that a datasheet's instrument should give at a state, in SI units, and its
-#: (d, 9) Jacobian with respect to an error of the state: position north-east-down [m], velocity [m/s] and attitude, the
-#: rotation vector about north-east-down [rad] (`simnav.types.COMPONENTS`). None where the state has no reading.
+#: An observation model. It returns the (d,) reading that an instrument with this datasheet should give at a state, in
+#: SI units, and the (d, 9) Jacobian of the reading with respect to an error of the state: position north-east-down [m],
+#: velocity [m/s] and attitude, the rotation vector about north-east-down [rad] (`simnav.types.COMPONENTS`). It returns
+#: None if there is no reading at the state.
 Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array] | None"]
 
 
@@ -141,9 +145,10 @@ class Component:
     name : str
         Name of the value, as in ``latitude``.
     unit : str
-        In which people read the value, a key of `simnav.spec.UNITS`; arrays hold SI units and radians.
+        Unit of the value in files and figures, a key of `simnav.spec.UNITS`. Arrays hold SI units and radians.
     error, error_unit : str
-        Name and unit of the error, where they are not those of the value: a latitude errs to the north, in metres.
+        Name and unit of the error, if they differ from those of the value. For example, the error of a latitude is
+        ``north``, in metres.
     limit : float
         Values of this size (SI) or larger are not plausible.
     cyclic : bool
@@ -166,7 +171,7 @@ class Component:
 
 
 def geodetic_components(*, height: bool) -> tuple[Component, ...]:
-    """Latitude, longitude and, with ``height``, the height of a position; its errors are north-east-down in metres."""
+    """Components of a position: latitude, longitude and, with ``height``, height. Errors are north-east-down [m]."""
     horizontal = (
         Component("latitude", "deg", "north", "m", limit=0.5 * pi),
         Component("longitude", "deg", "east", "m", limit=2.0 * pi, cyclic=True),
@@ -186,23 +191,22 @@ class Kind:
     Attributes
     ----------
     quantity : str
-        What the value is, in words.
+        Name of the measured quantity, in words.
     role : Role
-        What it is to a navigator: "fix" (a position), "velocity", "heading", "range" (to something known), "depth" or
-        "other".
+        Role in navigation: "fix" (a position), "velocity", "heading", "range" (to a known point), "depth" or "other".
     components : tuple of Component
         Components of a measurement's value, one to three.
     equation : str, callable or None
-        How a navigation filter predicts a reading: a key of `EQUATIONS`, whose equations come compiled, or an
-        `Observation`. None: filters leave the kind out.
+        How a navigation filter predicts a reading: a key of `EQUATIONS` (a compiled equation), or an `Observation`.
+        None: filters do not use the kind.
     geodetic : bool
-        Whether the first components are latitude and longitude (and the third, if it is called so, the height):
-        values in radians, errors in metres.
+        True if the first components are latitude and longitude, and the third one, if its name is ``height``, the
+        height: values in radians, errors in metres.
     datasheet : tuple of str
-        Fields of the instrument's specification that an estimator is told beyond the common ones (`Datasheet.details`).
+        Further fields of the instrument's specification that an estimator receives (`Datasheet.details`).
     log_columns : tuple of str
-        Columns that are read from a log of NMEA sentences where its scenario names none; by default those of the names
-        of the components.
+        Columns that are read from a log of NMEA sentences if its scenario names none. By default they are the names of
+        the components.
 
     Raises
     ------
@@ -248,7 +252,7 @@ class Kind:
                 )
         if self.geodetic and self.values[:2] != ("latitude", "longitude"):
             raise PluginError("the first components of a geodetic kind are latitude and longitude")
-        # A limit of an angle is still plausible, one of anything else is not.
+        # An angle equal to its limit is still plausible; another quantity equal to its limit is not.
         limits = tuple(nextafter(c.limit, inf) if c.cyclic else c.limit for c in self.components)
         object.__setattr__(self, "_limits", limits)
 
@@ -259,28 +263,28 @@ class Kind:
 
     @cached_property
     def errors(self) -> tuple[str, ...]:
-        """Name of each component of its error (and of ``Datasheet.sigma``); the value's, but for positions."""
+        """Name of each component of the error and of ``Datasheet.sigma``: that of the value, except for positions."""
         return tuple(c.error for c in self.components)
 
     @cached_property
     def observation(self) -> Observation | None:
-        """The function of the kind's own that predicts a reading; None where there is none, or a compiled equation."""
+        """The Python function that predicts a reading; None for a compiled equation, or without any equation."""
         return self.equation if callable(self.equation) else None
 
     @cached_property
     def _positions(self) -> int:
-        """How many of the first components are a geodetic position."""
+        """The number of leading components that are a geodetic position."""
         return 0 if not self.geodetic else 3 if self.values[2:] == ("height",) else 2
 
     @cached_property
     def layout(self) -> tuple[int, int]:
-        """What `add_error_scalar` is told: how many components are a position, and a bit for each that is cyclic."""
+        """First arguments of `add_error_scalar`: the number of position components, and a bit for each cyclic one."""
         n = self._positions
         return n, sum(1 << i for i, c in enumerate(self.components) if c.cyclic and i >= n)
 
     @property
     def limits(self) -> tuple[float, ...]:
-        """Of each component: a value is plausible between this and its negative, both excluded."""
+        """The limit of each component: a value is plausible between the limit and its negative, both excluded."""
         return self._limits
 
     def plausible(self, value: Array) -> bool:
@@ -302,7 +306,7 @@ class Kind:
         Returns
         -------
         (..., d) array
-            Angles that are cyclic in [-pi, pi).
+            Values with the error. Cyclic angles are in [-pi, pi).
         """
         total, error = (np.array(a, dtype=np.float64) for a in np.broadcast_arrays(value, error))
         d = len(self.components)
@@ -315,12 +319,12 @@ class Kind:
         Parameters
         ----------
         value, reference : (..., d) array
-            Measured values, and those that they are compared with; components as in `values`.
+            Measured values and reference values; components as in `values`.
 
         Returns
         -------
         (..., d) array
-            Components as in `errors`.
+            The errors of ``value``; components as in `errors`.
         """
         n = self._positions
         if n == len(self.components) == 3:
@@ -338,9 +342,9 @@ class Kind:
 
 
 def _three(array: Array, given: int) -> Array:
-    """The first ``given`` components of positions, or of their errors, with a zero where the height is missing.
+    """Return the first ``given`` components of positions, or of their errors, with a height of zero if it is missing.
 
-    The radii are then those at the sea surface: at 100 m depth the error of the error is 2e-5 of it.
+    The radii of curvature are then those at the sea surface. At 100 m depth this changes an error by a factor of 2e-5.
     """
     if given == 3:
         return array[..., :3]
@@ -368,7 +372,7 @@ class _Kinds(Mapping[str, Kind]):
         return len(INSTRUMENTS.items())
 
 
-#: Every kind of aiding instrument that is known. A scenario may carry several instruments of one kind.
+#: Every registered kind of aiding instrument. A scenario may have several instruments of one kind.
 KINDS: Mapping[str, Kind] = _Kinds()
 
 

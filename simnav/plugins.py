@@ -1,8 +1,8 @@
-"""How classes and functions of others become known: by a decorator, from entry points of packages, from single files.
+"""The registration of plug-ins: by a decorator, from entry points of packages, or from single files.
 
-A `Registry` holds those of one sort, by name. Entry points are loaded when they are first needed; one that fails is
-named in a warning and does not affect the others. simnav's own classes are registered by the same decorators, and
-first, so that a plug-in cannot take their names.
+A `Registry` holds the classes or functions of one sort, by name. Entry points are loaded when they are first needed. If
+one of them fails, a warning names it, and the others are not affected. simnav's own classes are registered first, by
+the same decorators, so that a plug-in cannot take their names.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ __all__ = [
 
 C = TypeVar("C")
 
-#: Of the names of modules that were imported from single files.
+#: Prefix of the names of modules that were imported from single files.
 _PREFIX = "simnav_file_"
 
 
 class PluginError(ValueError):
-    """A class or file that cannot be registered, found or loaded; the message is one sentence."""
+    """A class or file cannot be registered, found or loaded. The message is one sentence."""
 
 
 def import_file(
@@ -51,7 +51,7 @@ def import_file(
 ) -> types.ModuleType:
     """Import a Python file by its path, once for each content.
 
-    Modules beside it can be imported, but hide nothing.
+    The file can import modules of its own folder. They do not replace installed modules of the same name.
 
     Parameters
     ----------
@@ -161,11 +161,11 @@ def code_digest(source: bytes) -> str:
 
 
 def place_of(cls: Any) -> tuple[str, int]:
-    """File and line of the definition of a class or a function; ``"?"`` and 0 where they are not known."""
+    """File and line of the definition of a class or a function; ``"?"`` and 0 if they are not known."""
     cls = inspect.unwrap(cls)
     try:
         file = inspect.getsourcefile(cls) or "?"
-    except TypeError:  # typed in at a prompt
+    except TypeError:  # defined in an interactive session
         return "?", 0
     try:
         return file, inspect.getsourcelines(cls)[1]
@@ -191,9 +191,9 @@ class Registry(Generic[C]):
     group : str
         Entry-point group of other packages.
     home : str
-        Module whose import registers those of simnav itself.
+        Module whose import registers the classes of simnav itself.
     term : str
-        What a name is called in messages.
+        The word for a name in messages: "kind".
     """
 
     def __init__(self, what: str, group: str, home: str, *, term: str = "kind"):
@@ -202,12 +202,12 @@ class Registry(Generic[C]):
         self._discovered = False
 
     def add(self, name: str, cls: C) -> None:
-        """Register a class; a class that is defined again (in a notebook, or in an edited file) replaces itself.
+        """Register a class. A new version of a class, from a notebook or an edited file, replaces the old one.
 
         Raises
         ------
         PluginError
-            If the name is not in snake_case, or taken by another class: the message says by which, and where it is.
+            If the name is not in snake_case, or another class has it: the message names that class, its file and line.
         """
         if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
             raise PluginError(
@@ -225,7 +225,7 @@ class Registry(Generic[C]):
 
     @contextlib.contextmanager
     def adding(self, name: str, cls: C) -> Iterator[None]:
-        """`add` a class, and take it back if the block raises."""
+        """Register a class by `add`, and remove it if the body of the ``with`` statement raises."""
         before = dict(self._classes)
         self.add(name, cls)
         try:
@@ -270,7 +270,7 @@ def _label(item: Any) -> str:
 
 
 def _same(old: Any, new: Any) -> bool:
-    """Whether a class is another version of an old one: of the same name, in the same module or file, or in a copy."""
+    """Whether two classes are versions of one class: the same name, in the same module or file or in a copy of it."""
     if old.__qualname__ != new.__qualname__:
         return False
     if old.__module__ == new.__module__:

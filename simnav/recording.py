@@ -1,8 +1,8 @@
-"""A recording: everything that the instruments delivered in a run, and the truth beside it.
+"""A recording: all measurements of a run, with the truth and the labels of the faults.
 
-Simulated runs and real logs are recordings alike. A `Block` is a stretch of one; a `Recording` is
-a whole run with its start and its datasheets. Faults are labelled: per measurement, which fault
-touched it, what the faults added, and the noise that it really had.
+Simulated runs and real logs have the same form. A `Block` is a part of a run, from one time to another. A `Recording`
+is a whole run with its initial state and its datasheets. Each measurement has labels: the faults that affected it, the
+error that the faults added, and the standard deviation of its true noise.
 """
 
 from __future__ import annotations
@@ -34,28 +34,29 @@ from simnav.types import (
 
 __all__ = ["AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
 
-#: Of the files that `Recording.save` writes; raised when they change.
+#: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
 
 
 class RecordingError(ValueError):
-    """A file that holds no recording that this version can read."""
+    """A file is not a recording that this version of simnav can read."""
 
 
 @dataclass(frozen=True, eq=False)
 class FaultLabel:
-    """One fault of a run, as the truth knows it.
+    """One fault of a run. Estimators do not receive it.
 
     Attributes
     ----------
     kind : str
-        As in the scenario (``outage``, ``gross_error``, ...).
+        Kind of the fault in the scenario (``outage``, ``gross_error``, ...).
     instruments : tuple of str
-        Names of the instruments that it touches.
+        Names of the instruments that it affects.
     start, end : float
-        When it is active [s].
+        Beginning and end of the fault [s].
     parameters : mapping
-        What the scenario says of it (sizes, probability, correlation time), as fields of its specification, SI units.
+        The parameters of the fault in the scenario (sizes, probability, correlation time), as fields of its
+        specification, SI units.
     """
 
     kind: str
@@ -67,7 +68,7 @@ class FaultLabel:
 
 @dataclass(frozen=True, eq=False)
 class AidStream:
-    """All k measurements of one aiding instrument over a stretch of time, with their labels.
+    """All k measurements of one aiding instrument in an interval of time, with their labels.
 
     Attributes
     ----------
@@ -76,15 +77,15 @@ class AidStream:
     time : (k,) array
         Times of validity [s], ascending.
     value : (k, d) array
-        As delivered; components as in ``KINDS[kind].values``.
+        Measured values, including faults; components as in ``KINDS[kind].values``.
     faults : (k,) uint32 array
-        Bit j is set where fault j of the recording touched the measurement.
+        Bit j is set if fault j of the recording affected the measurement.
     fault_error : (k, d) array
-        What the faults added, in the units of ``KINDS[kind].errors``.
+        Error that the faults added, in the units of ``KINDS[kind].errors``.
     sigma : (k, d) array
-        The white noise that the measurement really had, likewise.
+        Standard deviation of the true white noise of the measurement, in the same units.
     dropped : (m,) array
-        Times of measurements that an outage or a lost bottom lock took away.
+        Times [s] of measurements that are missing because of an outage or a lost bottom lock.
     """
 
     name: str
@@ -101,7 +102,7 @@ class AidStream:
 
     @staticmethod
     def concatenate(parts: Sequence[AidStream]) -> AidStream:
-        """Join stretches that follow each other."""
+        """Join the measurements of consecutive intervals."""
         names = ("time", "value", "faults", "fault_error", "sigma", "dropped")
         joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in names}
         return AidStream(parts[0].name, parts[0].kind, **joined)
@@ -109,14 +110,14 @@ class AidStream:
 
 @dataclass(frozen=True, eq=False)
 class ImuLabels:
-    """Labels of n IMU samples that a fault touched.
+    """Labels of n IMU samples.
 
     Attributes
     ----------
     faults : (n,) uint32 array
-        As in `AidStream`.
+        Bit j is set if fault j of the recording affected the sample.
     fault_error : (n, 6) array
-        What the faults added: angular rate [rad/s], then specific force [m/s^2].
+        Error that the faults added: angular rate [rad/s], then specific force [m/s^2].
     """
 
     faults: NDArray[np.uint32]
@@ -125,20 +126,21 @@ class ImuLabels:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A stretch (start, end] of a run.
+    """The interval (start, end] of a run: measurements, labels and truth.
 
     Attributes
     ----------
     start, end : float
-        Limits of the stretch [s].
+        Limits of the interval [s].
     imu : ImuSamples or None
-        Samples within the stretch; None for a vessel without an IMU.
+        Samples within the interval; None for a vessel without an IMU.
     imu_labels : ImuLabels or None
-        None where no fault of the scenario touches the IMU.
+        Labels of the samples; None if no fault of the scenario affects the IMU.
     aids : dict of str to AidStream
         Measurements of each aiding instrument, by its name.
     truth : NavigationStates
-        At the ends of the steps within the stretch. Of a simulated run they are `TapStates`, with the current.
+        True states at the ends of the steps within the interval. For a simulated run they are `TapStates`, which also
+        hold the current.
     """
 
     start: float
@@ -150,7 +152,7 @@ class Block:
 
     @staticmethod
     def concatenate(parts: Sequence[Block]) -> Block:
-        """Join stretches that follow each other."""
+        """Join consecutive blocks."""
         first, imu, labels = parts[0], None, None
         if first.imu is not None:
             names = ("time", "interval", "angular_rate", "specific_force")
@@ -172,27 +174,27 @@ class Recording:
     Attributes
     ----------
     scenario : str
-        Versioned id, e.g. ``open-sea-v1``.
+        Id of the scenario with its version, e.g. ``open-sea-v1``.
     seed : int
-        Seed that the run was made with.
+        Seed of the run.
     instruments : Instruments
         The datasheets; ``instruments.step`` is the step of the run [s].
     initial_truth : NavigationStates
         One state: the truth at time 0.
     start : InitialState
-        What an estimator is told of it.
+        Initial state with errors, which an estimator receives.
     faults : tuple of FaultLabel
-        Labels of the faults: number j has bit j in ``AidStream.faults``.
+        The faults of the run; fault j has bit j in ``AidStream.faults``.
     data : Block
-        From time 0 to the end; ``data.truth`` holds the ends of all steps.
+        The measurements from time 0 to the end; ``data.truth`` holds the true states at the ends of all steps.
     note : str
-        E.g. which recording of a folder of logs this is.
+        Remarks on the run, e.g. which recording of a folder of logs it is.
     draws : mapping of str to object
-        What was drawn for this run, by key path, in the units of the scenario's file.
+        Values that were drawn for this run, by key path, in the units of the scenario's file.
     actual : Instruments or None
-        The datasheets that would be true, where those in ``instruments`` are wrong.
+        Datasheets with the true figures, if those in ``instruments`` are wrong.
     actual_covariance : (9, 9) array or None
-        Of the errors of ``start``, where the one in it is wrong.
+        True covariance of the errors of ``start``, if the covariance in ``start`` is wrong.
     """
 
     scenario: str
@@ -213,19 +215,19 @@ class Recording:
         return self.data.end
 
     def steps(self) -> Iterator[Measurements]:
-        """The packets that an estimator is fed, one a step, in order."""
+        """The packets of measurements that an estimator receives, one for each step, in order."""
         yield from packets(self.data, self.data.truth.time)
 
     def save(self, path: str | Path) -> None:
-        """Write the recording to one npz file: all of it, or nothing.
+        """Write the recording to one npz file, completely or not at all.
 
-        It is written under a temporary name beside ``path`` and renamed at the end, so that an interrupted write or a
-        full disk leaves no half file and spares the one that was there.
+        The file is written under a temporary name beside ``path`` and renamed at the end. So an interrupted write or a
+        full disk leaves no incomplete file, and an existing file stays as it is.
 
         Raises
         ------
         OSError
-            If it cannot be written.
+            If the file cannot be written.
         """
         path = Path(path)
         temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -246,8 +248,9 @@ class Recording:
         Raises
         ------
         RecordingError
-            If the file is not a recording, is damaged, or was written by another version.
+            If the file is not a recording, is damaged, or was written in another format.
         FileNotFoundError
+            If there is no such file.
         """
         try:
             with np.load(path, allow_pickle=False) as file:
@@ -279,6 +282,7 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
     Yields
     ------
     Measurements
+        The packet of each step: the IMU samples and aiding measurements within it.
     """
     aids = [
         Measurement(float(t), s.name, s.kind, v)
@@ -310,7 +314,7 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
-    """A datasheet for JSON; without ``details`` where there are none."""
+    """A datasheet as a dictionary for JSON, without ``details`` if they are empty."""
     return {k: _plain(v) for k, v in asdict(sheet).items() if k != "details" or v}
 
 
@@ -365,7 +369,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
 
 
 def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
-    """The way back from `_sheets`."""
+    """The datasheets from their dictionaries: the inverse of `_sheets`."""
     imu = sheets["imu"]
     if imu is not None:
         triads = {n: TriadDatasheet(**imu[n]) for n in ("gyroscope", "accelerometer")}

@@ -1,4 +1,4 @@
-"""Where measurements come from: the simulator or a recorded log, with the same interface."""
+"""The sources of measurements: the simulator and recorded logs, with the same interface."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Source(Protocol):
     Attributes
     ----------
     instruments : Instruments
-        The datasheets.
+        Datasheets of all instruments of the run.
     start : InitialState
-        What an estimator is told of the state at time 0.
+        Initial state with errors, which an estimator receives.
     initial_truth : NavigationStates
         One state: the truth at time 0.
     faults : tuple of FaultLabel
@@ -30,9 +30,9 @@ class Source(Protocol):
     duration, step : float
         Length of the run, and of one step [s].
     note : str
-        What is to be known of the run; empty for a simulated one.
+        Remarks on the run; empty for a simulated one.
     scenario : Scenario
-        That of this run, with nothing left to draw.
+        The scenario of this run, with all values drawn.
     """
 
     instruments: Instruments
@@ -45,17 +45,17 @@ class Source(Protocol):
     scenario: Scenario
 
     def advance(self, until: float) -> Block:
-        """The next stretch of the run, up to a time [s]."""
+        """Return the next block of the run, up to a time [s]."""
         ...
 
 
 def open_source(scenario: Scenario, seed: int) -> Source:
-    """Open one run of a scenario: the simulator, or a `simnav.log.LogSource` where the scenario is recorded.
+    """Open one run of a scenario: the simulator, or a `simnav.log.LogSource` for a recorded scenario.
 
     Parameters
     ----------
     scenario : Scenario
-        A simulated or a recorded one.
+        A simulated or a recorded scenario.
     seed : int
         Seed of the run, non-negative.
 
@@ -79,19 +79,19 @@ def record(scenario: Scenario, seed: int) -> Recording:
     Parameters
     ----------
     scenario : Scenario
-        A simulated or a recorded one.
+        A simulated or a recorded scenario.
     seed : int
         Seed of the run, non-negative.
 
     Raises
     ------
     SpecError
-        If the recording would not fit into the memory that is free: nothing is allocated then.
+        If the recording needs more memory than is free. It is raised before anything is allocated.
 
     Returns
     -------
     Recording
-        Without the truth it would be what an estimator sees.
+        The whole run, with truth and labels.
     """
     check_cost(scenario)
     source = open_source(scenario, seed)
@@ -116,7 +116,7 @@ def check_cost(scenario: Scenario) -> None:
     Raises
     ------
     SpecError
-        If it is more than is free; the message names the scenario, and the key that costs most.
+        If it is more than the free memory. The message names the scenario, and the key that needs most memory.
     """
     from simnav.spec import SpecError
 
@@ -134,12 +134,12 @@ def check_cost(scenario: Scenario) -> None:
         )
 
 
-#: Memory of an epoch of the truth, and of a sample of an instrument while it is made [bytes].
+#: Memory of an epoch of the truth, and of a sample of an instrument during the simulation [bytes].
 _EPOCH, _SAMPLE = 300.0, 150.0
 
 
 def free_memory() -> float:
-    """Memory that a process can have now [bytes]; 64 GiB where it is not known."""
+    """Memory that is available to a process at this time [bytes]; 64 GiB if it is not known."""
     with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/meminfo") as file:
         for line in file:
             if line.startswith("MemAvailable:"):

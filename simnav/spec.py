@@ -8,9 +8,9 @@ written in TOML under its name with the unit as suffix, so that the unit is alwa
 
     Gyroscope.from_toml({"random_walk_deg_sqrt_h": 0.01}, source="my.toml")
 
-One definition thus serves the schema, its validation, its documentation and the simulation.
-`Spec.to_toml` is the way back. Not-a-number is refused everywhere, infinity wherever it is neither
-a time nor the field's own default.
+So one definition gives the schema, its validation, its documentation and the values of the simulation.
+`Spec.to_toml` is the inverse of `Spec.from_toml`. NaN is refused everywhere. Infinity is accepted for times, and for
+fields whose default is infinite.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ __all__ = [
 
 _DEG = math.pi / 180.0
 _G = 9.80665  # standard gravity, for "micro-g"
-_BEYOND = 1e12  # no unit needs larger numbers, and their squares would overflow sooner or later
+_BEYOND = 1e12  # no unit needs larger numbers, and squares of very large numbers overflow
 
-#: Factor to SI of every unit that may end a key; `register_unit` adds one.
+#: Factor from each unit at the end of a key to SI; `register_unit` adds one.
 UNITS: dict[str, float] = {
     "s": 1.0,
     "min": 60.0,
@@ -96,7 +96,7 @@ Vector = tuple[float, float, float]
 
 
 class SpecError(ValueError):
-    """A specification that is not valid; the message names file, key, value and what is right."""
+    """A specification is not valid. The message names the file, the key, the value and what would be right."""
 
 
 def register_unit(name: str, factor: float) -> None:
@@ -130,16 +130,16 @@ def register_unit(name: str, factor: float) -> None:
 
 
 def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
-    """Declare a field that TOML writes in ``unit`` (a key of `UNITS`) and memory holds in SI.
+    """Declare a field that has the unit ``unit`` in TOML and the SI unit in memory.
 
     Parameters
     ----------
     unit : str
-        Unit in TOML, which is also the end of the key: ``rate_hz``.
+        Unit in TOML, a key of `UNITS`. It is also the end of the TOML key: ``rate_hz``.
     default : float or tuple, optional
-        In SI; a field without one is required.
+        Default value in SI. A field without a default is required.
     **kwargs
-        Passed on to `pydantic.Field` (``description``, ``gt``, ...; bounds are in SI).
+        Arguments of `pydantic.Field` (``description``, ``gt``, ...). Bounds are in SI.
     """
     if unit not in UNITS:
         raise SpecError(f"unknown unit {unit!r}; register_unit adds one; there are: {', '.join(UNITS)}")
@@ -147,12 +147,12 @@ def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
 
 
 def entries(key: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
-    """Declare a field with a plural name whose TOML tables are called ``key``: ``[[fault]]`` for ``faults``."""
+    """Declare a field with a plural name whose TOML tables have the name ``key``: ``[[fault]]`` for ``faults``."""
     return Field(default, json_schema_extra={"key": key}, **kwargs)
 
 
 def closest(name: str, valid: Sequence[str]) -> str:
-    """``"; did you mean 'x'?"``, or the list of valid names where none is near."""
+    """The end of a message on an unknown name: ``"; did you mean 'x'?"``, or the list of valid names."""
     near = difflib.get_close_matches(name, valid, n=1, cutoff=0.6)
     if near:
         return f"; did you mean {near[0]!r}?"
@@ -160,7 +160,7 @@ def closest(name: str, valid: Sequence[str]) -> str:
 
 
 def unit_of(info: FieldInfo) -> str | None:
-    """The TOML unit of a field, or None."""
+    """The unit of a field in TOML; None if it has none."""
     extra = info.json_schema_extra
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
 
@@ -198,33 +198,33 @@ def toml_number(value: float, unit: str) -> float:
 
 
 class Spec(BaseModel):
-    """Base of all specifications: immutable, strict about names, read from TOML by `from_toml`.
+    """Base class of all specifications. They are immutable, refuse unknown names, and are read by `from_toml`.
 
-    A union of Specs is discriminated by their ``kind`` field (a ``Literal`` with a default).
+    In a union of Specs the field ``kind`` (a ``Literal`` with a default) decides the class.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=True, validate_default=True)
 
     @classmethod
     def toml_keys(cls) -> dict[str, tuple[str, FieldInfo]]:
-        """TOML key -> (field name, field), in the order of declaration."""
+        """A mapping from TOML key to (field name, field), in the order of declaration."""
         return {_key(name, info): (name, info) for name, info in cls.model_fields.items()}
 
     @classmethod
     def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
-        """Build from a TOML table.
+        """Build a specification from a TOML table.
 
         Parameters
         ----------
         table : mapping
-            As `tomllib` returns it.
+            Table as `tomllib` returns it.
         source, path : str
-            File, and key of the table in it: for error messages.
+            Name of the file, and key of the table in it, for error messages.
 
         Raises
         ------
         SpecError
-            On an unknown, missing or invalid key: one sentence with file, key and value.
+            If a key is unknown, missing or invalid. The message is one sentence with file, key and value.
         """
         if not isinstance(table, Mapping):
             raise SpecError(f"{source}: {path or 'the file'} = {table!r} should be a table")
@@ -246,7 +246,7 @@ class Spec(BaseModel):
             raise SpecError(_sentence(cls, error, table, source, path)) from None
 
     def to_toml(self) -> dict[str, Any]:
-        """The TOML table that `from_toml` reads back into an equal specification: what was given, and the kind."""
+        """The TOML table from which `from_toml` makes an equal specification: the given fields, and the kind."""
         table = {}
         for key, (name, info) in self.toml_keys().items():
             value = getattr(self, name)
@@ -266,7 +266,7 @@ def _plain(value: Any, unit: str | None) -> Any:
 
 
 def _hint(key: str, keys: Mapping[str, tuple[str, FieldInfo]]) -> str:
-    """A unit mix-up is told apart from a typing slip."""
+    """The hint for an unknown key: the right unit for a known name, otherwise the most similar keys."""
     for valid, (name, info) in keys.items():
         unit = unit_of(info)
         if unit is not None and (key == name or (key.startswith(name + "_") and key[len(name) + 1 :] in UNITS)):
@@ -278,7 +278,7 @@ def _hint(key: str, keys: Mapping[str, tuple[str, FieldInfo]]) -> str:
 
 
 def _may_be_infinite(info: FieldInfo) -> bool:
-    """A time may (a correlation time, the end of a fault), and whatever is infinite by default (a range)."""
+    """Whether infinity is accepted: for times (a correlation time, the end of a fault) and for infinite defaults."""
     defaults = info.default if isinstance(info.default, tuple) else (info.default,)
     return unit_of(info) in ("s", "min", "h") or any(isinstance(d, float) and math.isinf(d) for d in defaults)
 
@@ -297,27 +297,27 @@ def _convert(raw: Any, factor: float, infinite: bool, source: str, where: str) -
 
 
 class OneOf:
-    """Annotation of a field that holds a Spec of one of several classes, told apart by ``kind``.
+    """Annotation of a field that holds a Spec of one of several classes; its ``kind`` decides the class.
 
-    Unlike a union it is open: the classes are asked for when a value is read::
+    Unlike a union it is open: the list of classes is read each time that a value is validated::
 
         instruments: dict[str, Annotated[AidSpec, OneOf(instrument_specs)]]
 
     Parameters
     ----------
     classes : callable
-        Returns the classes that are known by now.
+        Function without arguments that returns the classes that are registered at this time.
     """
 
     def __init__(self, classes: Callable[[], Sequence[type[Spec]]]):
         self.classes = classes
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        """Validate by `validate`; serialise each value as its own class does."""
+        """The pydantic schema: `validate` validates, and each value is serialised by its own class."""
         return core_schema.no_info_after_validator_function(self.validate, core_schema.any_schema())
 
     def validate(self, value: Any) -> Spec:
-        """A Spec as it is; a mapping, with SI units, as one of the class that its ``kind`` names."""
+        """Return a Spec unchanged; convert a mapping (SI units) to the class that its ``kind`` names."""
         by_kind = {_kind(cls): cls for cls in self.classes()}
         if isinstance(value, Spec) and isinstance(value, tuple(by_kind.values())):
             return value
@@ -331,7 +331,7 @@ class OneOf:
 
 
 def spec_types(annotation: Any) -> list[type[Spec]]:
-    """The Spec classes inside an annotation (unions, lists, dicts, Annotated and `OneOf` are looked through)."""
+    """The Spec classes inside an annotation, also inside unions, lists, dicts, Annotated and `OneOf`."""
     if typing.get_origin(annotation) is Annotated:
         for metadata in annotation.__metadata__:
             if isinstance(metadata, OneOf):
@@ -342,7 +342,7 @@ def spec_types(annotation: Any) -> list[type[Spec]]:
 
 
 def _containers(annotation: Any) -> set[Any]:
-    """The outermost types that the annotation allows (``| None`` is looked through)."""
+    """The outermost types that the annotation allows, without None."""
     origin = typing.get_origin(annotation)
     if origin is Annotated:
         return _containers(typing.get_args(annotation)[0])
@@ -367,7 +367,7 @@ def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
     if dict in top:
         if not isinstance(raw, Mapping):
             raise SpecError(f"{source}: {where} = {raw!r} should be a table of tables ([{where}.name])")
-        # A table that does not say its kind is of the kind that its name says.
+        # Without the key "kind", the name of the table is its kind.
         return {k: _one(v, specs, source, f"{where}.{k}", default_kind=k) for k, v in raw.items()}
     return _one(raw, specs, source, where)
 
@@ -403,7 +403,7 @@ _BOUNDS = {
 
 
 def _sentence(cls: type[Spec], error: ValidationError, table: Mapping[str, Any], source: str, path: str) -> str:
-    """The first problem of a ValidationError, or all keys that are missing, in the words and units of the TOML file."""
+    """The first problem of a ValidationError, or all missing keys, with the names and units of the TOML file."""
     first = error.errors()[0]
     location, context = first["loc"], first.get("ctx", {})
     message = str(first["msg"]).removeprefix("Value error, ").removeprefix("Input ")
@@ -440,7 +440,7 @@ def _sentence(cls: type[Spec], error: ValidationError, table: Mapping[str, Any],
 
 
 def _length(annotation: Any) -> str:
-    """Of the tuple inside an annotation."""
+    """The length of the tuple inside an annotation, as text."""
     parts = typing.get_args(annotation)
     if typing.get_origin(annotation) is tuple and Ellipsis not in parts:
         return str(len(parts))

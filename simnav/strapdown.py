@@ -1,10 +1,14 @@
 """Strapdown inertial mechanization in north-east-down, and its exact inverse.
 
-`mechanize` integrates IMU samples (means over their intervals) to position, velocity and attitude; `increments` goes
-the other way, from a trajectory to the samples that perfect instruments deliver. Both use one set of equations, so that
-the samples of `increments` re-integrate to the trajectory up to rounding.
+`mechanize` integrates IMU samples (means over their intervals) to position, velocity and attitude. `increments` is the
+inverse: from a trajectory it computes the samples of ideal instruments. Both use the same equations, so the integration
+of these samples gives the trajectory up to rounding.
 
-With the angle and velocity increments alpha, nu of an interval and alpha', nu' of the one before it:
+The symbols are: alpha, nu the angle and velocity increments of an interval (mean angular rate and mean specific force
+times dt), alpha', nu' those of the interval before; C the direction cosine matrix from body axes to north-east-down; v
+the velocity, p the geodetic position; dt the length of the interval; w_ie the Earth rate and w_en the transport rate in
+north-east-down; g gravity; T(p) the matrix from velocity to the rate of latitude, longitude and height; x after a
+vector its skew-symmetric matrix; + the value at the end of the interval.
 
 - rotation vector of the body, with the two-sample coning correction (Savage 1998, part 1, eqs. 39-40)
   ``phi = alpha + alpha' x alpha / 12``
@@ -15,9 +19,9 @@ With the angle and velocity increments alpha, nu of an interval and alpha', nu' 
 - ``p+ = p + T(pm) vm dt``, trapezoidal in velocity (Groves eq. 5.56)
 - ``C+ = exp(-zeta x) C exp(phi x)``
 
-where vm is the mean of the velocities at both ends, and gravity, radii and rates are taken at the middle of the
-interval. The mean angular rate and specific force of `increments` differ from the true means over an interval by a
-term of third order in dt.
+where vm is the mean of the velocities at both ends, pm the position at the middle of the interval, and gravity, radii
+and rates are computed there. The mean angular rate and specific force of `increments` differ from the true means over
+an interval by a term of third order in dt.
 
 References: P. G. Savage, *Strapdown inertial navigation integration algorithm design*, J. Guidance, Control and
 Dynamics 21(1) and 21(2), 1998. P. D. Groves 2013, chapter 5.
@@ -51,7 +55,16 @@ __all__ = ["increments", "integrate", "mechanize", "mechanize_step", "sample_fro
 
 @kernel()
 def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: float, dt: float) -> tuple[float, ...]:
-    """Earth and transport rate, gravity and radii at the middle of an interval that starts at a latitude and height.
+    """Earth rate, transport rate, gravity and radii at the middle of an interval.
+
+    Parameters
+    ----------
+    latitude, height : float
+        Latitude [rad] and height [m] at the start of the interval.
+    vm0, vm1, vm2 : float
+        Mean velocity over the interval, north, east, down [m/s].
+    dt : float
+        Length of the interval [s].
 
     Returns
     -------
@@ -79,7 +92,7 @@ def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: flo
     )
 
 
-#: Of three axes.
+#: Components along three axes.
 Triple: TypeAlias = tuple[float, float, float]
 
 
@@ -87,16 +100,16 @@ Triple: TypeAlias = tuple[float, float, float]
 def mechanize_step(
     position: Array, velocity: Array, dcm: Array, memory: Array, rate: Triple, force: Triple, dt: float
 ) -> None:
-    """One interval of the mechanization (equations in the module), in place.
+    """Integrate one interval of the mechanization (equations in the module), in place.
 
     Parameters
     ----------
     position, velocity : (3,) arrays
         Geodetic [rad, rad, m] and north-east-down [m/s]; updated.
     dcm : (3, 3) array
-        Body to north-east-down.
+        Direction cosine matrix from body axes to north-east-down; updated.
     memory : (6,) array
-        Angle and velocity increments of the interval before; zeros at the start.
+        Angle and velocity increments of the interval before, zeros at the start of a run; updated.
     rate, force : three floats
         Mean angular rate [rad/s], mean specific force [m/s^2].
     dt : float
@@ -159,9 +172,9 @@ def mechanize(
     position, velocity : (3,) arrays
         Geodetic [rad, rad, m] and north-east-down [m/s]; updated.
     dcm : (3, 3) array
-        Body to north-east-down; updated.
+        Direction cosine matrix from body axes to north-east-down; updated.
     memory : (6,) array
-        Increments of the sample before (zeros at the start of a run); updated.
+        Angle and velocity increments of the sample before, zeros at the start of a run; updated.
     angular_rate, specific_force : (n, 3) arrays
         Means over the intervals [rad/s], [m/s^2].
     interval : (n,) array
@@ -181,18 +194,18 @@ def _integrate(
     position: Array, velocity: Array, dcm: Array, angular_rate: Array, specific_force: Array, interval: Array,
     positions: Array, velocities: Array, dcms: Array,
 ) -> None:  # fmt: skip
-    """Mechanize k samples, from a state that is updated.
+    """Integrate k samples and store the state after each of them.
 
     Parameters
     ----------
     position, velocity, dcm : (3,), (3,), (3, 3) arrays
-        State at the start; overwritten by that at the end.
+        State at the start; overwritten by the state at the end.
     angular_rate, specific_force : (k, 3) arrays
         Means over the sample intervals [rad/s], [m/s^2].
     interval : (k,) array
-        Their lengths [s].
+        Lengths of the sample intervals [s].
     positions, velocities, dcms : (k, 3), (k, 3), (k, 3, 3) arrays
-        Overwritten: the states at their ends.
+        Overwritten by the states at the ends of the intervals.
     """
     memory = np.zeros(6)
     for k in range(interval.size):
@@ -220,7 +233,7 @@ def integrate(position: Array, velocity: Array, attitude: Array, samples: ImuSam
     Returns
     -------
     NavigationStates
-        At the n sample times.
+        The states at the n sample times.
     """
     n = len(samples)
     positions, velocities, dcms = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3, 3))
@@ -243,26 +256,26 @@ def sample_from_motion(
     latitude: float, height: float, v: tuple[float, float, float], w: tuple[float, float, float], c: tuple[float, ...],
     d: tuple[float, ...], memory: Array, dt: float,
 ) -> tuple[float, ...]:  # fmt: skip
-    """What perfect instruments deliver over one interval: the exact inverse of `mechanize_step`.
+    """The sample of ideal instruments over one interval: the exact inverse of `mechanize_step`.
 
     Parameters
     ----------
     latitude, height : float
-        At the start of the interval.
+        Latitude [rad] and height [m] at the start of the interval.
     v, w : tuples of 3 floats
-        Velocity at the start and at the end.
+        Velocity at the start and at the end, north-east-down [m/s].
     c, d : tuples of 9 floats
-        DCM body to north-east-down at the start and at the end, row by row.
+        Direction cosine matrix from body axes to north-east-down at the start and at the end, row by row.
     memory : (6,) array
-        Increments of the interval before; updated.
+        Angle and velocity increments of the interval before; updated.
     dt : float
         Length of the interval [s].
 
     Returns
     -------
     tuple of 11 floats
-        Mean angular rate and specific force; latitude and longitude change [rad] and height change [m]; the Earth
-        rate, north and down, in the middle.
+        Mean angular rate [rad/s] and mean specific force [m/s^2], body axes; changes of latitude and longitude [rad]
+        and of height [m]; the Earth rate, north and down, at the middle of the interval [rad/s].
     """
     m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
     e0, e2, k0, k1, k2, g, per_north, per_east, _ = local_rates(latitude, height, m0, m1, m2, dt)
@@ -333,18 +346,18 @@ def sample_from_motion(
 def _increments(
     time: Array, velocity: Array, dcm: Array, memory: Array, position: Array, angular_rate: Array, specific_force: Array
 ) -> None:
-    """What ideal sensors deliver between k + 1 states; see `increments`.
+    """The samples of ideal instruments between k + 1 states; see `increments`.
 
     Parameters
     ----------
     time : (k + 1,) array
-        Of the states [s].
+        Times of the states [s].
     velocity, dcm : (k + 1, 3), (k + 1, 3, 3) arrays
-        Of the states.
+        Velocities north-east-down [m/s], and direction cosine matrices from body axes to north-east-down.
     memory : (6,) array
-        Increments of the interval before, for coning and sculling; updated.
+        Angle and velocity increments of the interval before, for coning and sculling; updated.
     position : (k + 1, 3) array
-        The first is given; the others are overwritten by the mechanization's own rule.
+        Geodetic positions. The first one is given; the others are overwritten by the integral of the mechanization.
     angular_rate, specific_force : (k, 3) arrays
         Overwritten: means over the intervals [rad/s], [m/s^2].
     """
@@ -369,18 +382,18 @@ def _increments(
 
 
 def increments(time: Array, position: Array, velocity: Array, attitude: Array) -> tuple[ImuSamples, Array]:
-    """What perfect instruments deliver on a trajectory: the exact inverse of `integrate`.
+    """The samples of ideal instruments on a trajectory: the exact inverse of `integrate`.
 
     Parameters
     ----------
     time : (n + 1,) array
-        Ascending [s].
+        Times of the states, ascending [s].
     position : (3,) array
-        Geodetic, at the first time; the others follow from the velocity, as the mechanization integrates it.
+        Geodetic position at the first time. The other positions follow from the velocity by the mechanization.
     velocity : (n + 1, 3) array
-        North-east-down [m/s].
+        Velocities of the states, north-east-down [m/s].
     attitude : (n + 1, 3) array
-        Roll, pitch, yaw [rad]; less than a quarter turn a sample.
+        Roll, pitch, yaw [rad]. The rotation between two times is less than 90 degrees.
 
     Returns
     -------

@@ -21,12 +21,12 @@ def stream(seed: int, *names: str) -> np.random.Generator:
     seed : int
         Seed of the run, non-negative.
     *names : str
-        What the process is, from the general to the particular: ``"instrument", "dvl", "noise"``.
+        Name of the process, from the general to the particular: ``"instrument", "dvl", "noise"``.
 
     Returns
     -------
     numpy.random.Generator
-        SFC64: the fastest of NumPy's generators for normal variates.
+        A generator with SFC64, which is the fastest bit generator of NumPy for normal variates.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What travels between the rooms of simnav: datasheets, measurements, estimates, states.
+"""The data types that all parts of simnav exchange: datasheets, measurements, estimates, states.
 
 SI units and radians throughout. Position is geodetic latitude [rad], longitude [rad] and height
 above the WGS-84 ellipsoid [m]; velocity is north-east-down [m/s]; attitude is roll, pitch, yaw
@@ -55,7 +55,7 @@ COMPONENTS: tuple[str, ...] = (
 
 @dataclass(frozen=True, eq=False)
 class TriadDatasheet:
-    """What the datasheet says of three gyroscopes or three accelerometers.
+    """Datasheet of three gyroscopes or of three accelerometers.
 
     All figures are one sigma and equal on the three axes; ``x`` is rad/s for gyroscopes and
     m/s^2 for accelerometers.
@@ -63,10 +63,10 @@ class TriadDatasheet:
     Attributes
     ----------
     bias : float
-        Turn-on bias [x].
+        Turn-on bias [x]: constant in a run, different in each run.
     bias_instability : float
-        Stationary sigma of the in-run (first-order Gauss-Markov) bias [x]; where
-        ``correlation_time`` is infinite it is a random walk of this many x per sqrt(s).
+        Stationary standard deviation of the in-run bias, a first-order Gauss-Markov process [x]. If
+        ``correlation_time`` is infinite, the in-run bias is a random walk of this density [x/sqrt(s)].
     correlation_time : float
         Correlation time of the in-run bias [s].
     random_walk : float
@@ -74,13 +74,13 @@ class TriadDatasheet:
     rate_random_walk : float
         Random walk of the bias [x/sqrt(s)].
     scale : float
-        Scale-factor error [-].
+        Scale-factor error [-]: the reading is multiplied by 1 + error.
     misalignment : float
         Non-orthogonality of each axis [rad].
     quantization : float
-        Step of the output increment [x s]; 0 for none.
+        Step of the output increment [x s]; 0: no quantization.
     range : float
-        Largest output [x]; inf for none.
+        Largest output [x]; inf: no limit.
     """
 
     bias: float = 0.0
@@ -115,16 +115,16 @@ class ImuDatasheet:
 
 
 class Instruments(Mapping[str, Datasheet]):
-    """The datasheets of a run: a mapping from name to `Datasheet`, and the IMU's beside it.
+    """The datasheets of a run: a mapping from name to `Datasheet`, and the datasheet of the IMU as an attribute.
 
     Parameters
     ----------
     aids : sequence of Datasheet
-        Datasheets of the aiding instruments, each with a name of its own.
+        Datasheets of the aiding instruments, with different names.
     imu : ImuDatasheet or None
-        None for a vessel without an IMU.
+        Datasheet of the IMU; None for a vessel without an IMU.
     step : float
-        Seconds from one call of ``Estimator.update`` to the next.
+        Time from one call of ``Estimator.update`` to the next [s].
     """
 
     def __init__(self, aids: Sequence[Datasheet] = (), imu: ImuDatasheet | None = None, step: float = 1.0):
@@ -158,14 +158,14 @@ class Instruments(Mapping[str, Datasheet]):
 
 @dataclass(frozen=True, eq=False)
 class ImuSamples:
-    """A run of n IMU samples: averages over the interval that ends at each sample's time.
+    """A series of n IMU samples: averages over the interval that ends at each sample's time.
 
     Attributes
     ----------
     time, interval : (n,) array
         End of the interval and its length [s].
     angular_rate, specific_force : (n, 3) array
-        Mean over the interval, body axes [rad/s], [m/s^2]. The increment is mean x interval.
+        Mean over the interval, body axes [rad/s], [m/s^2]. The increment is the mean times the interval.
     """
 
     time: Array
@@ -201,16 +201,16 @@ class Measurement(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measurements:
-    """What the instruments delivered in one step, the interval (start, time].
+    """All measurements of one step, the interval (start, time].
 
     Attributes
     ----------
     start, time : float
-        Begin and end of the step [s]; the estimate is wanted for ``time``.
+        Beginning and end of the step [s]. The estimate must be valid at ``time``.
     imu : ImuSamples or None
-        None for a vessel without an IMU.
+        IMU samples of the step; None for a vessel without an IMU.
     aids : list of Measurement
-        In order of time. Iterating over the packet iterates over them.
+        Aiding measurements in order of time. Iteration over the packet gives these.
     """
 
     start: float
@@ -234,7 +234,7 @@ class Measurements:
 
 @dataclass(frozen=True, eq=False)
 class InitialState:
-    """Where an estimator starts: a state with errors drawn from ``covariance``.
+    """The initial state that an estimator receives, with errors drawn from ``covariance``.
 
     Attributes
     ----------
@@ -262,16 +262,17 @@ class Estimate:
     time : float
         Time of validity [s]: the end of the step.
     position, velocity, attitude : (3,) array or None
-        None for what is not estimated.
+        Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad]. None: this vector is not estimated.
     covariance : (9, 9) array or None
-        Over `COMPONENTS`; only the rows and columns of estimated components are read.
+        Covariance of the errors, in the order of `COMPONENTS`. Only the rows and columns of estimated components are
+        read.
     estimated : (9,) bool array or None
-        Which components are estimated, where part of a vector is not (a ship's filter estimates
-        no height, roll or pitch). None: all components of the vectors that are given.
+        True for each estimated component. It is needed if only a part of a vector is estimated; for example, a ship's
+        filter may not estimate height, roll and pitch. None: all components of the given vectors are estimated.
     diagnostics : dict
-        Named scalars or small arrays, recorded by epoch.
+        Named scalars or small arrays, which are recorded at each epoch.
     flagged : sequence of (instrument, time)
-        The measurements of this step that the estimator judged faulty; scored against the truth.
+        The measurements of this step that the estimator considers faulty. They are scored against the true faults.
     """
 
     time: float
@@ -315,7 +316,7 @@ class NavigationStates:
 
 @dataclass(frozen=True, eq=False)
 class TapStates(NavigationStates):
-    """The true states at the n sample times of one instrument: what its sensor model works on.
+    """The true states at the n sample times of one instrument, from which its readings are computed.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Compile every kernel in advance, so that no run has to wait for it."""
+"""Compile every kernel in advance, so that no run has to wait for the compiler."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from simnav.compiled import Kernel, kernels, prune
 
 __all__ = ["warmup"]
 
-#: Called with how many kernels are ready, how many there are, and the name of the last one.
+#: Called with the number of compiled kernels, the number of all kernels, and the name of the last compiled one.
 Callback = Callable[[int, int, str], None]
 
 _WORTH_A_PROCESS = 4  # fewer kernels than this are compiled in this process
@@ -29,11 +29,11 @@ def warmup(progress: Callback | None = None, *, load: bool = True, processes: in
     Parameters
     ----------
     progress : callable, optional
-        ``progress(done, total, name)``.
+        Called as ``progress(done, total, name)`` after each kernel.
     load : bool
-        Load them into this process, too.
+        True: also load the kernels into this process.
     processes : int, optional
-        Compile in this many processes at once; default: as many as there are cores, at most 4.
+        Number of processes that compile at the same time; by default the number of cores, at most 4.
     """
     report = progress or (lambda done, total, name: None)
     _import_all()
@@ -47,7 +47,7 @@ def warmup(progress: Callback | None = None, *, load: bool = True, processes: in
             report(done, len(every), name)
         prune()
     for kernel in every if load else missing:
-        kernel.compile()  # from the cache by now, or here if there is none
+        kernel.compile()  # loads it from the cache; compiles it here if there is no cache
         if kernel in missing and done < len(every):
             done += 1
             report(done, len(every), _name(kernel))
@@ -62,7 +62,7 @@ def _cores() -> int:
 
 
 def _import_all() -> None:
-    """Import every module of simnav that holds kernels, and whatever plug-ins import."""
+    """Import every module of simnav that holds kernels, and the modules of plug-ins."""
     for package in ("simnav", "simnav.estimators"):  # the second is a link in a checkout: rglob does not follow it
         spec = importlib.util.find_spec(package)
         for folder in [] if spec is None else spec.submodule_search_locations or []:
@@ -85,14 +85,14 @@ def _try_import(name: str) -> None:
 
 
 def _compile_beside(missing: list[Kernel[..., Any]], processes: int) -> Iterator[str]:
-    """Compile kernels in several forked processes, which leave them in the cache; yield their names.
+    """Compile kernels in several forked processes, which store them in the cache; yield their names.
 
-    Where processes cannot be forked, or one dies, the rest is left to the caller.
+    If processes cannot be forked, or one of them dies, the caller has to compile the remaining kernels.
     """
     if processes < 2 or "fork" not in multiprocessing.get_all_start_methods():
         return
     context = multiprocessing.get_context("fork")
-    _todo[:] = sorted(missing, key=_size, reverse=True)  # the longest first, lest it be alone at the end
+    _todo[:] = sorted(missing, key=_size, reverse=True)  # the longest first, so that no process works alone at the end
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads
@@ -109,7 +109,7 @@ _todo: list[Kernel[..., Any]] = []
 
 
 def _size(kernel: Kernel[..., Any]) -> int:
-    """About how long it takes to compile: the code of a kernel and of all that it calls."""
+    """The size of the code of a kernel and of all kernels that it calls, as a measure of its compile time."""
     return sum(len(k.function.__code__.co_code) for k in kernel.tree())
 
 

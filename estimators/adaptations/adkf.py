@@ -32,7 +32,7 @@ def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
 
 
 def three_segment(s: float, c0: float, c1: float) -> float:
-    """Eq. 35, the same function as IGG-III: 1 up to c0, falling to 0 at c1; continuous."""
+    """Eq. 35, the same function as IGG-III: 1 up to c0, decreasing to 0 at c1; continuous."""
     return igg3(s, c0, c1)
 
 
@@ -41,7 +41,7 @@ def exponential(s: float, c0: float, c1: float = 0.0) -> float:
     return 1.0 if s <= c0 else exp(-min((s - c0) ** 2, 700.0))
 
 
-#: The factor functions of the paper, by name; the statistic, c0 and c1 in, the factor in [0, 1] out.
+#: The factor functions of the paper, by name. Arguments: the statistic, c0 and c1. Result: the factor in [0, 1].
 FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
     "two-segment": two_segment,
     "three-segment": three_segment,
@@ -64,7 +64,8 @@ class _Preset(NamedTuple):
     c1: float
 
 
-#: Thresholds: those of the paper's experiment, and ours for whitened statistics, which exceed 2 seldom on clean data.
+#: Thresholds (c0, c1): those of the paper, and those of simnav for whitened statistics, which seldom exceed 2 without
+#: faults.
 PRESETS = {
     "paper": _Preset({"two-segment": 1.0, "three-segment": 1.5, "exponential": 1.0}, 4.0),
     "default": _Preset({"two-segment": 2.0, "three-segment": 2.0, "exponential": 2.0}, 8.0),
@@ -72,7 +73,7 @@ PRESETS = {
 
 
 class AdaptiveFactor(NoiseAdaptation):
-    """Divides R, or P, by a factor ``a`` in (0, 1] that falls as a statistic of the innovation grows.
+    """Divides R or P by a factor ``a`` in (0, 1] that decreases when a statistic of the innovation increases.
 
     Zhan et al. (2026), PLoS One 21(2) e0342016, eqs. 23-36; Yang and Gao (2006), J. Geodesy 80. With the
     innovation v of m components, ``S = H P H' + R``, the correction dx and the residual e after the update:
@@ -85,35 +86,37 @@ class AdaptiveFactor(NoiseAdaptation):
     ratio        s_x^2 / s_0^2     (32-33)     sqrt(s_x^2 / mean s_0^2)
     ===========  ============================  ==========================================================
 
-    with ``s_x^2 = dx' P^-1 dx / r_x`` and ``s_0^2 = e' R^-1 e / r``, ``r = m - r_x``. Eq. 30 compares the posterior
-    with the prediction and adds metres to radians; eq. 31 as printed is a length and fires nearly always; the ratio
-    of one epoch is 1 whatever happens where m = 1, so that the default compares with the mean s_0^2 of about the last
-    20 epochs. The factor functions are eqs. 34-36 (`FACTORS`); a is floored at 1e-3, since eq. 35 gives 0 and eq. 28
-    divides by it.
+    with ``s_x^2 = dx' P^-1 dx / r_x`` and ``s_0^2 = e' R^-1 e / r``, ``r = m - r_x``. H is the Jacobian, P the
+    covariance of the prediction and R that of the measurement noise; tr is the trace.
 
-    ``target="P"`` is eq. 28: P/a, for each measurement. ``target="R"`` is what the text does in the end ("the adaptive
-    factor can be used to inflate the measurement noise"): R/a by instrument; with the residual statistic and the
-    three-segment function these are IGG-III weights. By default it also doubts the prediction, when a fix and a log
-    have failed ``together`` times running: then R stands, and the covariance of position, velocity and attitude is
-    inflated (`ErrorModel.loosen`), but not that of the instruments' errors, which do not change because the vessel
-    moves otherwise. `PredictionTest` also limits every inflation: eq. 28 with ten gross errors in a row would multiply
-    by 1e30 what nothing observes. The covariance is Joseph's with the noise and P in use (eq. 29's first line lacks
-    the factor).
+    The defaults differ from the print for these reasons: eq. 30 compares the posterior with the prediction and adds
+    metres to radians. Eq. 31 as printed is a length and nearly always exceeds its threshold. The ratio of one epoch is
+    always 1 for m = 1, so the default compares with the mean s_0^2 of about the last 20 epochs. The factor functions
+    are eqs. 34-36 (`FACTORS`). a is at least 1e-3, because eq. 35 gives 0 and eq. 28 divides by a.
+
+    ``target="P"`` is eq. 28: P/a, for each measurement. ``target="R"`` follows the text of the paper ("the adaptive
+    factor can be used to inflate the measurement noise"): R/a for each instrument; with the residual statistic and the
+    three-segment function these are IGG-III weights. By default the prediction is tested, too. If a fix and a log have
+    failed their tests ``together`` times in a row, the prediction is taken as wrong: R is not changed, and the
+    covariance of position, velocity and attitude is inflated (`ErrorModel.loosen`). The covariance of the instruments'
+    errors is not inflated, because these do not depend on the motion. `PredictionTest` also limits every inflation:
+    eq. 28 with ten gross errors in a row would multiply the variances of unobserved states by 1e30. The covariance is
+    updated in Joseph's form with the noise and P in use (the first line of eq. 29 lacks the factor).
 
     Parameters
     ----------
     statistic : "discrepancy", "residual" or "ratio"
-        Of the innovation, as in the table.
+        Statistic of the innovation, as in the table.
     factor : "two-segment", "three-segment" or "exponential"
-        The function of the statistic that the factor follows: eq. 34, 35 or 36.
+        Function from the statistic to the factor: eq. 34, 35 or 36.
     target : "R" or "P"
-        What is divided by the factor: the noise of the measurement, or the covariance of the prediction.
+        The matrix that is divided by the factor: the noise of the measurement, or the covariance of the prediction.
     preset : "default" or "paper"
-        ``paper``: statistics and thresholds as printed, no doubt of the prediction with target R.
+        ``paper``: statistics and thresholds as printed, and no test of the prediction with target R.
     c0, c1 : float or None
-        Thresholds; None: the preset's (paper: c = 1; c0 = 1.5, c1 = 4).
+        Thresholds of the factor function; None: those of the preset (paper: c = 1; c0 = 1.5, c1 = 4).
     together : int
-        How many times running a fix and a log have to fail before it is the prediction that is doubted; 0: never.
+        Number of times in a row that a fix and a log must fail before the prediction is taken as wrong; 0: never.
     """
 
     SMALLEST = 1e-3

@@ -1,10 +1,11 @@
 """GNSS noise from a neuro-fuzzy network (ANFIS): a reconstruction of Jiang et al. (2026).
 
-Section 3 of the paper, the ANFIS itself, is missing from the text at hand. Known are: a five-layer first-order network,
-fed with features of the present moment (of the ship's motion), that gives the covariance of the GNSS. Reconstructed
-after Jang 1993 (`simnav.estimators.adaptations.sugeno`, `simnav.estimators.training.hybrid_learning`): three inputs
-with three Gaussian memberships, 27 rules. The output is the logarithm of the variance over the datasheet's. What it
-learns from is in `simnav.estimators.training.anfis_training`; `simnav train anfis` learns it again.
+Section 3 of the paper, which defines the ANFIS, is missing from the text at hand. The paper says elsewhere that it is a
+five-layer first-order network, that its inputs are features of the present motion of the ship, and that its output is
+the covariance of GNSS. The reconstruction follows Jang 1993 (`simnav.estimators.adaptations.sugeno`,
+`simnav.estimators.training.hybrid_learning`): three inputs with three Gaussian memberships each, 27 rules. The output
+is the logarithm of the variance divided by that of the datasheet. The training data are described in
+`simnav.estimators.training.anfis_training`; `simnav train anfis` repeats the training.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ __all__ = ["Anfis", "Features", "Motion"]
 class Motion:
     """Speed, turn rate and change of speed, from the predicted readings of compass and log.
 
-    Measured less innovation is the prediction, in which the filter has smoothed the instrument's noise already; its
-    differences, through a first-order low pass, are the rates. All of it is known before the fix that it is used for.
-    The first compass and the first log (or DVL) of the run are used.
+    The prediction of a reading is the measurement minus the innovation. In it the filter has smoothed the noise of the
+    instrument. The rates are its differences, filtered by a first-order low-pass filter. They are known before the fix
+    for which they are used. The first compass and the first log (or DVL) of the run are used.
 
     Parameters
     ----------
@@ -39,10 +40,10 @@ class Motion:
     Attributes
     ----------
     speed, turn_rate, change_of_speed : float
-        [m/s], [rad/s], [m/s^2], without sign; NaN where there is no instrument to tell, or not yet.
+        Absolute values [m/s], [rad/s], [m/s^2]; NaN without such an instrument, or before its first measurements.
     """
 
-    SMOOTHING = 5.0  # s; of the low pass
+    SMOOTHING = 5.0  # s; time constant of the low-pass filter
 
     def __init__(self, instruments: Instruments):
         headings, speeds = instruments.of_equation(HEADING), instruments.of_equation(WATER_SPEED, BODY_VELOCITY)
@@ -82,20 +83,21 @@ class Motion:
 class Features:
     """The inputs of the network, at each fix.
 
-    - ``innovation``: ``ln(1 + sqrt(v' S^-1 v / m))`` of the fix's m components, S with the datasheet's noise. The
-      logarithm, since what is to be told apart lies between 1 and 5 sigma, and gross errors reach 30.
-    - ``recent_innovations``: its fading mean, the present one included.
-    - ``speed``, ``turn_rate``, ``change_of_speed``: of `Motion`.
+    - ``innovation``: ``ln(1 + sqrt(v' S^-1 v / m))`` of the innovation v of the fix with m components; S is its
+      covariance with the datasheet's noise. The logarithm is used because most innovations to be distinguished are
+      between 1 and 5 sigma, while gross errors reach 30.
+    - ``recent_innovations``: the fading mean of ``innovation``, including the present one.
+    - ``speed``, ``turn_rate``, ``change_of_speed``: from `Motion`.
 
     Parameters
     ----------
     features : str
-        Key of `FEATURES`.
+        Name of the set of inputs, a key of `FEATURES`.
     instruments : Instruments
         Datasheets of the run's instruments.
     """
 
-    MEMORY = 10.0  # s; of the fading mean
+    MEMORY = 10.0  # s; time constant of the fading mean
 
     def __init__(self, features: str, instruments: Instruments):
         self._names = FEATURES[features]
@@ -103,7 +105,7 @@ class Features:
         self._recent: dict[str, tuple[float, float]] = {}
 
     def observe(self, innovation: Innovation) -> list[float] | None:
-        """Update from an innovation; return the n inputs for a fix of GNSS, and None for other measurements."""
+        """Update from an innovation; return the n inputs for a GNSS fix, or None for other measurements."""
         m = innovation.measurement
         if KINDS[m.kind].equation != POSITION:
             self._motion.observe(innovation)
@@ -117,19 +119,20 @@ class Features:
 
 
 class Anfis(NoiseAdaptation):
-    """The noise of GNSS fixes, scaled by the network (reconstruction of Jiang et al. 2026).
+    """Scales the noise of GNSS fixes by the network (reconstruction of Jiang et al. 2026).
 
-    Inputs beyond what training saw are clipped to it; an input that is not known (no compass, no log) is the median of
-    training. Every component of a fix is scaled alike. Other instruments keep their nominal noise.
+    Inputs beyond the range of the training data are clipped to it. An unknown input (no compass, no log) is replaced by
+    the median of the training data. All components of a fix have the same factor. Other instruments keep their nominal
+    noise.
 
     Parameters
     ----------
     features : "innovation", "motion" or "recent"
-        The set of inputs: the innovation beside the motion; the motion only; the innovation beside those before it.
+        The set of inputs: innovation and motion; motion only; or innovation and earlier innovations.
     file : str
-        Parameter file of `simnav train anfis`; empty for the one that comes with the package.
+        Parameter file of `simnav train anfis`; empty: the file that comes with simnav.
     lowest, highest : float
-        Bounds of the sigma in units of the datasheet's, as of `EstimatedNoise`.
+        Bounds of the sigma, as multiples of the datasheet's sigma.
 
     Raises
     ------

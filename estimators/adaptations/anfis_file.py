@@ -22,12 +22,12 @@ FEATURES: dict[str, tuple[str, ...]] = {
     "motion": ("speed", "turn_rate", "change_of_speed"),
     "recent": ("innovation", "recent_innovations", "turn_rate"),
 }
-#: Of the file; raised when it changes.
+#: Version of the format of the file. It is increased when the format changes.
 FORMAT = 1
 
 
 class ParametersError(ValueError):
-    """A parameter file that cannot be used; the message names file and field."""
+    """A parameter file cannot be used. The message names the file and the field."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +37,17 @@ class Parameters:
     Attributes
     ----------
     features : str
-        Key of `FEATURES`.
+        Name of the set of inputs, a key of `FEATURES`.
     low, high : (n,) array
-        Range of each input in training; a network sees inputs clipped to it and scaled to [0, 1].
+        Range of each input in the training data. Inputs are clipped to it and scaled to [0, 1].
     typical : (n,) array
-        Median of each input in training: stands for one that is not known.
+        Median of each input in the training data; it replaces an unknown input.
     largest : float
-        Largest log variance factor in training; the output is held in [0, largest].
+        Largest log variance factor in the training data; the output is limited to [0, largest].
     network : Sugeno
-        The trained network.
+        The trained network with n inputs.
     record : dict
-        How it was learnt: command, seeds, errors, version of the simulator.
+        Record of the training: command, seeds, errors, version of the simulator.
     """
 
     features: str
@@ -59,13 +59,13 @@ class Parameters:
     record: dict[str, Any] = field(default_factory=dict)
 
     def scale(self, x: Array) -> Array:
-        """(k, n) inputs as the network sees them; NaN is the typical value."""
+        """Scale (k, n) inputs to [0, 1]; NaN is replaced by the typical value."""
         known = np.where(np.isnan(x), self.typical, x)
         scaled: Array = (np.clip(known, self.low, self.high) - self.low) / (self.high - self.low)
         return scaled
 
     def log_factor_of(self, row: list[float]) -> float:
-        """Logarithm of the variance over the datasheet's, of one row of inputs."""
+        """Logarithm of the variance divided by the datasheet's, from one row of inputs."""
         scaled = [
             (min(max(typical if x != x else x, low), high) - low) / (high - low)
             for x, (low, high, typical) in zip(row, self._ranges)
@@ -104,7 +104,7 @@ class Parameters:
         Raises
         ------
         ParametersError
-            If it is absent, no such file, or a field in it is missing or wrong.
+            If the file does not exist, is not a parameter file, or a field is missing or wrong.
         """
         try:
             document = json.loads(path.read_text(encoding="utf-8"))

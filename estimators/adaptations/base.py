@@ -21,11 +21,12 @@ class Innovation(NamedTuple):
     predicted : (m, m) array
         H P H', the covariance of the prediction.
     noise : (m, m) array
-        R, of the measurement.
+        R, the covariance of the measurement noise.
     covariance : (n, n) array or None
-        P, of the model's error before the measurement; to be read, not changed.
+        P, the covariance of the model's error before the measurement. It must not be changed. None if the solver has
+        no such matrix.
     cross : (n, m) array or None
-        P H'.
+        P H', the covariance between the model's error and the prediction; None if ``covariance`` is None.
     """
 
     measurement: Measurement
@@ -37,9 +38,9 @@ class Innovation(NamedTuple):
 
 
 class Adaptation:
-    """Base of all adaptations: uses every measurement with the noise of the model.
+    """Base class of all adaptations. It uses every measurement with the noise of the model.
 
-    One that gates by a chi-square test::
+    An adaptation that rejects measurements by a chi-square test::
 
         class Gate(Adaptation):
             def adapt(self, innovation):
@@ -50,11 +51,11 @@ class Adaptation:
     Attributes
     ----------
     inflation : float
-        What the solver inflates the prediction by before it uses the measurement that `adapt` has just seen; for those
-        who doubt the prediction rather than the measurement.
+        Factor by which the solver multiplies the covariance of the prediction, before it uses the measurement of the
+        last call of `adapt`. Adaptations use it if the prediction is wrong and not the measurement.
     inflates : bool
-        Whether all of P is multiplied by ``inflation``. A window keeps no covariance of a prediction to multiply, and
-        refuses such an adaptation.
+        True if all of P is multiplied by ``inflation``. A window has no covariance of a prediction, and refuses such
+        an adaptation.
     inflates_motion : bool
         Whether the covariance of the motion is inflated, and no other (`ErrorModel.loosen`). A window weighs motion by
         its own residuals, and leaves this out.
@@ -68,12 +69,12 @@ class Adaptation:
     reads_truth: ClassVar[bool] = False
 
     def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
+        """Start a run."""
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """The (m, m) noise to use, or None to leave the measurement out; it is then flagged as faulty."""
+        """Return the (m, m) noise to use, or None to reject the measurement, which is then flagged as faulty."""
         return innovation.noise
 
     def diagnostics(self) -> dict[str, float | Array]:
-        """Named values of the last step, recorded by epoch."""
+        """Named values of the last step, which are recorded at each epoch."""
         return {}

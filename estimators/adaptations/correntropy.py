@@ -29,18 +29,18 @@ def correntropy_noise(
     predicted, nominal : (m, m) arrays
         H P H' and R.
     bandwidth, smallest : float
-        Bandwidth of the kernel in sigma, and the least weight of a measurement.
+        Bandwidth of the kernel [sigma], and the smallest weight of a measurement.
     iterations : int
-        Number of fixed-point iterations.
+        Largest number of fixed-point iterations.
     from_update : bool
-        Begin with the residual after the plain update, not with the innovation.
+        True: start from the residual after the plain update; False: from the innovation.
     noise : (m, m) array
-        Overwritten with R over the weights.
+        Overwritten with R divided by the weights.
 
     Returns
     -------
     float
-        The least weight.
+        The smallest weight of a component.
     """
     m = innovation.size
     residual, weights, after = innovation.copy(), np.zeros(m), np.empty((m, m))
@@ -58,7 +58,7 @@ def correntropy_noise(
             for j in range(m):
                 noise[i, j] = nominal[i, j] / sqrt(weights[i] * weights[j])
         if least > 0.7 or settled or k == iterations - 1:
-            break  # another round would hardly change them
+            break  # a further iteration would hardly change the weights
         posterior(innovation, predicted, noise, residual, after)
     return least
 
@@ -69,23 +69,23 @@ class MaximumCorrentropy(NoiseAdaptation):
     Chen, Liu, Zhao and Principe (2017), "Maximum correntropy Kalman filter", Automatica 76, algorithm 1. A residual is
     standardised by R, which is divided by the weights; then the update, and the weights, are computed again.
 
-    Two things differ from the print. It weights the components of the prediction error too; while the measurement is
-    not believed, these are near zero and their weights one, so that they are left at one. And it starts from the
-    prediction, which locks a filter out whose P is large against R (any measurement after an outage looks absurd next
-    to R): the default starts from the plain Kalman update; ``begin="prediction"`` is as printed. P is that of the
-    noise in use, not of the nominal one with the smaller gain, which would promise more than an ignored measurement
-    gives.
+    There are three differences from the printed algorithm. The print also weights the components of the prediction
+    error; while a measurement has a small weight these components are near zero and their weights are one, so they stay
+    at one here. The print starts from the prediction. If P is much larger than R, as after an outage, every measurement
+    then gets a small weight and the filter does not recover. So the default starts from the plain Kalman update;
+    ``begin="prediction"`` is as printed. The updated P follows from the noise in use; with the nominal noise and the
+    smaller gain it would be too small.
 
     Parameters
     ----------
     bandwidth : float
-        In sigma; the filter is the plain one as it grows.
+        Bandwidth of the Gaussian kernel [sigma]. With a large bandwidth the filter is the plain one.
     iterations : int
-        Most iterations of a measurement.
+        Largest number of iterations for a measurement.
     smallest : float
-        Least weight.
+        Smallest weight of a residual, in (0, 1].
     begin : "update" or "prediction"
-        Whether the first weights are those of the residual after the plain update, or of the innovation.
+        The first weights are those of the residual after the plain update, or those of the innovation.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class MaximumCorrentropy(NoiseAdaptation):
         self.bandwidth, self.iterations, self.smallest, self.begin = bandwidth, iterations, smallest, begin
 
     def choose(self, innovation: Innovation) -> Array:
-        """The noise over the weights; reports the least of them."""
+        """The noise divided by the weights; the smallest weight is reported."""
         nominal = innovation.noise
         noise: Array = np.empty((len(nominal), len(nominal)))
         least = correntropy_noise(

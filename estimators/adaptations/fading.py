@@ -12,15 +12,16 @@ __all__ = ["FadingMemory"]
 
 
 class FadingMemory(NoiseAdaptation):
-    """Old information loses weight as ``exp(-age/memory)``.
+    """The weight of old information decreases as ``exp(-age/memory)``.
 
-    Simon (2006), section 7.4: ``P <- a^2 F P F' + Q``, here with ``a^2 = exp(dt/memory)``, so that the memory does not
-    depend on how many instruments there are. P is inflated when a measurement comes.
+    Simon (2006), section 7.4: ``P <- a^2 F P F' + Q``, with the covariance P, the transition matrix F and the process
+    noise Q; here with ``a^2 = exp(dt/memory)`` for the time dt since the last measurement, so that the memory does not
+    depend on the number of instruments. P is inflated before a measurement is used.
 
     Parameters
     ----------
     memory : float
-        Time in which information loses a factor of e of its weight [s].
+        Time in which the weight of information decreases by a factor of e [s].
     """
 
     together = 0

@@ -11,19 +11,19 @@ __all__ = ["ChiSquareGate"]
 
 
 class ChiSquareGate(NoiseAdaptation):
-    """Leaves out a measurement whose normalised innovation squared fails its chi-square test.
+    """Rejects a measurement whose normalised innovation squared fails its chi-square test.
 
-    Bar-Shalom, Li and Kirubarajan (2001), section 5.4; Groves (2013), section 17.3.1. A gate alone can lock a filter
-    out for ever: once it is wrong and sure, every good measurement fails. So where an instrument has failed for
-    ``patience`` seconds without a pass, it is the filter that is doubted: its measurements are used again, until one
-    passes.
+    Bar-Shalom, Li and Kirubarajan (2001), section 5.4; Groves (2013), section 17.3.1. With a gate alone a filter with a
+    wrong state and a small covariance never recovers, because every good measurement fails the test. So if all
+    measurements of an instrument have failed for ``patience`` seconds, the filter is taken as wrong: its measurements
+    are used again until one of them passes.
 
     Parameters
     ----------
     probability : float
-        Of a good measurement to pass.
+        Probability that a good measurement passes the test.
     patience : float
-        Time without a pass after which the filter is doubted [s].
+        Time without a passed test after which the measurements of an instrument are used again [s].
     """
 
     together = 0

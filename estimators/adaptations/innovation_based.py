@@ -26,19 +26,19 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
     nominal : float
         Trace of the nominal innovation covariance, in the same unit.
     low, high : float
-        v_min and v_max, which the paper does not give, as multiples of ``nominal``.
+        v_min and v_max of eq. 20, as multiples of ``nominal``. The paper does not give them.
     shortest, longest : int
-        M_min and M_max.
+        M_min and M_max, the smallest and largest length of the window [innovations].
     """
     if variance > high * nominal:
         return longest
     return (shortest + longest) // 2 if variance > low * nominal else shortest
 
 
-#: Of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
+#: Columns of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
 @kernel("void(f8[:, ::1], i8, f8[::1], f8[::1], f8, f8[:, ::1])")
 def _push(rows: Array, count: int, innovation: Array, residual: Array, sign: float, predicted: Array) -> None:
-    """Write the row of one epoch over the oldest."""
+    """Overwrite the oldest row with that of the present epoch."""
     m, row = innovation.size, rows[count % rows.shape[0]]
     at = m
     for i in range(m):
@@ -69,18 +69,18 @@ def _average(
     Parameters
     ----------
     rows : (r, ...) array
-        Ring of what `_push` wrote, one row an epoch.
+        Ring buffer of the rows of `_push`, one row for each epoch.
     count : int
-        Epochs so far; the last r of them are there.
+        Number of epochs so far; the last r of them are in the buffer.
     predicted, nominal : (m, m) arrays
         H P H' and R.
     window : (int, int, float, float)
-        Shortest and longest length of the window, equal for a fixed one; bounds of the ratio of variances between which
-        the length is adapted.
+        Smallest and largest length of the window (equal for a fixed one); bounds v_min and v_max of the ratio of
+        variances between which the length is adapted.
     newest : bool
-        Subtract the newest H P H' from all epochs, not to each its own.
+        True: subtract the newest H P H' from all epochs; False: from each epoch its own.
     forgetting : float
-        Share of the mean in the new estimate.
+        Weight of the mean in the new estimate (a of eq. 18).
     estimate : (m, m) array
         The last estimate of R; updated.
 
@@ -112,7 +112,7 @@ def _average(
 
 @cache
 def _contradiction(length: int, significance: float) -> tuple[float, float]:
-    """Means of ``length`` squares of unit normals below and above which each has the probability ``significance``."""
+    """Lower and upper limit of the mean of ``length`` squared unit normals, each with the tail ``significance``."""
     if significance >= 1.0:
         return np.inf, 0.0
     from scipy.special import chdtri
@@ -121,7 +121,7 @@ def _contradiction(length: int, significance: float) -> tuple[float, float]:
 
 
 class _Window:
-    """The last rows of one instrument, in a ring; how many there ever were; and the last estimate, for eq. 18."""
+    """Ring buffer of the last rows of one instrument, the number of all rows, and the last estimate, for eq. 18."""
 
     __slots__ = ("count", "estimate", "rows")
 
@@ -130,46 +130,47 @@ class _Window:
         self.estimate: Array | None = None
 
     def push(self, innovation: Array, residual: Array, sign: float, predicted: Array) -> None:
-        """Keep a row; the oldest goes."""
+        """Store a row in place of the oldest one."""
         _push(self.rows, self.count, innovation, residual, sign, predicted)
         self.count += 1
 
 
 class InnovationBased(EstimatedNoise):
-    """R as the mean over a window, of fixed or adaptive length.
+    """Estimates R as a mean over a window of fixed or adaptive length.
 
     Mehra (1970), Mohamed and Schwarz (1999); Mao, Wang and Fu (2025), eqs. 16-20. For the M last innovations v::
 
         innovation:  R = 1/M sum(v v') - H P H'           (eqs. 16-17)
-        residual:    R = 1/M sum(e e' + H P+ H')          e: residual after the update; positive definite always
+        residual:    R = 1/M sum(e e' + H P+ H')          e: residual after the update; always positive definite
 
-    The residual of an epoch is known when its noise is: there the window ends one epoch earlier. Then
-    ``R <- (1 - a) R_before + a R`` (eq. 18). The text of the paper suggests memory, the equation gives the new estimate
-    the weight a = 0.9; the figures of its Table 2 agree with the equation, so it is built as printed. Eq. 17 subtracts
-    the newest H P H'; the default subtracts from each v v' the H P H' of its own epoch, which is the same in steady
-    state and unbiased outside of it (after the start, in an outage). While the window is not full, the nominal R stands
-    for what it lacks. Eq. 20 (`adaptive_window`) compares the scatter of the innovations with multiples of the nominal
-    trace. The filter uses the estimate within bounds; eq. 17 alone is often not positive definite.
+    H P H' is the covariance of the prediction and H P+ H' that after the update. The residual of an epoch is known only
+    after its noise, so with residuals the window ends one epoch earlier. Then ``R <- (1 - a) R_before + a R`` (eq. 18).
+    The text of the paper suggests a long memory, but in the equation the new estimate has the weight a = 0.9. The
+    figures of Table 2 agree with the equation, so it is used as printed. Eq. 17 subtracts the newest H P H'. The
+    default subtracts from each v v' the H P H' of its own epoch; this is the same in steady state, and unbiased
+    otherwise (after the start, in an outage). While the window is not full, the nominal R is used for the missing rows.
+    Eq. 20 (`adaptive_window`) compares the scatter of the innovations with multiples of the nominal trace. The filter
+    uses the estimate within bounds, because eq. 17 alone is often not positive definite.
 
-    The datasheet stands until the innovations contradict it: where the mean squares in the window are those that it
-    makes probable, by chi-square of M degrees of freedom, component by component, the nominal R is used. An estimate
-    from ten innovations scatters by 45 %, and using it where nothing is wrong costs accuracy.
+    The datasheet is used until the innovations contradict it: for each component, if the mean square in the window is
+    probable by chi-square with M degrees of freedom, the nominal R is used. An estimate from ten innovations scatters
+    by 45 %, so its use without a fault would increase the error.
 
     Parameters
     ----------
     source : "innovation" or "residual"
-        What the noise is estimated from: innovations, or residuals after the update.
+        Data of the estimate: innovations, or residuals after the update.
     shortest, longest : int
-        M_min and M_max; equal for a fixed window.
+        Smallest and largest length of the window [innovations], M_min and M_max of eq. 20; equal for a fixed window.
     low, high : float
-        v_min and v_max in units of the nominal trace.
+        Bounds v_min and v_max of eq. 20, as multiples of the nominal trace.
     forgetting : float
-        a, in (0, 1].
+        Weight a of the new estimate in eq. 18, in (0, 1].
     newest : bool
-        True: eq. 17 as printed.
+        True: subtract the newest H P H' from all epochs, eq. 17 as printed.
     significance : float
-        Probability with which a sound instrument contradicts its datasheet, for one component on one side, in (0, 1];
-        1: the estimate is always used, as printed.
+        Probability that the test rejects the datasheet of a healthy instrument, for one component on one side, in
+        (0, 1]; 1: the estimate is always used, as printed.
     """
 
     def __init__(
@@ -220,12 +221,12 @@ class InnovationBased(EstimatedNoise):
         return self._believed(self._mean(name, window, innovation), innovation)
 
     def _believed(self, estimate: Array, innovation: Innovation) -> Array:
-        """An estimate within its bounds, or the nominal noise, if the innovations do not contradict that."""
+        """The bounded estimate, or the nominal noise if the innovations do not contradict it."""
         nominal = innovation.noise
         low, high = _contradiction(self._length, self.significance)
         variances = (m.diagonal().tolist() for m in (estimate, nominal, innovation.predicted))
         for found, noise, predicted in zip(*variances, strict=True):
-            # Variance of what is squared: an innovation, or a residual, which is R S^-1 times it.
+            # Variance of the squared quantity: an innovation, or a residual, which is R S^-1 times the innovation.
             variance = noise + predicted if self.source == "innovation" else noise * noise / (noise + predicted)
             if not low <= 1.0 + (found - noise) / variance <= high:
                 return self.bounded(estimate, nominal)
@@ -247,12 +248,12 @@ class InnovationBased(EstimatedNoise):
 
 
 class FixedWindow(InnovationBased):
-    """R as the mean over a fixed number of innovations; in a graph, IAE-FGO-Fix of Mao, Wang and Fu (2025).
+    """Estimates R as the mean over a fixed number of innovations; in a graph, IAE-FGO-Fix of Mao, Wang and Fu (2025).
 
     Parameters
     ----------
     innovations : int
-        M of eq. 17.
+        Number of innovations in the window, M of eq. 17.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Base classes of adaptations of the noise: report of the sigma in use, bounds of an estimate, and the posterior."""
+"""Base classes of adaptations that change the noise: report of the sigma in use, bounds of an estimate, posterior."""
 
 from __future__ import annotations
 
@@ -21,25 +21,26 @@ Scope = Literal["fixes", "all"]
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
 def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array, after: Array) -> float:
-    """Residual ``v - H P H' S^-1 v`` and ``H P+ H'`` after an update with ``S = H P H' + R``.
+    """Residual and covariance of the prediction after an update, in the m components of the measurement.
 
-    A state of m components observed directly is the same problem, so the solver's own kernel computes it.
+    With ``S = H P H' + R`` they are ``v - H P H' S^-1 v`` and ``H P+ H' = H P H' - H P H' S^-1 H P H'``. This is the
+    update of a state of m components that is observed directly, so the kernel of the solver computes it.
 
     Parameters
     ----------
     innovation : (m,) array
-        Measurement minus its prediction.
+        v, the measurement minus its prediction.
     predicted, noise : (m, m) arrays
-        H P H' and R.
+        H P H' (covariance of the prediction) and R (covariance of the measurement noise).
     residual : (m,) array
-        Overwritten.
+        Overwritten with the residual after the update.
     after : (m, m) array
-        Overwritten.
+        Overwritten with H P+ H'.
 
     Returns
     -------
     float
-        Normalised innovation squared; -1 where S is singular: then nothing is corrected.
+        Normalised innovation squared ``v' S^-1 v``; -1 if S is singular, and then there is no update.
     """
     m = innovation.size
     spread = np.empty((m, m))
@@ -55,7 +56,7 @@ def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
 def normalised_square(innovation: Array, predicted: Array, noise: Array) -> float:
-    """Normalised innovation squared ``v' S^-1 v``, ``S = H P H' + R``; -1 where S is singular."""
+    """Normalised innovation squared ``v' S^-1 v`` with ``S = H P H' + R``; -1 if S is singular."""
     m = innovation.size
     return posterior(innovation, predicted, noise, np.empty(m), np.empty((m, m)))
 
@@ -94,18 +95,18 @@ class Posterior:
     Parameters
     ----------
     innovation : Innovation
-        The innovation that is used.
+        The innovation, with the covariance of its prediction.
     noise : (m, m) array
-        Covariance of the measurement noise R.
+        Covariance R of the measurement noise in the update.
 
     Attributes
     ----------
     nis : float
-        -1 where S is singular; then nothing is corrected.
+        Normalised innovation squared; -1 if S is singular, and then there is no update.
     residual : (m,) array
         Measurement minus its prediction after the update.
     predicted : (m, m) array
-        H P+ H'.
+        H P+ H', the covariance of the prediction after the update.
     """
 
     __slots__ = ("nis", "predicted", "residual")
@@ -117,7 +118,7 @@ class Posterior:
 
 
 def scaled(noise: Array, factors: list[float]) -> Array:
-    """A covariance of up to three components, the variance of the i-th times ``factors[i]``, correlations kept."""
+    """A covariance of up to three components with variance i times ``factors[i]`` and the same correlations."""
     if min(factors) == max(factors) == 1.0:
         return noise
     product: Array = np.empty((len(noise), len(noise)))
@@ -128,19 +129,18 @@ def scaled(noise: Array, factors: list[float]) -> Array:
 
 class NoiseAdaptation(Adaptation):
     """An adaptation that reports the sigma that it used: ``sigma_<component>.<instrument>``, for example
-    ``sigma_north.gnss``; a subclass gives `choose`.
+    ``sigma_north.gnss``; a subclass defines `choose`.
 
-    Before an instrument's first measurement its datasheet's sigma stands. Where the prediction is at fault
-    (`PredictionTest`), the nominal noise is used, and the adaptation does not see the innovation: the filter is then
-    the plain one.
+    Before the first measurement of an instrument, the sigma of its datasheet is reported. If the prediction is wrong
+    (`PredictionTest`), the nominal noise is used and `choose` is not called: the filter is then the plain one.
 
     Attributes
     ----------
     together : int
-        See `PredictionTest`; 0: the prediction is never at fault.
+        Number of joint failures after which the prediction is taken as wrong, see `PredictionTest`; 0: never.
     inflates_motion : bool
-        Whether the motion is inflated besides, where the prediction is at fault. Only `AdaptiveFactor` does: it helps
-        where an IMU is disturbed, and does harm where it was two instruments after all.
+        True if the covariance of the motion is also inflated when the prediction is wrong. Only `AdaptiveFactor` does
+        this. It helps if an IMU is disturbed, and it is harmful if two instruments are wrong instead.
     """
 
     together = 3
@@ -157,14 +157,14 @@ class NoiseAdaptation(Adaptation):
 
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:
-        """The (m, m) noise to use, or None to leave the measurement out."""
+        """The (m, m) noise to use, or None to reject the measurement."""
 
     def report(self, label: str, value: float) -> None:
-        """Set a diagnostic; it keeps its value until it is set again."""
+        """Set a diagnostic. It keeps its value until the next call."""
         self._report[label] = value
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """Call `choose` and record its sigma; an instrument without noise keeps its noise."""
+        """Call `choose` and record the sigma of its result. An instrument without noise is not adapted."""
         self.inflation = 1.0
         name = innovation.measurement.instrument
         if innovation.noise is not self._noisy.get(name):
@@ -188,30 +188,30 @@ class NoiseAdaptation(Adaptation):
 
 
 class EstimatedNoise(NoiseAdaptation):
-    """Base of adaptations that estimate R: keeps the estimate within bounds. A subclass gives `estimate`.
+    """Base class of adaptations that estimate R and keep it within bounds. A subclass defines `estimate`.
 
-    An innovation has the covariance ``H P H' + R``. It says little about R if the prediction is less certain than the
-    measurement: after a start with a poor heading, in an outage, or with positions of centimetre accuracy. Then the
-    noise used last is kept, and the innovation is not used for the estimate. Without this rule ``iae-fgo`` has up to
-    twice the error of ``sw-fgo`` on random voyages without faults.
+    An innovation has the covariance ``H P H' + R``. It contains little information on R if the prediction is less
+    certain than the measurement: after a start with a poor heading, in an outage, or with positions of centimetre
+    accuracy. Then the last noise is kept, and the innovation is not used for the estimate. Without this rule
+    ``iae-fgo`` has up to twice the error of ``sw-fgo`` on random voyages without faults.
 
     Parameters
     ----------
     lowest, highest : float
-        The estimated sigma stays between these multiples of the nominal one (for a full matrix: the roots of its
-        eigenvalues, in units of the nominal variances). By default never below the datasheet: an instrument at its best
-        is what that describes, and an estimate from ten innovations scatters by 45 %, half of it downwards.
+        Bounds of the estimated sigma, as multiples of the nominal one (for a full matrix: of the square roots of its
+        eigenvalues, in units of the nominal variances). By default the estimate is never below the datasheet, which
+        describes the instrument without faults; an estimate from ten innovations scatters by 45 % in both directions.
     full : bool
-        False: variances only, with the nominal correlations. An instrument's components err independently by its
-        datasheet, and m (m - 1)/2 covariances that are zero cost accuracy to estimate.
+        False: only the variances are estimated, with the nominal correlations. By its datasheet the components of an
+        instrument have independent errors, and the estimation of m (m - 1)/2 zero covariances costs accuracy.
     scope : "fixes" or "all"
-        Whose noise is estimated: GNSS positions and terrain fixes (as in Mao, Wang and Fu 2025), or every instrument's.
-        With fixes only, a log that is wrong is believed in full, and the fixes that contradict it are doubted.
+        The instruments whose noise is estimated: GNSS positions and terrain fixes (as in Mao, Wang and Fu 2025), or
+        all. With fixes only, a wrong log has its full weight, and the fixes that contradict it get a smaller weight.
 
     Raises
     ------
     ValueError
-        If the bounds are not 0 < lowest <= highest, or the scope is none.
+        If the bounds are not 0 < lowest <= highest, or the scope is unknown.
     """
 
     def __init__(self, lowest: float, highest: float, full: bool = False, scope: Scope = "all"):
@@ -223,10 +223,10 @@ class EstimatedNoise(NoiseAdaptation):
 
     @abstractmethod
     def estimate(self, innovation: Innovation) -> Array:
-        """The (m, m) noise estimated, within the bounds, this innovation included."""
+        """The (m, m) estimate of the noise within the bounds, including this innovation."""
 
     def choose(self, innovation: Innovation) -> Array:
-        """The estimate; the nominal noise of an instrument out of scope; the last one after a poor prediction."""
+        """The estimate; for an instrument out of scope the nominal noise; for a poor prediction the last noise."""
         if self.scope == "fixes" and KINDS[innovation.measurement.kind].role != "fix":
             return innovation.noise
         before = self._reported.get(innovation.measurement.instrument, innovation.noise)
@@ -235,12 +235,12 @@ class EstimatedNoise(NoiseAdaptation):
         return self.estimate(innovation)
 
     def bounded(self, estimate: Array, nominal: Array) -> Array:
-        """An estimate of R, which may be indefinite, brought within the bounds; its diagonal alone, if not ``full``.
+        """Limit an estimate of R, which may be indefinite, to the bounds; only its diagonal, if not ``full``.
 
         Parameters
         ----------
         estimate, nominal : (m, m) array
-            The estimated and the datasheet's covariance of the noise.
+            Estimated covariance of the noise, and that of the datasheet.
         """
         low, high = self.lowest * self.lowest, self.highest * self.highest
         m = len(nominal)

@@ -17,7 +17,7 @@ __all__ = ["PredictionTest", "standardised"]
 
 @kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")
 def standardised(residual: Array, predicted: Array, noise: Array) -> tuple[float, float, float]:
-    """The components of an innovation, each over its sigma in ``H P H' + R``; zeros up to three."""
+    """The components of an innovation, each divided by its sigma in ``H P H' + R``, with zeros up to three."""
     m = residual.size
     u0 = residual[0] / sqrt(predicted[0, 0] + noise[0, 0])
     u1 = residual[1] / sqrt(predicted[1, 1] + noise[1, 1]) if m > 1 else 0.0
@@ -38,9 +38,9 @@ class PredictionTest:
     instruments : Instruments
         Datasheets of the run's instruments.
     together : int
-        0: never.
+        Number of times in a row that both tests must fail before the prediction is taken as wrong; 0: never.
     probability : float
-        Of a good measurement to pass.
+        Probability that a good measurement passes its test.
     """
 
     RECENT = 5.0  # s; an older failure of another instrument does not count
@@ -90,9 +90,9 @@ class PredictionTest:
         return self.limited(0.5 * sqrt(sum(u * u for u in components) / len(innovation.residual)), innovation)
 
     def limited(self, inflation: float, innovation: Innovation) -> float:
-        """A limited inflation: without it, variances that no measurement observes would grow without bound.
+        """Limit an inflation. Without the limit, the variances of unobserved states would grow without bound.
 
-        At most `LARGEST` at a time, and no variance beyond `TOTAL` times what it was at the first of them.
+        A single inflation is at most `LARGEST`, and no variance exceeds `TOTAL` times its value before the first one.
         """
         if inflation <= 1.0 or innovation.covariance is None:
             return 1.0

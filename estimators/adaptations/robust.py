@@ -44,16 +44,16 @@ class EquivalentWeights(NoiseAdaptation):
 
     Component i of an innovation v with covariance ``S = H P H' + R`` is standardised as ``u = v_i / sqrt(S_ii)``;
     ``R_ij`` becomes ``R_ij / sqrt(w(u_i) w(u_j))``, which keeps the correlations (the two-factor form of Yang, Song and
-    Xu 2002). S and not R standardises, so that a filter that knows itself to be uncertain does not doubt good
-    measurements. A weight is never less than ``smallest``, so that a filter that is wrong
-    itself is still corrected, though slowly.
+    Xu 2002). The innovation is standardised by S and not by R, so that an uncertain filter does not reject good
+    measurements. A weight is at least ``smallest``, so that a filter with a wrong state is still corrected, though
+    slowly.
 
     Parameters
     ----------
     weight : callable
-        Of the standardised innovation; in [0, 1], and no larger for a larger one.
+        Weight in [0, 1] as a function of the standardised innovation; it does not increase with the innovation.
     smallest : float
-        Least weight.
+        Smallest weight of a component, in (0, 1].
     """
 
     def __init__(self, weight: Callable[[float], float], smallest: float = 1e-3):
@@ -62,7 +62,7 @@ class EquivalentWeights(NoiseAdaptation):
         self.weight, self.smallest = weight, smallest
 
     def choose(self, innovation: Innovation) -> Array:
-        """The noise over the weights; reports the least of them."""
+        """The noise divided by the weights; the smallest weight is reported."""
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
         least = max(self.weight(max(map(abs, components))), self.smallest)
         self.report(f"weight.{innovation.measurement.instrument}", least)
@@ -75,12 +75,12 @@ class EquivalentWeights(NoiseAdaptation):
 class HuberWeights(EquivalentWeights):
     """Huber's equivalent weights: the influence of an innovation is bounded at k sigma.
 
-    Huber's k = 1.345 keeps 95 % of the efficiency for each component; it cost up to 8 % of RMSE on clean data.
+    Huber's k = 1.345 has 95 % efficiency for each component; it increases the RMSE by up to 8 % on clean data.
 
     Parameters
     ----------
     k : float
-        In sigma, above 0.
+        Innovation above which the weight is less than 1 [sigma], above 0.
     """
 
     def __init__(self, k: float = 2.0):
@@ -95,7 +95,7 @@ class Igg3Weights(EquivalentWeights):
     Parameters
     ----------
     k0, k1 : float
-        In sigma, ``0 < k0 < k1``.
+        Innovation above which the weight decreases, and innovation at which it is zero [sigma], ``0 < k0 < k1``.
     """
 
     def __init__(self, k0: float = 2.5, k1: float = 8.0):

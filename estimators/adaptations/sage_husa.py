@@ -12,7 +12,7 @@ __all__ = ["SageHusa"]
 
 @kernel("void(f8[:, ::1], f8, f8[::1], f8[:, ::1])")
 def _fade(estimate: Array, d: float, innovation: Array, predicted: Array) -> None:
-    """The recursion, in place."""
+    """Update the estimate by the recursion of `SageHusa`, in place."""
     for i in range(innovation.size):
         for j in range(innovation.size):
             sample = innovation[i] * innovation[j] - predicted[i, j]
@@ -27,20 +27,20 @@ class SageHusa(EstimatedNoise):
 
         R_k = (1 - d_k) R_(k-1) + d_k (v v' - H P H'),    d_k = (1 - b) / (1 - b^(k + 1)),
 
-    and d_k = 1 / (k + 1) for b = 1. The estimate may leave the positive definite matrices; the recursion goes on with
-    it as it is, which keeps it unbiased, and what the filter uses is brought within bounds. Only R is estimated: Q
-    and R together are not identifiable from one innovation sequence, and the comparison of
-    Mao, Wang and Fu needs R.
+    and d_k = 1 / (k + 1) for b = 1; H P H' is the covariance of the prediction. The estimate may become indefinite. The
+    recursion continues with it, so that it stays unbiased, and the filter uses the estimate limited to its bounds. Only
+    R is estimated: Q and R together are not identifiable from one innovation sequence, and the comparison of Mao, Wang
+    and Fu needs R.
 
-    Mao, Wang and Fu do not print b. Their figures agree with a filter that does not forget (b = 1, the row
-    ``sage-husa-paper``); a fading one is the fair comparison.
+    Mao, Wang and Fu do not print b. Their figures agree with a filter without fading (b = 1, the row
+    ``sage-husa-paper``); a filter with fading is the fair comparison.
 
     Parameters
     ----------
     fading : float
-        b, in (0, 1].
+        Forgetting factor b, in (0, 1]; 1: no fading.
     prior : int
-        How many innovations the datasheet's noise counts for at the start; they fade too.
+        Number of innovations to which the datasheet's noise is equivalent at the start; it fades like them.
     """
 
     def __init__(

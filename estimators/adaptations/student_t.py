@@ -15,7 +15,7 @@ __all__ = ["StudentT", "normalised_trace", "student_weight"]
 
 @kernel("f8(f8[:, ::1], f8[::1], f8[:, ::1])")
 def normalised_trace(noise: Array, residual: Array, spread: Array) -> float:
-    """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A; -1 where R is singular."""
+    """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A (``spread``); -1 if R is singular."""
     m = residual.size
     L, inverse = noise.copy(), np.empty((m, m))
     if not factorise(L, m, 1e-14, np.empty(m)):
@@ -31,7 +31,7 @@ def normalised_trace(noise: Array, residual: Array, spread: Array) -> float:
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8)")
 def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float, iterations: int) -> float:
-    """The weight of a measurement: its noise is R over it (see `StudentT`).
+    """The weight w of a measurement; its noise is R / w (see `StudentT`).
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float
     dof : float
         Degrees of freedom of the t distribution.
     iterations : int
-        Number of iterations between state and weight.
+        Number of alternating updates of state and weight.
     """
     m = innovation.size
     residual, after, used = np.empty(m), np.empty((m, m)), np.empty((m, m))
@@ -61,15 +61,17 @@ def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float
 
 
 class StudentT(NoiseAdaptation):
-    """Every measurement's noise is of Student's t distribution, with the datasheet's covariance for its scale matrix.
+    """The noise of every measurement has Student's t distribution, with the datasheet's covariance R as scale matrix.
 
-    A variable of that distribution is Gaussian with the covariance ``R / w``, where w is gamma distributed,
-    ``w ~ gamma(dof/2, dof/2)``. State and w are estimated in turns, in variational Bayes (with P+ of the last turn)::
+    A variable with this distribution is Gaussian with the covariance ``R / w``, where w is gamma distributed,
+    ``w ~ gamma(dof/2, dof/2)``. By variational Bayes, state and w are estimated alternately (with P+ of the last
+    update)::
 
         w = (dof + m) / (dof + tr(R^-1 (e e' + H P+ H'))),    e: residual after an update with the noise R / w
 
-    Unlike `VariationalBayes` it has no memory: each measurement is judged for itself. With infinitely many degrees of
-    freedom it is the plain filter.
+    for a measurement of m components with the Jacobian H; P+ is the covariance after the update. Unlike
+    `VariationalBayes` it has no memory: each weight depends on one measurement only. With infinitely many degrees of
+    freedom the filter is the plain one.
 
     After the measurement model of Y. Huang, Y. Zhang, N. Li, Z. Wu and J. A. Chambers, *A novel robust Student's
     t-based Kalman filter*, IEEE Trans. Aerospace and Electronic Systems 53(3), 2017; the prediction stays Gaussian.
@@ -81,7 +83,7 @@ class StudentT(NoiseAdaptation):
     dof : float
         Degrees of freedom, above 0: the fewer, the heavier the tails. Infinite: Gaussian.
     turns : int
-        Of state and weight, for a measurement; at least 1.
+        Number of alternating updates of state and weight for a measurement; at least 1.
     """
 
     def __init__(self, dof: float = 8.0, turns: int = 5):
@@ -92,7 +94,7 @@ class StudentT(NoiseAdaptation):
         self.dof, self.turns = min(dof, 1e12), turns
 
     def choose(self, innovation: Innovation) -> Array:
-        """The noise over the weight, which is reported."""
+        """The noise divided by the weight, which is reported."""
         weight = student_weight(innovation.residual, innovation.predicted, innovation.noise, self.dof, self.turns)
         self.report(f"weight.{innovation.measurement.instrument}", weight)
         return np.asarray(innovation.noise / weight)

@@ -33,9 +33,9 @@ class Sugeno:
     Attributes
     ----------
     centres, widths : (n, m) array
-        Of the Gaussian memberships, in the inputs' units; the premise parameters.
+        Centres c and widths s of the Gaussian memberships, in the inputs' units: the premise parameters.
     consequents : (m**n, n + 1) array
-        Slopes and constant of each rule.
+        Slopes p and constant r of each rule.
     """
 
     centres: Array
@@ -44,7 +44,7 @@ class Sugeno:
 
     @classmethod
     def grid(cls, inputs: int, memberships: int = 3) -> Sugeno:
-        """Memberships evenly over [0, 1], neighbours crossing at one half (Jang 1993, section IV); output zero."""
+        """A network with memberships evenly over [0, 1], which cross at one half (Jang 1993, section IV); output 0."""
         centres = np.tile(np.linspace(0.0, 1.0, memberships), (inputs, 1))
         half = 0.5 / (memberships - 1)
         widths = np.full_like(centres, half / np.sqrt(2.0 * np.log(2.0)))
@@ -65,8 +65,9 @@ class Sugeno:
     def weights(self, x: Array) -> Array:
         """Layers 2 and 3: (k, m**n) normalised strengths of (k, n) inputs.
 
-        The sum over all rules of products is the product of the sums: so the grades of each input may be normalised by
-        themselves; by the largest first, so that an input far from all memberships still belongs to the nearest.
+        The sum over all rules of products is the product of the sums, so the grades of each input can be normalised
+        separately. They are divided by the largest first, so that an input far from all memberships belongs to the
+        nearest.
         """
         logs = -0.5 * ((x[:, :, None] - self.centres) / self.widths) ** 2
         shares = np.exp(logs - logs.max(axis=2, keepdims=True))
@@ -87,7 +88,7 @@ class Sugeno:
         return output
 
     def single(self, x: list[float]) -> float:
-        """The output of one input: the same, for the most part in plain floats, which are quicker for so few."""
+        """The output for one input, computed mostly with Python floats, which are faster for few numbers."""
         values: list[float] = (self.consequents @ [*x, 1.0]).tolist()
         for value, memberships in zip(reversed(x), reversed(self._premises)):
             logs = [((value - centre) / width) ** 2 for centre, width in memberships]

@@ -1,15 +1,16 @@
-"""The adaptations of the oracles: what each of them knows of the noise and the faults of a measurement.
+"""The adaptations of the oracles: the knowledge of each oracle about the noise and the faults of a measurement.
 
-A fault is known by its statistics, not by the value that it took. Of those that act on a measurement
+The oracles know the statistics of a fault, not its values:
 
-- a noise step changes the sigma, which is known;
-- multipath, a bias step and a ramp last: they are states (`simnav.estimators.models.fault_states`), since taking an
-  error that is correlated in time for noise makes a filter believe it more with every epoch;
-- a gross error is noise of the second moment of its distribution, and left out where that is more than `LIMIT` sigma;
-- a frozen or false value says nothing, and is left out.
+- A noise step changes the sigma, which is known.
+- Multipath, a bias step and a ramp are lasting errors. They are states (`simnav.estimators.models.fault_states`): if a
+  time-correlated error is modelled as white noise, the covariance becomes too small.
+- A gross error is noise with the second moment of its distribution. If that is more than `LIMIT` sigma, the measurement
+  is rejected.
+- A frozen or false value contains no information and is rejected.
 
-Where a recording does not say how large its faults are, or a fault of others does something else, what was really added
-stands for it.
+If a recording does not hold the size of its faults, or a fault of a third party has another effect, the true added
+error is used.
 """
 
 from __future__ import annotations
@@ -29,18 +30,18 @@ from simnav.types import KINDS, Array, Instruments, Measurement
 
 __all__ = ["FisherNoise", "MixtureNoise", "NominalNoise", "TrueNoise", "fisher_information", "imu_faults"]
 
-#: A fault of more than this many sigma makes a component worth no weight at all.
+#: A component with a fault of more than this many sigma is rejected.
 LIMIT = 3.0
-#: A gross error is one, to those that have to guess, above this probability.
+#: Without knowledge of the labels, a measurement has a gross error if its probability is above this.
 CERTAIN = 0.95
 #: Points of the integral for the Fisher information, as a power of two.
 _POINTS = 14
-#: What a fault of these does to a measurement is a state (`simnav.sensors.faults.Effect`).
+#: Faults with these effects are states (`simnav.sensors.faults.Effect`).
 LASTING = ("lasting", "growing")
 
 
 class TrueNoise(Adaptation):
-    """The true sigma of each measurement, and the faults that touch it: the oracle O1."""
+    """The oracle O1: it knows the true sigma of each measurement, and the faults that affect it."""
 
     reads_truth = True
 
@@ -50,7 +51,7 @@ class TrueNoise(Adaptation):
         self._states: dict[str, int] = {}
 
     def reveal(self, recording: Recording) -> None:
-        """Take the labels of a recording."""
+        """Receive the labels of a recording."""
         self._streams = {n: (s, np.asarray(s.time)) for n, s in recording.data.aids.items()}
         self.faults = recording.faults
 
@@ -60,7 +61,7 @@ class TrueNoise(Adaptation):
         self._variances: dict[tuple[int, str], Array | None] = {}
 
     def states(self) -> list[FaultState]:
-        """The faults that last as states, for the model; they then count no longer as noise."""
+        """The lasting faults as states of the model. They no longer count as noise."""
         self._states = dict.fromkeys(self._streams, 0)
         found: dict[tuple[Any, ...], tuple[FaultState, int]] = {}
         for j, fault in enumerate(self.faults):
@@ -71,7 +72,7 @@ class TrueNoise(Adaptation):
                 size = _size(fault, self._streams[name][0])
                 if size is None or (growing and "mean_active" in fault.parameters):
                     continue
-                # The intervals of one fault are one process; a ramp begins anew in each.
+                # The intervals of one fault are one process; a ramp starts from zero in each.
                 key = (name, fault.kind, repr(fault.parameters), fault.start if growing else 0.0)
                 mask = 1 << j | (found[key][1] if key in found else 0)
                 factor: Callable[[float], float] = partial(self._factor, name, mask, fault.start if growing else None)
@@ -87,12 +88,12 @@ class TrueNoise(Adaptation):
         return 1.0 if start is None else max(time - start, 0.0)
 
     def _label(self, instrument: str, time: float) -> tuple[AidStream, int]:
-        """The stream of an instrument, and the index of its measurement of a time."""
+        """The stream of an instrument, and the index of its measurement at a time."""
         stream, times = self._streams[instrument]
         return stream, min(int(np.searchsorted(times, time - 1e-9)), len(times) - 1)
 
     def _white(self, innovation: Innovation) -> tuple[Array, list[int], AidStream, int]:
-        """Noise with the true sigma; the faults that are neither noise steps nor states; the label."""
+        """Noise with the true sigma; the faults that are neither noise steps nor states; stream and index."""
         m = innovation.measurement
         stream, k = self._label(m.instrument, m.time)
         d = len(innovation.residual)
@@ -104,7 +105,7 @@ class TrueNoise(Adaptation):
         return noise, faults, stream, k
 
     def _variance(self, j: int, stream: AidStream, k: int, d: int) -> Array | None:
-        """What fault j adds to the noise of a measurement; None where it makes it worthless."""
+        """The variance that fault j adds to a measurement; None if the measurement must be rejected."""
         fault, key = self.faults[j], (j, stream.name)
         if key not in self._variances:
             variance = None
@@ -130,14 +131,14 @@ class TrueNoise(Adaptation):
 
 
 class NominalNoise(TrueNoise):
-    """The sigma that each measurement would have had without faults: the oracle O0, from whose data they are taken."""
+    """The oracle O0: the errors of the faults are subtracted, and the sigma is that without faults."""
 
     def states(self) -> list[FaultState]:
-        """None: nothing is left of the faults."""
+        """An empty list, because the faults are subtracted."""
         return []
 
     def restore(self, measurement: Measurement) -> Measurement:
-        """A measurement without what the faults added to it."""
+        """A measurement without the error that the faults added."""
         stream, k = self._label(measurement.instrument, measurement.time)
         if not stream.faults[k]:
             return measurement
@@ -153,18 +154,18 @@ class NominalNoise(TrueNoise):
 
 
 class MixtureNoise(TrueNoise):
-    """The rate and size of gross errors are known, but not which measurements have them: the oracle O3.
+    """The oracle O3: it knows the rate and size of gross errors, but not which measurements have them.
 
-    Each measurement may have been hit by any of the gross errors that are about at its time. Weighed by Bayes' rule,
-    with the innovation, the hypotheses give the noise ``R^-1 = sum w_j R_j^-1``, the information that is expected.
-    What is decided by the schedule of a scenario (noise steps, multipath, frozen values, ...) it knows like O1.
+    Each measurement may have any of the gross errors that are active at its time. The hypotheses j have the noise R_j
+    and, by Bayes' rule with the innovation, the probability w_j. The noise is ``R^-1 = sum w_j R_j^-1``, from the
+    expected information. Faults with a fixed schedule (noise steps, multipath, frozen values, ...) are known as in O1.
 
     Source: C. J. Masreliez, "Approximate non-Gaussian filtering with linear state and observation relations", IEEE
     Trans. Automatic Control 20(1), 1975, for the weights; the collapse into one noise is ours.
     """
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """The expected noise; None where a gross error is almost certain and leaves nothing."""
+        """The expected noise; None if a gross error that leaves no information is almost certain."""
         mixture = self.mixture(innovation)
         if mixture is None or len(mixture) == 1:
             return None if mixture is None else mixture[0][1]
@@ -182,7 +183,7 @@ class MixtureNoise(TrueNoise):
         return np.asarray(np.linalg.inv(information))
 
     def mixture(self, innovation: Innovation) -> list[tuple[float, Array]] | None:
-        """Probability and noise of each hypothesis, "no gross error" first; None where the measurement is worthless."""
+        """Probability and noise of each hypothesis, "no gross error" first; None if there is no information."""
         noise, faults, stream, k = self._white(innovation)
         d = len(noise)
         for j in faults:
@@ -212,7 +213,7 @@ class MixtureNoise(TrueNoise):
 
 
 class FisherNoise(MixtureNoise):
-    """Noise of the Fisher information of each measurement's density: the bound of those who do not know the hits."""
+    """Noise from the Fisher information of each measurement's density: a bound without knowledge of the labels."""
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -220,7 +221,7 @@ class FisherNoise(MixtureNoise):
         self._known: dict[bytes, Array] = {}
 
     def adapt(self, innovation: Innovation) -> Array | None:
-        """The inverse of the information; None where there is none."""
+        """The inverse of the Fisher information; None if it is zero."""
         mixture = self.mixture(innovation)
         if mixture is None or len(mixture) == 1:
             return None if mixture is None else mixture[0][1]
@@ -237,19 +238,20 @@ class FisherNoise(MixtureNoise):
 def fisher_information(probability: Array, variance: Array) -> Array:
     """Diagonal of the Fisher information of location of a mixture of zero-mean normal densities.
 
-    ``J_ii = integral of (d p / d x_i)^2 / p``; the rest is zero by symmetry. Components of one hypothesis are
-    independent, but share the hit. The integral is a mean over quasi-random points, good to 0.5 %.
+    For the density p(x) it is ``J_ii = integral of (d p / d x_i)^2 / p``; other elements are zero by symmetry. Under
+    one hypothesis the components are independent. The integral is a mean over quasi-random points, accurate to 0.5 %.
 
     Parameters
     ----------
     probability : (c,) array
         Probabilities of the components of the mixture.
     variance : (c, d) array
-        Of each component under each hypothesis.
+        Variance of each of d measurement components under each hypothesis.
 
     Returns
     -------
     (d,) array
+        The diagonal of the Fisher information.
 
     Examples
     --------
@@ -273,7 +275,7 @@ def fisher_information(probability: Array, variance: Array) -> Array:
 
 
 def _size(fault: FaultLabel, stream: AidStream) -> Array | None:
-    """A fault's size for an instrument, by component; None where the label does not say."""
+    """The size of a fault for each component of an instrument; None if the label does not hold it."""
     cls = FAULTS.get(fault.kind)
     if cls is None or not cls.stems:
         return None
@@ -290,7 +292,7 @@ def _second_moment(fault: FaultLabel, stream: AidStream) -> Array | None:
 
 
 def imu_faults(recording: Recording) -> tuple[Array, Array] | None:
-    """Times and (n, 6) fault errors of the IMU samples, or None where no fault touches the IMU."""
+    """Times and (n, 6) fault errors of the IMU samples; None if no fault affects the IMU."""
     data = recording.data
     if data.imu is None or data.imu_labels is None:
         return None

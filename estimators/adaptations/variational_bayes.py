@@ -19,7 +19,7 @@ def variational_noise(
     innovation: Array, predicted: Array, nominal: Array, shape: float, iterations: int, lowest: float, highest: float,
     scales: Array, noise: Array,
 ) -> None:  # fmt: skip
-    """The iteration (see `VariationalBayes`).
+    """Compute the iteration of `VariationalBayes` for one measurement.
 
     Parameters
     ----------
@@ -28,13 +28,14 @@ def variational_noise(
     predicted, nominal : (m, m) arrays
         H P H' and R.
     shape : float
-        Of the inverse gamma densities, this measurement included.
+        Shape parameter a of the inverse gamma densities, including this measurement.
     iterations : int
-        Number of iterations between state and noise.
+        Number of alternating updates of state and noise.
     lowest, highest : float
-        Of the estimated variances over the nominal ones.
+        Bounds of the estimated variances, as multiples of the nominal ones.
     scales : (m,) array
-        Of the densities, in units of the nominal variances: before; overwritten by those after.
+        Scale parameters b of the densities before the measurement, in units of the nominal variances; overwritten by
+        those after it.
     noise : (m, m) array
         Overwritten with the estimate of R.
     """
@@ -55,7 +56,7 @@ def variational_noise(
 
 
 class VariationalBayes(EstimatedNoise):
-    """State and noise variances estimated together: inverse-gamma distributed variances that slowly forget.
+    """Estimates state and noise variances together; the variances are inverse-gamma distributed, with forgetting.
 
     Sarkka and Nummenmaa (2009), "Recursive noise adaptive Kalman filtering by variational Bayesian approximations",
     IEEE Trans. Automatic Control 54(3), algorithm 1. Component i of an instrument has variance ~ inverse gamma(a,
@@ -64,18 +65,19 @@ class VariationalBayes(EstimatedNoise):
         a  <- rho a + 1/2,    b_i- = rho b_i
         repeat:  R = diag(b_i / a);  update with R;  b_i = b_i- + 1/2 (e_i^2 + (H P+ H')_ii)
 
-    with e the residual after the update. Small state errors and a large residual together let R grow at once, within
-    the same epoch: a gross error is given little weight without a test. The variances are kept in units of the
-    nominal R, whose correlations stay.
+    with the shape a and the scale b_i of the density, the forgetting factor rho, and the residual e after the update;
+    P+ is the covariance after it. If the state error is small and the residual is large, R increases in the same epoch,
+    so a gross error gets a small weight without a test. The variances are stored in units of the nominal R, and its
+    correlations are kept.
 
     Parameters
     ----------
     forgetting : float
-        rho, in (0, 1]: the memory is 1/(1 - rho) measurements.
+        Forgetting factor rho, in (0, 1]; the memory is 1/(1 - rho) measurements.
     prior : float
-        How many measurements the datasheet's noise counts for at the start.
+        Number of measurements to which the datasheet's noise is equivalent at the start.
     iterations : int
-        Of state and noise in turns, for a measurement; at least 1.
+        Number of alternating updates of state and noise for a measurement; at least 1.
     """
 
     def __init__(

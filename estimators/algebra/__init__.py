@@ -1,1 +1,1 @@
-"""Linear algebra that models and solvers share."""
+"""Linear algebra for models and solvers."""

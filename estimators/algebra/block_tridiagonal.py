@@ -1,29 +1,35 @@
 """Gauss-Newton steps on a chain of nodes: the block-tridiagonal normal equations, solved by elimination.
 
-A window is a prior on its first node, motion factors between neighbours and aiding factors on single nodes. With dx_k
-what is added to node k, the step minimises the sum of
+A window is a prior on its first node, motion factors between neighbours and aiding factors on single nodes. With the
+correction dx_k of node k, the step minimises the sum of
 
 - ``(dx_0 - d)' P_0^-1 (dx_0 - d)``                        prior
 - ``w_k (e_k + dx_k+1 - F_k dx_k)' Q_k^-1 (...)``          motion
 - ``w_i (r_i - H_i dx_k)' R_i^-1 (r_i - H_i dx_k)``        aiding
 - ``lambda dx_k' diag(P_k)^-1 dx_k``                       Levenberg-Marquardt damping, P_k as predicted
 
-whose normal equations are block-tridiagonal. They are eliminated from the oldest node to the newest and solved for
-backward. The Schur complement that is left of all nodes before k,
-``S_k = Q^-1 - Q^-1 F (F' Q^-1 F + ...)^-1 F' Q^-1``, is kept as its inverse, ``P_k = F (...)^-1 F' + Q``, the same by
-Woodbury's identity: as printed it is a small difference of large numbers (Q of a hundredth of a second is 12 orders of
-magnitude below P), and a state without process noise has no Q^-1 at all. So
+The symbols are: d and P_0 the mean (minus the first node) and covariance of the prior; e_k the residual, F_k the
+transition matrix, Q_k the process noise and w_k the weight of the motion from node k to k + 1; r_i the residual, H_i
+the Jacobian, R_i the noise and w_i the weight of measurement i on node k; lambda the damping.
 
-- P_k and d_k before node k's own measurements are the prior that marginalising all nodes before k leaves;
+The normal equations are block-tridiagonal. Nodes are eliminated from the oldest to the newest, and solved for in a
+backward pass. The Schur complement of all nodes before k,
+``S_k = Q^-1 - Q^-1 F (F' Q^-1 F + ...)^-1 F' Q^-1``, is stored as its inverse, ``P_k = F (...)^-1 F' + Q``, which is
+equal by Woodbury's identity. The first form is a small difference of large numbers (Q of a hundredth of a second is 12
+orders of magnitude below P), and for a state without process noise Q^-1 does not exist. So
+
+- P_k and d_k before node k's own measurements are the prior after the marginalisation of all nodes before k;
 - P at the newest node, after its measurements, is its covariance;
-- the backward pass needs no inverse: with a the adjoint after a node's measurements, ``dx = d + P a``, and through them
-  ``a <- a + H' S^-1 (v - H P a)``, through the motion ``a <- F' a``;
-- damping is a measurement of each component to be zero.
+- the backward pass needs no inverse: with the adjoint a after a node's measurements it is ``dx = d + P a``; a is
+updated
+  through the measurements by ``a <- a + H' S^-1 (v - H P a)``, with the innovation v and its covariance S, and through
+  the motion by ``a <- F' a``;
+- damping is a measurement of zero for each component.
 
-Measurements of one instrument on one node are taken as their mean, weighed by their information: the mean of what they
-read, of their Jacobians, and its covariance. Where their Jacobians are the same and their noise is proportional,
-nothing is lost. Folded onto a node (`simnav.estimators.models.chain`), they differ by the motion of a fraction of a
-second.
+Measurements of one instrument on one node are replaced by their mean, weighted by their information: the mean of their
+readings and of their Jacobians, and its covariance. If their Jacobians are equal and their noise is proportional, this
+is exact. The Jacobians of measurements that are folded onto a node (`simnav.estimators.models.chain`) differ by the
+motion of a fraction of a second.
 
 Sources: B. M. Bell, "The iterated Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994; for the
 backward pass G. J. Bierman, "Fixed interval smoothing with discrete measurements", Int. J. Control 18(1), 1973.
@@ -44,7 +50,7 @@ __all__ = [
     "Aids", "Elimination", "after_step", "error_after_step", "half_squares", "keep_weights", "solve_chain", "whiten",
 ]  # fmt: skip
 
-#: A factor of less weight than this counts for nothing.
+#: A factor with a smaller weight than this is left out.
 LEAST_WEIGHT = 1e-9
 
 #: The M aiding factors: their nodes (M,), in ascending order, and the number of the first node of all; which instrument
@@ -53,10 +59,10 @@ LEAST_WEIGHT = 1e-9
 #: covariances (M, 3, 3), and the weights that divide them (M,).
 Aids: TypeAlias = tuple[Integers, int, Integers, Integers, Array, Array, Array, Array]
 _AIDS = "Tuple((i8[::1], i8, i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1]))"
-#: What an elimination leaves: covariances (K, n, n) of a node without its own measurements, all older ones included,
-#: and its mean less the node (K, n); the same two with its own measurements; ``L^-1 H P`` and ``L^-1 H`` of each
-#: measurement at its turn, ``L L'`` being S (M, 3, n), and ``L^-1 (r - H d)`` (M, 3); 1 where a measurement counts, for
-#: itself or for a mean, else 0 (M,).
+#: The stored results of an elimination: covariance of each node without its own measurements, with all older ones
+#: (K, n, n), and its mean minus the node (K, n); the same two with its own measurements; ``L^-1 H P`` and ``L^-1 H`` of
+#: each measurement (M, 3, n) with ``L L' = S``, and ``L^-1 (r - H d)`` (M, 3); 1 if a measurement is used, by itself or
+#: as a mean, otherwise 0 (M,).
 Elimination: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array, Integers]
 _ELIMINATION = (
     "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1]))"
@@ -65,7 +71,7 @@ _ELIMINATION = (
 
 @kernel()
 def _predict(P: Array, F: Array, Q: Array, weight: float, work: Array, turned: Array, out: Array) -> None:
-    """``out = F P F' + Q / weight``; F is sparse."""
+    """Compute ``out = F P F' + Q / weight``, for a sparse F."""
     n = P.shape[0]
     for i in range(n):
         for j in range(n):
@@ -97,11 +103,11 @@ def _predict(P: Array, F: Array, Q: Array, weight: float, work: Array, turned: A
 def _absorb(
     P: Array, d: Array, measured: tuple[Array, Array, Array, float, int], L: Array, white: tuple[Array, Array, Array]
 ) -> bool:
-    """Take measurements (H, r, R, weight, m) with the covariance ``R / weight`` into P and d.
+    """Update P and d with a measurement (H, r, R, weight, m) with the noise covariance ``R / weight``.
 
-    With ``L L' = S = H P H' + R / weight`` they are left white (U, G, y): ``U = L^-1 H P``, ``G = L^-1 H`` and
-    ``y = L^-1 (r - H d)``, so that ``d + U' y`` and ``P - U' U`` are the update. The last row of L is for the pivots.
-    False, and nothing done, if S is singular.
+    With ``L L' = S = H P H' + R / weight`` the whitened quantities ``white`` = (U, G, y) are stored: ``U = L^-1 H P``,
+    ``G = L^-1 H`` and ``y = L^-1 (r - H d)``; the update is ``d + U' y`` and ``P - U' U``. The last row of L holds the
+    pivots. If S is singular, nothing is changed and the result is False.
     """
     H, r, R, weight, m = measured
     U, G, y = white
@@ -110,7 +116,7 @@ def _absorb(
         y[a] = r[a]
         for c in range(n):
             U[a, c] = 0.0
-        for c in range(n):  # few are not zero
+        for c in range(n):  # most elements are zero
             x = H[a, c]
             G[a, c] = x
             if x != 0.0:
@@ -155,14 +161,14 @@ def _absorb(
 
 @kernel()
 def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r: Array, mean_R: Array) -> int:
-    """The mean of measurement i and of the later ones before ``end`` that are its instrument's and count.
+    """Compute the mean of measurement i and of the later used measurements of its instrument before ``end``.
 
-    Each has a share of ``w / trace(R)`` in it. ``used`` becomes 0 for those that i stands for.
+    The weight of each measurement in the mean is ``w / trace(R)``. ``used`` becomes 0 for those that i replaces.
 
     Returns
     -------
     int
-        How many they are; where there is only one, nothing is written.
+        Number of measurements in the mean. If it is 1, nothing is written.
     """
     _, _, instrument, components, H, r, R, weight = aids
     count = 1
@@ -215,7 +221,7 @@ def _whiten(error: Array, whitener: Array, whitened: Array) -> float:
 
 @kernel()
 def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> None:
-    """Take the adjoint back through m measurements: ``a + G' (y - U a)``; z is work space."""
+    """Update the adjoint a through a measurement of m components, backward: ``a + G' (y - U a)``; z is work space."""
     n = adjoint.size
     for a in range(m):
         z[a] = y[a]
@@ -234,32 +240,32 @@ def solve_chain(
     prior: tuple[Array, Array], motion: tuple[Array, Array, Array, Array], aids: Aids, damping: float, first: int,
     left: Elimination, step: Array, size: Array,
 ) -> tuple[float, float]:  # fmt: skip
-    """One step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
+    """Compute one step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
     Parameters
     ----------
     prior : (n, n) and (n,) arrays
-        Covariance of the first node before its measurements; d, mean of the prior less the first node.
+        Covariance of the first node before its measurements; d, the mean of the prior minus the first node.
     motion : (K - 1, n, n), (K - 1, n, n), (K - 1, n) and (K - 1,) arrays
-        F and Q; e, newer node less the motion of the older one; the weights that divide Q.
+        F and Q; e, the newer node minus the prediction from the older one; the weights that divide Q.
     aids : tuple
-        See `Aids`.
+        The aiding factors, see `Aids`.
     damping : float
-        lambda, 0 for a Gauss-Newton step.
+        The damping lambda, 0 for a Gauss-Newton step.
     first : int
-        Nodes before it have been eliminated, without damping; ``left`` holds what that left.
+        Nodes before this one have been eliminated already, without damping; ``left`` holds their results.
     left : tuple of arrays
-        See `Elimination`; overwritten.
+        Results of the elimination, see `Elimination`; overwritten from node ``first`` on.
     step : (K, n) array
-        Overwritten with dx.
+        Overwritten with the corrections dx.
     size : (K,) array
-        Overwritten with the largest component of each node's step, in its filtered sigmas; NaN or infinite where the
-        step is of no use.
+        Overwritten with the largest component of each node's step, in units of its filtered sigmas; NaN or infinite if
+        the step cannot be used.
 
     Returns
     -------
     float, float
-        Largest ``size`` of all nodes, and of those before ``first``.
+        Largest ``size`` of all nodes, and of the nodes before ``first``.
     """
     prior_covariance, prior_shift = prior
     transition, noise, error, motion_weight = motion
@@ -374,14 +380,14 @@ def after_step(
     step: Array, shifts: tuple[Array, Array], motion: tuple[Array, Array, Array, Array, Array],
     aids: tuple[Integers, int, Array, Array, Array, Array, Array],
 ) -> None:  # fmt: skip
-    """Shifts and residuals after a step, as the factors were linearised: what solving for it supposes them to be.
+    """Update shifts and residuals after a step, by the linearised factors.
 
     Parameters
     ----------
     step : (K, n) array
-        Of the nodes.
+        Corrections of the nodes.
     shifts : two (K, n) arrays
-        Means without and with a node's own measurements, less the node; the step is taken off them.
+        Means of the nodes without and with their own measurements, minus the nodes; the step is subtracted.
     motion : tuple of arrays
         F and e, which is updated, as for `solve_chain`; whiteners, whitened errors and norms, as for `whiten`.
     aids : tuple
@@ -416,13 +422,13 @@ def whiten(first: int, error: Array, whitener: Array, whitened: Array, norm: Arr
     Parameters
     ----------
     first : int
-        Row to begin with.
+        Index of the first row that is computed.
     error : (N, n) array
         Errors to be whitened.
     whitener : (N, n, n) array
-        Lower triangular.
+        Inverse Cholesky factors of their covariances, lower triangular.
     whitened : (N, n) array
-        Overwritten.
+        Overwritten with the whitened errors.
     norm : (N,) array
         Overwritten with the norms of the whitened errors.
     """
@@ -434,23 +440,23 @@ def whiten(first: int, error: Array, whitener: Array, whitened: Array, norm: Arr
 def keep_weights(
     motion: tuple[Array, Array, Array], node: Integers, base: int, aids: tuple[Array, Array, Array], tolerance: float
 ) -> int:
-    """Set weights back that have hardly changed.
+    """Keep the old values of weights that have hardly changed.
 
     Parameters
     ----------
     motion, aids : three (K - 1,), three (M,) arrays
-        The weights with which the factors were eliminated; norms of the whitened residuals; the weights that are
-        wanted, overwritten with those before where the weight and the factor's pull, which is the weight times the
-        norm, differ by no more than the tolerance.
+        The weights with which the factors were eliminated; norms of the whitened residuals; the new weights. A new
+        weight is replaced by the old one if neither the weight nor the influence of the factor (weight times norm)
+        changes by more than the tolerance.
     node, base
-        As of `Aids`.
+        Nodes of the aiding factors, and number of the first node, see `Aids`.
     tolerance : float
-        Largest change of a weight that is ignored.
+        Largest change that is ignored.
 
     Returns
     -------
     int
-        The first node at whose elimination a weight differs; K if there is none.
+        The first node with a changed weight; K if there is none.
     """
     before, norm, weight = motion
     aid_before, aid_norm, aid_weight = aids
@@ -477,11 +483,11 @@ def half_squares(
     Parameters
     ----------
     whitener : (n, n) array
-        Of the prior; lower triangular.
+        Inverse Cholesky factor of the covariance of the prior, lower triangular.
     shift : (n,) array
-        Mean of the prior less the first node.
+        Mean of the prior minus the first node.
     weight, norm, aid_weight, aid_norm : arrays
-        Of the factors of motion and of aids: their weights, and the norms of their whitened residuals.
+        Weights of the motion and aiding factors, and the norms of their whitened residuals.
     """
     total = 0.0
     for i in range(shift.size):

@@ -6,7 +6,7 @@ __all__ = ["chi_square_limits"]
 
 
 def chi_square_limits(probability: float) -> list[float]:
-    """Limits of chi-square of 0, 1, 2, 3 degrees of freedom that hold with a probability."""
+    """The quantiles of chi-square with 0, 1, 2 and 3 degrees of freedom at a probability."""
     from scipy.special import chdtri
 
     return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]

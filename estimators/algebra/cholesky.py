@@ -12,16 +12,17 @@ __all__ = ["factorise", "invert_factor", "solve_factor"]
 
 @kernel()
 def factorise(L: Array, m: int, least: float, pivot: Array) -> bool:
-    """Overwrite the lower triangle of a covariance with its Cholesky factor; what lies above is left as it is.
+    """Overwrite the lower triangle of a covariance with its Cholesky factor. The upper triangle is not changed.
 
     Parameters
     ----------
     L : (>= m, >= m) array
-        The covariance in, the factor out. A component that depends on those before it gets a column of zeros.
+        The covariance; overwritten with the factor. A component that depends linearly on earlier ones gets a column of
+        zeros.
     m : int
-        Number of components.
+        Number of components of the covariance.
     least : float
-        A pivot of no more than this part of its variance counts as zero.
+        A pivot that is not larger than this fraction of its variance counts as zero.
     pivot : (>= m,) array
         Overwritten with the pivots: the squares of the factor's diagonal.
 

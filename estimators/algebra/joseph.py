@@ -17,14 +17,14 @@ __all__ = ["joseph_update", "project"]
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
 def project(covariance: Array, jacobian: Array, cross: Array, predicted: Array) -> None:
-    """What a covariance says of a measurement: ``P H'`` and ``H P H'``.
+    """Compute ``P H'`` and ``H P H'``, the covariance of a predicted measurement.
 
     Parameters
     ----------
     covariance : (n, n) array
-        P, symmetric.
+        Covariance P of the state's error, symmetric.
     jacobian : (m, n) array
-        H; its zeros cost nothing.
+        Jacobian H of the measurement; its zeros are skipped.
     cross : (n, m) array
         Overwritten with P H'.
     predicted : (m, m) array
@@ -62,20 +62,20 @@ def joseph_update(
     Parameters
     ----------
     covariance : (n, n) array
-        P, updated.
+        Covariance P of the state's error, updated.
     cross : (n, m) array
-        P H'.
+        P H', with the Jacobian H of the measurement.
     innovation_covariance : (m, m) array
-        S.
+        Covariance S of the innovation.
     residual : (m,) array
-        Measurement minus its prediction.
+        Innovation: the measurement minus its prediction.
     correction : (n,) array
-        Overwritten with K times the residual.
+        Overwritten with the correction of the state, K times the innovation.
 
     Returns
     -------
     float
-        Normalised innovation squared; -1 where S is singular, and nothing is changed.
+        Normalised innovation squared; -1 if S is singular, and then nothing is changed.
     """
     n, m = cross.shape
     L, white = innovation_covariance.copy(), np.empty(m)

@@ -36,20 +36,20 @@ MEMORY_COLUMNS = 6
 
 @kernel("void(f8[:, ::1], f8, f8[:, ::1], f8[:, :, ::1], f8[::1])")
 def set_scales(actions: Array, largest: float, setting: Array, scale: Array, process_scale: Array) -> None:
-    """Factors on the sigmas from logarithms in [-1, 1], in units of that of the largest factor; clipped.
+    """Convert actions in [-1, 1], logarithms of factors over the logarithm of the largest factor, to factors on sigmas.
 
     Parameters
     ----------
     actions : (b, p + 1) array
-        Of p instruments, and of the process noise.
+        Actions for p instruments and the process noise; they are clipped to [-1, 1].
     largest : float
-        Largest factor.
+        Largest factor on a sigma.
     setting : (b, p) array
         Overwritten with the logarithms of the instruments.
     scale : (b, p, k) array
         Overwritten with the factors on the sigmas of the k components of each instrument.
     process_scale : (b,) array
-        Overwritten.
+        Overwritten with the factors on the sigma of the process noise.
     """
     places = setting.shape[1]
     for b in range(actions.shape[0]):
@@ -75,9 +75,9 @@ def observe(
     steps: Steps, events: Events, end: Array, context: Array, layout: tuple[Integers, Array, int],
     filters: tuple[Array, Array, Array], observation: NDArray[np.float32],
 ) -> None:  # fmt: skip
-    """What an agent sees before it decides on the step that lies ahead (`simnav.estimators.learning.features`).
+    """Compute the observations before the decision on the next step (`simnav.estimators.learning.features`).
 
-    The innovations are those that the filter would see if it used none of the step's measurements.
+    The innovations are those before any measurement of the step is used.
 
     Parameters
     ----------
@@ -86,10 +86,10 @@ def observe(
     end : (b,) array
         End of each filter's step [s].
     context : (b, 11) array
-        As of `simnav.estimators.learning.features.Context`.
+        Numbers on the voyage, see `simnav.estimators.learning.features.Context`.
     layout : (k,) int array, (b, p) array, int
-        Of each instrument its place in the observation, -1 for none; of each place the nominal time between two
-        measurements [s]; how many measurements a step have room in the observation.
+        Place of each instrument in the observation, -1 for none; nominal time between two measurements of each place
+        [s]; largest number of measurements of a step in the observation.
     filters : (b, n, n), (b, n) and (b, p, 6) arrays
         Covariances, distances to the plain filter, and memory of the instruments, which is updated.
     observation : (b, o) float32 array
@@ -127,7 +127,7 @@ def observe(
             m = size[e]
             at = place[instrument[e]] if m > 0 else -1
             if at >= 0:
-                # S with the covariance of the step's start: good enough for a number that is looked at
+                # S with the covariance at the start of the step, which is accurate enough for an observation
                 for i in range(m):
                     for k in range(i + 1):
                         x = noise[e, i, k]
@@ -183,7 +183,7 @@ def observe(
 def _propagate(
     P: Array, delta: Array, transition: Array, process_noise: Array, factor: float, A: Array, B: Array, T: Array
 ) -> None:
-    """``delta = Phi delta``, ``P = Phi P Phi' + factor Q`` in place; A, B, T are (n, n) work space."""
+    """Compute ``delta = Phi delta`` and ``P = Phi P Phi' + factor Q`` in place; A, B, T are (n, n) work space."""
     n = delta.size
     for i in range(n):
         x = 0.0
@@ -218,21 +218,21 @@ def _propagate(
 def take(
     steps: Steps, events: Events, place: Integers, scale: Array, process_scale: Array, covariance: Array, delta: Array
 ) -> None:
-    """Take each filter of a bank through its step, with the noise that its agent has set.
+    """Advance each filter of a bank by one step, with the noise that its agent has set.
 
     Parameters
     ----------
     steps, events : tuples of arrays
         See `Steps` and `simnav.estimators.learning.reference.Events`.
     place : (k,) int array
-        Of each instrument: its place in the observation; -1 for none.
+        Place of each instrument in the observation; -1 for none.
     scale : (b, p, k) array
-        Factor on the sigma of the j-th measurement of the step by the instrument of each place, the last for those
-        beyond; not above zero: the measurement is left out.
+        Factor on the sigma of each measurement of the step, for the instrument of each place. The last factor also
+        applies to further measurements. A measurement with a factor of zero or less is not used.
     process_scale : (b,) array
         Factor on the sigma of the process noise.
     covariance, delta : (b, n, n), (b, n) arrays
-        Updated.
+        Covariances P of the filters, and differences delta from the plain filter; updated.
     """
     active, first, last = steps
     transition, process_noise, moves, instrument, _, size, innovation, jacobian, noise, correction = events

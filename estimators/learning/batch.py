@@ -1,4 +1,4 @@
-"""What the vector forms of the learning tasks share: seeds, resets and the modes of autoreset.
+"""The common part of the vector forms of the learning tasks: seeds, resets and autoreset modes.
 
 They behave like Gymnasium's own vector forms, with the numbers of the environment of one voyage.
 """
@@ -38,18 +38,18 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
     num_envs : int
         Number n of voyages.
     observation_space, action_space : Space
-        Of one voyage.
+        Spaces of a single voyage.
     autoreset_mode : AutoresetMode or str
-        ``NEXT_STEP`` (as of Gymnasium: the step after the last one begins a new voyage, and its action is not read),
-        ``SAME_STEP`` (the last step returns the new voyage's observation, and its own in ``final_obs``), or
-        ``DISABLED`` (a voyage that is over stands still until ``reset(options={"reset_mask": ...})``).
+        ``NEXT_STEP`` (as in Gymnasium: the step after the last one starts a new voyage, and its action is not read),
+        ``SAME_STEP`` (the last step returns the observation of the new voyage, and the last one in ``final_obs``), or
+        ``DISABLED`` (a finished voyage waits until ``reset(options={"reset_mask": ...})`` restarts it).
     independent_seeds : bool
-        What an integer seed becomes: False: ``seed + i`` for voyage i, as in Gymnasium; True: independent seeds
+        Meaning of an integer seed. False: voyage i has ``seed + i``, as in Gymnasium; True: independent seeds
         (`simnav.environment.spawn_seeds`).
     voyages : int, optional
-        Learn from so many training voyages (`simnav.environment.seeds`); None: the seed of a reset is the run's.
+        Number of training voyages (`simnav.environment.seeds`); None: the seed of a reset is the seed of the run.
     render_mode : None
-        One environment draws charts; the vector form does not.
+        Must be None: only the single environment draws charts.
 
     Raises
     ------

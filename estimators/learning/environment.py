@@ -7,8 +7,8 @@ An episode of n steps, from reset to truncation::
         action = agent(observation)             # how the filter is to take them
         observation, reward, terminated, truncated, info = env.step(action)
 
-What is observed is described in `simnav.estimators.learning.features`, what is decided and what it is worth in
-`simnav.estimators.learning.tasks`.
+`simnav.estimators.learning.features` describes the observations, and `simnav.estimators.learning.tasks` the actions and
+rewards.
 """
 
 from __future__ import annotations
@@ -38,25 +38,25 @@ _ON = np.ones(1, np.bool_)
 
 
 class TaskOptions:
-    """What the environment of one voyage and the vector form have in common.
+    """The common options of the environment of one voyage and of the vector form.
 
     Parameters
     ----------
     scenario : Scenario, str or path
         A scenario, its name in the catalogue, or a TOML file.
     task : str
-        One of `simnav.estimators.learning.tasks.TASKS`.
+        Name of the task, one of `simnav.estimators.learning.tasks.TASKS`.
     reward : str, optional
-        One of the task's; its first by default.
+        Name of a reward of the task; by default its first one.
     instruments : "all" or "fixes"
-        Whom the agent is asked about: every instrument that the filter uses, or those that give a position.
+        The instruments for which the agent decides: all that the filter uses, or those that give a position.
     steps : int, optional
-        An episode ends after so many; None: with the run.
+        Number of steps of an episode; None: the whole run.
     voyages : int, optional
-        Learn from this many training voyages (`simnav.environment.seeds`): each reset draws one of them. None: the
-        seed of a reset is the seed of its run.
+        Number of training voyages (`simnav.environment.seeds`): each reset draws one of them. None: the seed of a reset
+        is the seed of its run.
     reveal_truth : bool
-        Put the truth, and the horizontal errors of the filter and of the oracle, into ``info``.
+        True: ``info`` holds the truth, and the horizontal errors of the filter and of the oracle.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class TaskOptions:
 
     @property
     def oracle(self) -> bool:
-        """Whether the oracle has to come along."""
+        """Whether the oracle must run, too."""
         return self.reward in NEED_ORACLE or self.reveal_truth
 
 
@@ -111,7 +111,7 @@ class FilterTaskEnv(ChartedEnv[Numbers, Numbers]):
     Parameters
     ----------
     scenario, task, reward, instruments, steps, voyages, reveal_truth
-        As of `TaskOptions`.
+        The options of the task, see `TaskOptions`.
     render_mode : {"human", "rgb_array"}, optional
         Show the chart in a window, or return it as an array; default: no chart.
 

@@ -1,4 +1,4 @@
-"""What an agent is worth on voyages that it has not seen, beside the plain filter and the oracle."""
+"""The evaluation of an agent on unseen voyages, compared with the plain filter and the oracle."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LEVEL = 0.975
 
 
 class Worth(NamedTuple):
-    """Of each of n voyages: return of the episode, and RMS of the horizontal errors of the agent and the oracle [m]."""
+    """For each of n voyages: return of the episode, and RMS horizontal errors of the agent and of the oracle [m]."""
 
     returns: Array
     error: Array
@@ -32,7 +32,7 @@ class Worth(NamedTuple):
 
 
 def plain(envs: FilterTaskVectorEnv) -> Agent:
-    """The agent that leaves the filter as it is."""
+    """The agent that does not change the filter."""
     shape, dtype = envs.action_space.shape, envs.single_action_space.dtype
     return lambda observation: np.zeros(shape or (), dtype)
 
@@ -40,7 +40,7 @@ def plain(envs: FilterTaskVectorEnv) -> Agent:
 def scoring_envs(
     scenario: Scenario | str | Path, seeds: Sequence[int], task: str = "Tuning", **options: object
 ) -> FilterTaskVectorEnv:
-    """The voyages to score on, side by side; ValueError where a seed is one of training."""
+    """The environments of the scored voyages; ValueError if a seed is one of training."""
     if wrong := [s for s in seeds if is_training(s)]:
         raise ValueError(f"seed {wrong[0]} is one of training; scores are of seeds below it")
     return FilterTaskVectorEnv(
@@ -54,7 +54,7 @@ def worth(envs: FilterTaskVectorEnv, seeds: Sequence[int], agent: Agent) -> Wort
     Parameters
     ----------
     envs : FilterTaskVectorEnv
-        Of `scoring_envs`.
+        The environments from `scoring_envs`.
     seeds : sequence of int
         Seed of each voyage, one for each environment.
     agent : callable

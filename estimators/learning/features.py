@@ -1,6 +1,6 @@
-"""What an agent sees of a running filter, and in which units: all of order one, by these constants.
+"""The observation of a running filter, scaled to numbers of order one by the constants of this module.
 
-For each instrument that the agent is asked about (`PER_INSTRUMENT` numbers, then `PER_MEASUREMENT` for each of the at
+For each instrument for which the agent decides (`PER_INSTRUMENT` numbers, then `PER_MEASUREMENT` for each of the at
 most K measurements of a step):
 
 ====================== =============================================================================================

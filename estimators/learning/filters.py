@@ -1,4 +1,4 @@
-"""The filters of b agents side by side: state, memory and what is decided, around the kernels."""
+"""The filters of b agents: state, memory and decisions, around the kernels."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ __all__ = ["Filters", "Layout", "checked_actions", "layout_of", "layout_of_scena
 
 
 class Layout:
-    """Which instruments an agent is asked about, and where they stand in its observation.
+    """The instruments for which an agent decides, and their places in its observation.
 
     Parameters
     ----------
     watched : list of str
         The instruments that the plain filter uses in any run.
     kinds : list of str
-        Of those that the agent is asked about.
+        Kinds of the instruments for which the agent decides.
     names : list of str
-        Those that the agent is asked about.
+        Names of these instruments.
     most : int
-        Room for so many measurements a step of each.
+        Largest number of measurements of an instrument in a step.
     states : int
-        Most states of the filter.
+        Largest number of states of the filter.
     events : float
-        Most measurements a step of all instruments together.
+        Largest number of measurements of all instruments in a step.
 
     Attributes
     ----------
     place : (k,) int array
-        Of each watched instrument; -1 where the agent is not asked.
+        Place of each watched instrument; -1 if the agent does not decide for it.
     size : int
         Length of the observation.
     """
@@ -112,27 +112,27 @@ def layout_of_scenario(scenario: Scenario, which: str) -> Layout:
 
 
 class Filters:
-    """b filters with noise of their own, over the linear problems that they are handed.
+    """b filters, each with its own noise, over given linear problems.
 
     Parameters
     ----------
     task : Task
-        What the agents decide on.
+        The task of the agents.
     layout : Layout
-        Which instruments they see, and at which place.
+        The instruments of the observation, and their places.
     reward : str
-        One of the task's.
+        Name of a reward of the task.
     b, n : int
-        How many, and of how many states.
+        Number of filters, and number of states of each.
 
     Attributes
     ----------
     covariance, delta : (b, n, n), (b, n) array
-        P, and the distance to the plain filter.
+        Covariances P of the filters, and differences from the plain filter.
     decision : Decision
-        The last.
+        The last decisions of the agents.
     observation : (b, o) float32 array
-        What the agents saw last.
+        The last observations of the agents.
     """
 
     def __init__(self, task: Task, layout: Layout, reward: str, b: int, n: int):

@@ -62,18 +62,18 @@ ROUTES = ("track", "channel", "dock")
 
 
 class GuidanceScores(NamedTuple):
-    """What a voyage was worth, of the true track.
+    """The scores of a voyage, from the true track.
 
     Attributes
     ----------
     cross_track : float
         RMS of the distance from the track [m].
     clearance : float
-        Least distance to the sides of the channel [m]; inf without one.
+        Smallest distance to the sides of the channel [m]; inf without a channel.
     fuel : float
-        Of the planned voyage: mean of the cube of speed over planned speed.
+        Fuel as a ratio to the planned voyage: mean of the cube of speed over planned speed.
     aground : bool
-        Whether it touched the side.
+        Whether the vessel touched the side of the channel.
     """
 
     cross_track: float
@@ -83,24 +83,24 @@ class GuidanceScores(NamedTuple):
 
 
 class GuidanceOptions:
-    """What the environment of one voyage and the vector form have in common.
+    """The common options of the environment of one voyage and of the vector form.
 
     Parameters
     ----------
     scenario : Scenario, str or path
-        A simulated scenario.
+        A simulated scenario, its name in the catalogue, or a TOML file.
     route : {"track", "channel", "dock"}
-        What is scored.
+        Kind of the route, which decides the reward.
     half_width : float
-        Of the channel [m].
+        Half the width of the channel [m].
     navigator : Estimator or str, optional
         An estimator or its name; by default the plain filter of ``ekf``, or ``ship-ekf`` without an IMU.
     steps : int, optional
-        An episode ends after so many; None: with the run.
+        Number of steps of an episode; None: the whole run.
     voyages : int, optional
-        Learn from so many training voyages (`simnav.environment.seeds`); None: the seed of a reset is the run's.
+        Number of training voyages (`simnav.environment.seeds`); None: the seed of a reset is the seed of the run.
     reveal_truth : bool
-        Put the truth and the distance from the track into ``info``.
+        True: ``info`` holds the truth and the distance from the track.
 
     Raises
     ------
@@ -239,9 +239,9 @@ class GuidanceEnv(ChartedEnv[Numbers, Numbers]):
     Parameters
     ----------
     scenario, route, half_width, navigator, steps, voyages, reveal_truth
-        As of `GuidanceOptions`.
+        The options of the task, see `GuidanceOptions`.
     render_mode : {"human", "rgb_array"}, optional
-        As of `NavigationEnv`.
+        Show the chart in a window, or return it as an array; default: no chart.
 
     Notes
     -----
@@ -287,7 +287,7 @@ class GuidanceEnv(ChartedEnv[Numbers, Numbers]):
         return self._voyages.observation[0].copy(), info
 
     def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
-        """Steer for a step; get its reward and what the navigator then believes.
+        """Steer for a step; return its reward and the next observation, from the navigator's estimate.
 
         Raises
         ------

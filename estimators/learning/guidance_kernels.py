@@ -42,23 +42,24 @@ def steer(
     active: Flags, actions: Array, at: Integers, ahead: Integers, tracks: Tracks, truth: Array, estimate: Array,
     commands: tuple[Array, Array, Array, Array],
 ) -> None:  # fmt: skip
-    """What the agents' actions mean for the vessels.
+    """Convert the actions of the agents to commands of the vessels.
 
     Parameters
     ----------
     active : (b,) bool array
-        Which voyages.
+        True for each voyage that is steered.
     actions : (b, 2) array
-        Clipped to [-1, 1].
+        Actions of the agents; they are clipped to [-1, 1].
     at, ahead : (b,) int arrays
-        Point of the track where each vessel believes to be, and how far ahead the heading is taken.
+        Index of the track's point nearest to the estimated position, and number of points by which the planned heading
+        is taken ahead of it.
     tracks : tuple of arrays
-        See `Tracks`.
+        The planned tracks, see `Tracks`.
     truth, estimate : (b, 9) arrays
-        Position, velocity, roll, pitch and yaw; NaN for what is not estimated.
+        Position, velocity, roll, pitch and yaw; NaN for components that are not estimated.
     commands : four (b,) arrays
-        Overwritten: the planned speed, and the arguments of `simnav.world.motion.command`: what is wrong with the
-        heading, heading and speed.
+        Overwritten with the planned speed, and the arguments of `simnav.world.motion.command`: error of the heading,
+        heading and speed.
     """
     route, length, points, _, _, _ = tracks
     planned, wrong, heading, speed = commands
@@ -77,7 +78,7 @@ def steer(
 def _place(
     latitude: float, longitude: float, at: int, length: int, geodetic: Array, course: Array, along: Array
 ) -> tuple[int, float, float]:
-    """Nearest point within two minutes of one, the distance to starboard [m], and how far along [m]."""
+    """Nearest point within two minutes of point ``at``, distance to starboard [m], and distance along the track [m]."""
     low, high = max(at - BEHIND, 0), min(at + AHEAD, length)
     least, north, east = inf, 0.0, 0.0
     for i in range(low, high):
@@ -98,26 +99,27 @@ def judge(
     which: tuple[Flags, Flags], paces: tuple[Array, Array, Array], truth: Array, tracks: Tracks,
     task: tuple[int, float], at: Integers, tally: Array, outcome: tuple[Array, Array, Flags],
 ) -> None:  # fmt: skip
-    """What a step was worth.
+    """Compute the rewards of a step.
 
     Parameters
     ----------
     which : two (b,) bool arrays
-        Which voyages, and for which of them this is the last step.
+        True for each voyage that is scored, and for each voyage whose last step this is.
     paces : three (b,) arrays
         Length of a step [s], planned speed, and true speed through the water [m/s].
     truth : (b, 9) array
-        As of `steer`.
+        True position, velocity, roll, pitch and yaw.
     tracks : tuple of arrays
-        See `Tracks`.
+        The planned tracks, see `Tracks`.
     task : (int, float)
         0 track, 1 channel, 2 dock; half the width of the channel [m].
     at : (b,) int array
-        Point of the track where each vessel truly is; updated.
+        Index of the track's point nearest to the true position; updated.
     tally : (b, 4) array
-        Distance along the track, sum of the squared distances from it, fuel, least clearance; updated.
+        Distance along the track, sum of the squared distances from it, fuel, smallest clearance; updated.
     outcome : three (b,) arrays
-        Overwritten: distance to starboard of the track [m], reward, whether the vessel touched the side.
+        Overwritten with the distance to starboard of the track [m], the reward, and whether the vessel touched the
+        side.
     """
     active, last = which
     step, planned, speed = paces
@@ -173,26 +175,28 @@ def look(
     delivered: tuple[Integers, Integers, Array, Flags], tracks: Tracks, half_width: float,
     memory: tuple[Integers, Array, Array], observation: NDArray[np.float32],
 ) -> None:  # fmt: skip
-    """What the agents see.
+    """Compute the observations of the agents.
 
     Parameters
     ----------
     active : (b,) bool array
-        Which voyages.
+        True for each voyage that is observed.
     clock : three (b,) arrays
-        Number of the step, 0 at the start of a voyage, when there is no step to look back at; time of the estimate, and
-        length of a step [s].
+        Number of the step (0 at the start of a voyage, before any step); time of the estimate, and length of a step
+        [s].
     believed : (b, 9) and (b, 2) arrays
-        Estimate, as of `steer`; variances of its horizontal position [m^2] and of its heading [rad^2].
+        Estimated position, velocity and attitude; variances of the horizontal position [m^2] and of the heading
+        [rad^2].
     delivered : tuple of arrays
-        Count, who and when of `simnav.simulation.steps.SteppedRuns`; which instruments give a position (b, i).
+        ``count``, ``who`` and ``when`` of `simnav.simulation.steps.SteppedRuns`; mask of instruments that give a
+        position (b, i).
     tracks : tuple of arrays
-        See `Tracks`.
+        The planned tracks, see `Tracks`.
     half_width : float
-        Of the channel [m]; `ASIDE` without one.
+        Half the width of the channel [m]; `ASIDE` without a channel.
     memory : (b,) int, (b, 3) and (b, 2) arrays
-        Point of the track where each vessel believes to be, updated; heading of the last estimate, turn rate and time
-        of the last fix, updated; variances at the start.
+        Index of the track's point nearest to the estimated position, updated; heading of the last estimate, turn rate
+        and time of the last fix, updated; variances at the start.
     observation : (b, 16) float32 array
         Overwritten for the voyages that are active.
     """

@@ -25,15 +25,16 @@ __all__ = ["GuidanceVectorEnv"]
 class GuidanceVectorEnv(VoyagesVectorEnv):
     """Steer n vessels by their estimates (`simnav.estimators.learning.guidance`).
 
-    The plain inertial filters of all voyages are one compiled pass. Other navigators, and those of vessels without an
-    IMU, are asked one after the other.
+    The plain inertial filters of all voyages run in one compiled pass. Other navigators, and those of vessels without
+    an IMU, run one after the other.
 
     Parameters
     ----------
     scenario, route, half_width, navigator, steps, voyages, reveal_truth
-        As of `simnav.estimators.learning.guidance.GuidanceOptions`; each voyage has a copy of the navigator.
+        The options of the task, see `simnav.estimators.learning.guidance.GuidanceOptions`. Each voyage has a copy of
+        the navigator.
     num_envs, autoreset_mode, independent_seeds, render_mode
-        As of `simnav.estimators.learning.batch.VoyagesVectorEnv`.
+        The options of a vector form, see `simnav.estimators.learning.batch.VoyagesVectorEnv`.
     """
 
     def __init__(

@@ -42,12 +42,12 @@ class Navigators:
     Parameters
     ----------
     runs : SteppedRuns
-        What their instruments deliver.
+        The runs of the voyages, with their measurements.
 
     Attributes
     ----------
     estimate : (n, 9) array
-        Position, velocity, roll, pitch and yaw; NaN for what is not estimated.
+        Position, velocity, roll, pitch and yaw; NaN for components that are not estimated.
     spread : (n, 4) array
         Variance of the position north, its covariance, variance east [m^2], and variance of the heading [rad^2].
     """
@@ -85,7 +85,7 @@ class Navigators:
         self._note(b, Estimate(start.time, start.position, start.velocity, start.attitude, start.covariance))
 
     def update(self, active: NDArray[np.bool_]) -> None:
-        """Take what the instruments of some voyages delivered in their last step."""
+        """Process the measurements of the last step of some voyages."""
         runs = self.runs
         for b in np.flatnonzero(active & ~self._banked).tolist():
             navigator = self._others[b]
@@ -151,24 +151,23 @@ def navigate(
     Parameters
     ----------
     active : (b,) bool array
-        Which filters.
+        True for each filter that is advanced.
     until : (b,) array
         End of each step [s].
     delivered : tuple of arrays
-        Count, who, when and value of `simnav.simulation.steps.SteppedRuns`.
+        ``count``, ``who``, ``when`` and ``value`` of `simnav.simulation.steps.SteppedRuns`.
     imu : tuple of arrays
-        Its samples, times, intervals, rate and force.
+        Number of IMU samples, their times, intervals, angular rates and specific forces.
     instruments : tuple of (b, i, ...) arrays
-        Codes, arms, noises and limits, as of `simnav.estimators.models.inertial.InertialModel.arrays`; the time of the
-        last measurement of each that was used [s], updated.
+        Codes, lever arms, noises and limits of `simnav.estimators.models.inertial.InertialModel.arrays`; the time of
+        the last used measurement of each instrument [s], updated.
     process : tuple of (b, ...) arrays
-        Sensors, decay and density, as of `InertialModel.arrays`.
+        ``sensors``, ``decay`` and ``density`` of `InertialModel.arrays`.
     state : tuple of (b, ...) arrays
-        Updated: how many states each filter has, and their time [s]; position, velocity, matrix of the attitude,
-        memory, biases, turn, clock and calibration, as of `InertialModel.arrays`; the covariance, flat, with room
-        behind it.
+        Updated: number of states of each filter, and their time [s]; position, velocity, attitude matrix, memory,
+        biases, turn, clock and calibration of `InertialModel.arrays`; the covariance, flattened, in a longer row.
     result : (b, 9) and (b, 4) arrays
-        Overwritten: estimate and spread (`Navigators`).
+        Overwritten with ``estimate`` and ``spread`` of `Navigators`.
     """
     count, who, when, value = delivered
     samples, imu_time, imu_interval, rate, force = imu

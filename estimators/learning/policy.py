@@ -1,4 +1,4 @@
-"""A trained policy as a file of plain arrays: a network, what it expects, and what it was trained on.
+"""A trained policy as a file of plain arrays: a network, the form of its input, and a record of its training.
 
 The file is an ``.npz`` without pickle: ``meta`` (JSON), ``mean`` and ``deviation`` of the observation, and
 ``weight_0``, ``bias_0``, ``weight_1``, ... of the layers. Between the layers is a hyperbolic tangent, and the last is
@@ -35,22 +35,22 @@ _ACTIONS: dict[str, Callable[[int, int], int]] = {
 
 
 def record_of_training(scenario: Scenario | str, voyages: int, **more: Any) -> dict[str, Any]:
-    """What a policy tells of its training on the training voyages 0, 1, ... of a scenario.
+    """The record of a training on the training voyages 0, 1, ... of a scenario.
 
     Parameters
     ----------
     scenario : Scenario or str
         Scenario of the training voyages, or its name.
     voyages : int
-        How many.
+        Number of training voyages.
     **more
-        What else people should know, in plain values: ``algorithm``, ``steps``, ``seed``, ``versions``.
+        Further information as plain values: ``algorithm``, ``steps``, ``seed``, ``versions``.
 
     Returns
     -------
     dict
-        Also ``first_seed`` of the voyages, and ``streams``: first and last of the numbers that their random streams
-        start from (`simnav.scenario.Scenario.root`).
+        The arguments, ``first_seed`` of the voyages, and ``streams``: first and last of the numbers from which their
+        random streams start (`simnav.scenario.Scenario.root`).
     """
     found = load(scenario) if isinstance(scenario, str) else scenario
     streams = [found.root(training_seed(0)), found.root(training_seed(voyages - 1))]
@@ -58,7 +58,7 @@ def record_of_training(scenario: Scenario | str, voyages: int, **more: Any) -> d
 
 
 class PolicyError(ValueError):
-    """A file that holds no policy, or one that does not fit: one sentence that names it."""
+    """A file is not a policy, or the policy does not fit. The message is one sentence that names the file."""
 
 
 class Policy:
@@ -69,19 +69,20 @@ class Policy:
     layers : sequence of (weight, bias)
         ``(m, n)`` and ``(m,)`` arrays; the first takes the observation, the last gives the action.
     task : str
-        One of `simnav.estimators.learning.tasks.TASKS`, or ``"Guidance"``.
+        Name of the task, one of `simnav.estimators.learning.tasks.TASKS`, or ``"Guidance"``.
     kinds : sequence of str
-        Kinds of the instruments that the agent is asked about, in order; empty for Guidance.
+        Kinds of the instruments for which the agent decides, in order; empty for Guidance.
     most : int
-        Measurements a step that have room in the observation.
+        Largest number of measurements of an instrument in a step of the observation.
     instruments : str
-        As of `simnav.estimators.learning.environment.TaskOptions`.
+        ``"all"`` or ``"fixes"``, see `simnav.estimators.learning.environment.TaskOptions`.
     trained_on : mapping
-        What it learned from, as of `record_of_training`.
+        Record of the training, see `record_of_training`.
     mean, deviation : (o,) array, optional
-        The observation is taken less the mean, over the deviation; by default as it is.
+        The input of the network is the observation minus the mean, divided by the deviation; by default the observation
+        itself.
     version : int, optional
-        Of the task; the present one by default.
+        Version of the task; by default the present one.
 
     Raises
     ------

@@ -16,14 +16,14 @@ __all__ = ["Pool"]
 
 
 class Pool:
-    """At most so many voyages of one task, by the seeds of their runs; the one that was used longest ago goes first.
+    """Prepared voyages of one task, by the seeds of their runs. The least recently used one is removed first.
 
     Parameters
     ----------
     options : TaskOptions
         Scenario and task of the voyages.
     capacity : int
-        Most voyages.
+        Largest number of voyages.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Pool:
     length : (capacity,) int array
         Steps of each voyage.
     end, context, error, oracle : (capacity, S, ...) arrays
-        As of `simnav.estimators.learning.voyage.Prepared`.
+        The arrays of each voyage, see `simnav.estimators.learning.voyage.Prepared`.
     faulty : (e,) bool array
         Whether a fault touches the measurement of each event.
     start : list of InitialState

@@ -38,7 +38,7 @@ class Linear(NamedTuple):
     Attributes
     ----------
     transition, process_noise : (e, n, n) array
-        Phi and Q.
+        Transition matrix Phi and process noise Q of each propagation.
     moves : (e,) bool array
         False where the event has no propagation.
     instrument : (e,) int array

@@ -1,4 +1,4 @@
-"""What a step of a filter is worth, as one kernel for one filter or a bank of them.
+"""The reward of a step of a filter, as one kernel for one filter or a bank of them.
 
 ============= =================================================================================================
 error         ``-ln((e^2 + s^2) / (o^2 + s^2)) / 2``: e and o the horizontal errors of the filter and of the
@@ -45,16 +45,16 @@ def reward(
     code: int, steps: Steps, events: Events, faulty: Flags, errors: tuple[Array, Array],
     decision: tuple[Integers, Array, Array], filters: tuple[Array, Array], rewards: Array,
 ) -> None:  # fmt: skip
-    """What each filter's step was worth; 0 where the truth is not known.
+    """Compute the reward of each filter's step; 0 if the truth is not known.
 
     Parameters
     ----------
     code : int
-        Of `REWARDS`.
+        Code of the reward, from `REWARDS`.
     steps, events : tuples of arrays
-        As of `simnav.estimators.learning.bank`.
+        The steps and their events, see `simnav.estimators.learning.bank`.
     faulty : (e,) bool array
-        Which measurements a fault has touched.
+        True for each measurement that a fault affected.
     errors : (b, 9) and (b, 3) arrays
         Of the plain filter at the end of the step: estimate minus truth; of the oracle, as of
         `simnav.estimators.learning.voyage.Voyage`.
@@ -64,7 +64,7 @@ def reward(
     filters : (b, n, n) and (b, n) arrays
         Covariances, and distances to the plain filter.
     rewards : (b,) array
-        Overwritten.
+        Overwritten with the rewards.
     """
     active, first, last = steps
     _, _, _, instrument, _, size, _, _, _, _ = events

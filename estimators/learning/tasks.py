@@ -1,4 +1,4 @@
-"""The tasks around a running filter: what an agent decides once a step, and what that is worth.
+"""The tasks around a running filter: the action of an agent in each step, and its reward.
 
 ================ =========================================== ==========================================================
 task             action                                      reward
@@ -60,14 +60,14 @@ class Decision:
 
 
 class Task(ABC):
-    """What is decided, and what for.
+    """A task: the actions and their meaning.
 
     Parameters
     ----------
     instruments : list of str
-        Whom the agent is asked about.
+        The instruments for which the agent decides.
     most : int
-        K.
+        Largest number K of measurements of an instrument in a step.
     """
 
     name: ClassVar[str]

@@ -2,8 +2,8 @@
 
 A voyage is prepared once (simulated, filtered by the plain filter and by the oracle, linearised) and kept. A step of
 the bank is then one pass over shared arrays. The numbers are those of `FilterTaskEnv`
-(`simnav.estimators.learning.environment`), bit for bit. What is new to the pool costs its preparation at the reset:
-learn from a number of ``voyages``.
+(`simnav.estimators.learning.environment`), bit for bit. The preparation of a new voyage takes time at the reset, so use
+the same ``voyages`` many times.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ class FilterTaskVectorEnv(VoyagesVectorEnv):
     Parameters
     ----------
     scenario, task, reward, instruments, steps, voyages, reveal_truth
-        As of `simnav.estimators.learning.environment.TaskOptions`.
+        The options of the task, see `simnav.estimators.learning.environment.TaskOptions`.
     num_envs, autoreset_mode, independent_seeds, render_mode
-        As of `simnav.estimators.learning.batch.VoyagesVectorEnv`.
+        The options of a vector form, see `simnav.estimators.learning.batch.VoyagesVectorEnv`.
     cache : int, optional
-        Prepared voyages that are kept; by default twice n, or all ``voyages`` where those are more.
+        Number of prepared voyages that are kept; by default twice n, or all ``voyages`` if these are more.
     """
 
     def __init__(

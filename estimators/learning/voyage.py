@@ -1,4 +1,4 @@
-"""A voyage of a learning task: recording, plain filter, oracle and truth, step by step, or all steps ahead."""
+"""A voyage of a learning task: recording, plain filter, oracle and truth, step by step, or all steps in advance."""
 
 from __future__ import annotations
 
@@ -37,43 +37,43 @@ def recorded(scenario: Scenario, seed: int, steps: int | None = None) -> Recordi
 
 
 class Voyage:
-    """A voyage as it goes on: `advance` takes the next step's measurements through the plain filter and the oracle.
+    """A running voyage: `advance` runs the plain filter and the oracle over the measurements of the next step.
 
     Parameters
     ----------
     scenario : Scenario
-        What is sailed.
+        Scenario of the voyage.
     seed : int
         Seed of the run.
     names : list of str
         The instruments, as the events are to number them (`ReferenceFilter`).
     steps : int, optional
-        The voyage ends after so many; None: with the run.
+        Number of steps of the voyage; None: the whole run.
     oracle : bool
-        Whether the oracle comes along. Where it does not, or knows no way, its numbers are NaN.
+        Whether the oracle runs, too. Otherwise, or if it has no estimate, its numbers are NaN.
 
     Attributes
     ----------
     recording : Recording
-        The whole run.
+        The recording of the whole run.
     filter : ReferenceFilter
-        As of the end of the step; ``filter.linear`` are the events in it.
+        The plain filter at the end of the step; ``filter.linear`` holds the events of the step.
     step : int
         Number of the step; -1 before the first.
     context : (11,) array
-        What was known before it (`simnav.estimators.learning.features.Context`).
+        Numbers on the voyage before the step (`simnav.estimators.learning.features.Context`).
     error : (9,) array
-        Of the plain filter at its end: position north, east, down [m], velocity [m/s], two zeros, heading [rad]; NaN
-        where the filter estimates or the reference of a log holds no such thing.
+        Error of the plain filter at the end of the step: position north, east, down [m], velocity [m/s], two zeros,
+        heading [rad]; NaN for components that are not estimated, or that the reference of a log does not hold.
     oracle : (3,) array
         The oracle's horizontal error and its horizontal sigma s [m], and the root of the mean of ``p^2 + s^2`` from the
         start on, p the horizontal error of the plain filter [m].
     faulty : (e,) bool array
         Which of the events' measurements a fault has touched.
     estimate : Estimate
-        The plain filter's.
+        Estimate of the plain filter at the end of the step.
     truth : (3, 3) array
-        At the end of the step: position, velocity, attitude.
+        True position, velocity and attitude at the end of the step.
     """
 
     def __init__(

@@ -1,1 +1,1 @@
-"""What is estimated: state, error dynamics, measurement models."""
+"""Models: states, error dynamics and measurement equations."""

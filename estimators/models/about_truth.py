@@ -1,26 +1,27 @@
 """An inertial error model that is linearised about the truth, with a state for each error that the simulator draws.
 
-It is the model of the oracles. The bound that they are to attain is that of the problem linearised about the truth, so
-an oracle must not lose anything by linearising elsewhere: with a heading that is wrong by a radian an extended Kalman
-filter does, and may diverge.
+It is the model of the oracles. Their bound is that of the problem linearised about the truth, so an oracle must not
+linearise at another point: with a heading that is wrong by a radian an extended Kalman filter does this, and may
+diverge.
 
-The state is a **nominal** trajectory, and the error vector y (estimate minus nominal). The nominal one starts each
-step of the run at the truth, and follows the IMU's samples, as measured, to the end of the step. Within a step it
-leaves the truth by millimetres. With Phi, H and the innovation r at the nominal trajectory::
+The state is a **nominal** trajectory, and the error vector y (estimate minus nominal). The nominal trajectory starts
+each step of the run at the truth, and follows the measured IMU samples to the end of the step. Within a step it differs
+from the truth by millimetres. With the transition matrix Phi, the Jacobian H and the innovation r at the nominal
+trajectory::
 
     y(t + dt) = Phi y(t),    y += nominal minus truth  (where a step begins),    innovation = r - H y
 
-So the estimate, nominal plus y, is that of a linear Kalman filter, however large y is. What the samples' errors add is
-in the difference between the nominal trajectory and the truth at the end of a step. Where the truth is not known (NaN
-in a recorded log) the estimate itself is the next nominal state, as in an extended Kalman filter.
+So the estimate, nominal plus y, is that of a linear Kalman filter for any size of y. The effect of the samples' errors
+is in the difference between the nominal trajectory and the truth at the end of a step. If the truth is not known (NaN
+in a recorded log), the estimate itself is the next nominal state, as in an extended Kalman filter.
 
-Other than `simnav.estimators.models.inertial`, which stands for some errors by simpler ones, it has a state for
+`simnav.estimators.models.inertial` combines some errors in one state. This model also has separate states for
 
 - the turn-on bias beside the in-run bias, of the IMU and of each aid
 - scale factors and misalignments of the IMU: they act as a bias in proportion to the rate or force, as measured
 - the scale factor of each velocity and depth, the misalignment of a DVL, the deviation of a magnetic compass
 
-The water's velocity is taken as known where it is given. A speed log then measures the velocity over the ground.
+If the velocity of the water is given, it is treated as known. A speed log then measures the velocity over the ground.
 """
 
 from __future__ import annotations

@@ -20,7 +20,8 @@ __all__ = [
     "triad_bias",
 ]  # fmt: skip
 
-#: Of m components and n states: innovation (m,), P H' (n, m), H P H' (m, m) and noise (m, m).
+#: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
+#: noise (m, m).
 Observation = tuple[Array, Array, Array, Array]
 
 
@@ -32,9 +33,9 @@ class Linearised(NamedTuple):
     innovation : (m,) array
         Measured minus predicted, in the units of ``KINDS[kind].errors``.
     jacobian : (m, n) array
-        Of the prediction with respect to the error (estimate minus truth).
+        Jacobian of the prediction with respect to the error (estimate minus truth).
     noise : (m, m) array
-        Covariance of what the state does not explain.
+        Covariance of the measurement noise, including errors without a state.
     """
 
     innovation: Array
@@ -42,7 +43,7 @@ class Linearised(NamedTuple):
     noise: Array
 
     def project(self, covariance: Array) -> Observation:
-        """The Jacobian times an (n, n) ``covariance``: ``P H'`` and ``H P H'``."""
+        """The measurement with ``P H'`` and ``H P H'`` of an (n, n) ``covariance`` P."""
         d, n = self.jacobian.shape
         cross, predicted = np.empty((n, d)), np.empty((d, d))
         project(covariance, np.ascontiguousarray(self.jacobian, dtype=np.float64), cross, predicted)
@@ -50,18 +51,18 @@ class Linearised(NamedTuple):
 
 
 class ErrorModel(ABC):
-    """A state, kept by the model, and what a solver needs to know of its n-component error.
+    """A state, and the dynamics and measurement equations of its error of n components.
 
-    Errors are estimate minus truth; a correction ``dx`` is what is to be added to the estimate.
+    Errors are estimate minus truth. A correction ``dx`` is added to the estimate.
 
     Attributes
     ----------
     size : int
-        n.
+        Number n of components of the error.
     time : float
-        Of the state [s].
+        Time of the state [s].
     own : mapping of str to OwnObservation
-        The instruments observed whose kind has a measurement equation of its own.
+        The observed instruments whose kind has a measurement equation of its own.
     """
 
     size: int
@@ -71,14 +72,14 @@ class ErrorModel(ABC):
     state: ClassVar[tuple[str, ...]] = ()
     #: Names of further arrays that `propagate` keeps from one call to the next.
     memory: ClassVar[tuple[str, ...]] = ()
-    #: Place of the attitude, a rotation vector, in the error; None for a model without one.
+    #: Indices of the attitude, a rotation vector, in the error; None for a model without attitude.
     attitude_at: ClassVar[int | None] = None
-    #: Places of position and velocity, and of the attitude: what `loosen` inflates. Here all states and none.
+    #: Indices of position and velocity, and of the attitude, which `loosen` inflates. Here all states and none.
     moving: ClassVar[tuple[slice, slice]] = (slice(None), slice(0, 0))
 
     @property
     def needs(self) -> Needs:
-        """The instruments without which it cannot work, as of `simnav.estimator.Estimator.needs`."""
+        """The instruments without which the model cannot work, see `simnav.estimator.Estimator.needs`."""
         return ()
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
@@ -89,12 +90,12 @@ class ErrorModel(ABC):
         instruments : Instruments
             Datasheets of the run's instruments.
         name : str
-            Of the estimator, for the message.
+            Name of the estimator, for the message.
 
         Raises
         ------
         UnsuitableScenario
-            If an instrument is lacking that the model needs.
+            If an instrument that the model needs is missing.
         """
         return self
 
@@ -104,10 +105,10 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def observes(self, instrument: Datasheet) -> bool:
-        """Whether `measure` knows what to do with an instrument."""
+        """Whether the model can use the measurements of an instrument."""
 
     def load(self, imu: ImuSamples | None) -> None:  # noqa: B027 (most models have no IMU)
-        """Take the IMU samples of the step that follows."""
+        """Receive the IMU samples of the next step."""
 
     @abstractmethod
     def propagate(self, covariance: Array, until: float) -> None:
@@ -115,11 +116,9 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def measure(self, measurement: Measurement) -> Linearised | None:
-        """Linearise at the present state; None where the measurement says nothing usable."""
+        """Linearise a measurement at the present state; None if it cannot be used."""
 
-    def observe_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...]
-    ) -> tuple[Array, Array] | None:
+    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
         """Innovation and Jacobian of a measurement of an instrument in ``own``, at any state.
 
         Parameters
@@ -143,7 +142,7 @@ class ErrorModel(ABC):
         raise NotImplementedError(f"{type(self).__name__} observes no instrument with an equation of its own")
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
-        """The noise alone, or None, as of `measure`; a model may know it without linearising."""
+        """The noise of `measure` alone, or None. A model may compute it without linearisation."""
         linearised = self.measure(measurement)
         return None if linearised is None else linearised.noise
 
@@ -152,26 +151,26 @@ class ErrorModel(ABC):
         """Add a correction to the state."""
 
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
-        """`measure`, projected; a model may have a faster way than one after the other."""
+        """Linearise a measurement and project the covariance; a model may have a faster implementation."""
         linearised = self.measure(measurement)
         return None if linearised is None else linearised.project(covariance)
 
     def absorb(self, observation: Observation, covariance: Array, correction: Array) -> float:
-        """Update a covariance and `correct` the state by what a measurement says.
+        """Correct the state and its covariance by a measurement.
 
         Parameters
         ----------
         observation : tuple
-            With the noise that is to be used.
+            The linearised measurement, with the noise that is used.
         covariance : (n, n) array
-            Updated.
+            Covariance of the model's error, updated.
         correction : (n,) array
-            Overwritten with what was added to the state.
+            Overwritten with the correction of the state.
 
         Returns
         -------
         float
-            Normalised innovation squared; -1 where its covariance is singular, and nothing is changed.
+            Normalised innovation squared; -1 if the innovation covariance is singular, and then nothing is changed.
         """
         innovation, cross, predicted, noise = observation
         nis: float = joseph_update(covariance, cross, predicted + noise, innovation, correction)
@@ -180,40 +179,41 @@ class ErrorModel(ABC):
         return nis
 
     def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
-        """Use a measurement with its nominal noise: `innovate` and `absorb` in one go.
+        """Use a measurement with its nominal noise: `innovate` and `absorb` in one step.
 
         Parameters
         ----------
         measurement : Measurement
             The measurement to be used.
         covariance : (n, n) array
-            Updated.
+            Covariance of the model's error, updated.
         correction : (n,) array
-            Overwritten with what was added to the state.
+            Overwritten with the correction of the state.
 
         Returns
         -------
         (float, float) or None
-            Normalised innovation squared, or -1 where nothing was changed, and the norm of the innovation. None where
-            the model has no faster way than one after the other.
+            Normalised innovation squared (-1 if nothing was changed), and the norm of the innovation. None if the
+            model has no faster implementation than `innovate` and `absorb`.
         """
         return None
 
     def loosen(self, covariance: Array, inflation: float, first: Array) -> None:
-        """Doubt the motion of the state: inflate its covariance in place, and that of nothing else.
+        """Inflate the covariance of position, velocity and attitude in place, if the motion is wrong.
 
-        A prediction is wrong where the vessel, or an IMU that is disturbed, has not moved as the model says. Position
-        and velocity are then anywhere. The errors of the instruments are what they were: whoever inflates them, too,
-        lets them follow the first measurement that is wrong.
+        The prediction is wrong if the motion does not follow the model, or if the IMU is disturbed. Position and
+        velocity are then uncertain. The errors of the instruments have not changed. If their covariance were inflated,
+        too, they would follow the first wrong measurement.
 
         Parameters
         ----------
         covariance : (n, n) array
-            P, of the model's error; changed in place.
+            Covariance P of the model's error, updated.
         inflation : float
-            Of the variances, above 1.
+            Factor on the variances, above 1.
         first : (n,) array
-            Variances at the start of the run. No attitude is doubted beyond its own, for which corrections are linear.
+            Variances at the start of the run. The variance of the attitude is not inflated beyond this, so that
+            corrections stay in the linear range.
         """
         motion, attitude = self.moving
         factors = np.ones(self.size)
@@ -242,7 +242,7 @@ class ErrorModel(ABC):
             covariance[:, attitude] = covariance[:, attitude] @ J.T
 
     def snapshot(self) -> list[Array]:
-        """Copies of what `correct` changes, for `restore`; TypeError where the model does not name it."""
+        """Copies of the arrays that `correct` changes, for `restore`; TypeError if the model does not name them."""
         if not self.state:
             raise TypeError(f"{type(self).__name__}.state is to name the arrays that `correct` changes; it names none")
         return [getattr(self, name).copy() for name in self.state]
@@ -253,13 +253,13 @@ class ErrorModel(ABC):
             getattr(self, name)[...] = value
 
     def take_over(self, other: ErrorModel) -> None:
-        """Go on from the state of another model of the same kind, begun with the same instruments, between steps."""
+        """Copy the state of another model of the same kind with the same instruments, between steps."""
         for name in (*self.state, *self.memory):
             getattr(self, name)[...] = getattr(other, name)
         self.time = other.time
 
     def carry(self, error: Array, elapsed: float) -> None:
-        """Take an (n,) error, or (n, k) errors, through the last propagation, of ``elapsed`` seconds, in place."""
+        """Propagate an (n,) error, or (n, k) errors, through the last propagation of ``elapsed`` seconds, in place."""
         raise NotImplementedError(f"{type(self).__name__} has no transition matrix to carry an error with")
 
     @abstractmethod
@@ -268,12 +268,12 @@ class ErrorModel(ABC):
 
 
 class GaussMarkov(NamedTuple):
-    """A first-order Gauss-Markov bias and the white noise that stands for what is faster than it.
+    """A first-order Gauss-Markov bias, and white noise in place of faster errors.
 
     Attributes
     ----------
     variance : float
-        At the start [x^2].
+        Initial variance [x^2].
     decay : float
         Inverse of the correlation time [1/s].
     noise : float
@@ -293,9 +293,10 @@ def gauss_markov(
 ) -> GaussMarkov:
     """One Gauss-Markov state for a turn-on bias and an in-run bias together.
 
-    The two have the autocovariance ``b^2 + s^2 exp(-t/tau)``. One state of variance ``b^2 + s^2`` and correlation
-    time ``tau (b^2 + s^2) / s^2`` has the same value and the same slope at lag 0, and falls off faster everywhere
-    else, so that it promises no more than the two. It is exact where either is zero.
+    With the sigma b of the turn-on bias and the sigma s and correlation time tau of the in-run bias, their sum has the
+    autocovariance ``b^2 + s^2 exp(-t/tau)``. One state with the variance ``b^2 + s^2`` and the correlation time
+    ``tau (b^2 + s^2) / s^2`` has the same value and the same slope at lag 0, and a smaller autocovariance at all other
+    lags, so its variance after averaging is not too small. It is exact if b or s is zero.
 
     Parameters
     ----------

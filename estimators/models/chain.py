@@ -1,16 +1,17 @@
-"""What a model is to a graph: the nodes of a window and the factors that link them, around a state that runs ahead.
+"""The form of a model for a graph: the nodes of a window and the factors between them, and a propagated newest state.
 
-The model itself, the *front*, runs from measurement to measurement as it does in a filter. At each time of a
-measurement its state becomes a node, and what lies between two nodes a motion factor: the transition matrix F and the
-noise Q that the model accumulated, on the trajectory that it predicted. A factor knows how far its two ends have moved
-since (``begin_shift``, ``end_shift``), which is all it takes to linearise it anew: with x the nodes now, the error is
-``e = x_k+1 - f(x_k)``, f being the exact motion. So the IMU is integrated once, whatever happens to the nodes
+The model itself, the *front*, is propagated from measurement to measurement as in a filter. At each time of a
+measurement its state becomes a node, and the motion between two nodes becomes a motion factor: the transition matrix F
+and the process noise Q that the model accumulated along its predicted trajectory. A factor stores by how much its two
+nodes have moved since the prediction (``begin_shift``, ``end_shift``). This is sufficient to linearise it again: with
+the present nodes x, the error is ``e = x_k+1 - f(x_k)`` for the exact motion f. So the IMU is integrated only once
 (preintegration: C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", IEEE Trans.
 Robotics 33(1), 2017; here about the predicted trajectory and on the rotating Earth).
 
-A measurement need not have a node of its own. It can be *folded* onto the newest node, some time before it: what it
-should read is then a function of that node through the motion between them, whose noise is added to the measurement's.
-Two measurements that are folded onto one node share a part of that noise; this correlation is neglected.
+A measurement need not have a node of its own. It can be *folded* onto the newest node, some time before it. Its
+prediction is then a function of that node through the motion between them, and the noise of this motion is added to the
+noise of the measurement. Two measurements that are folded onto one node share a part of this noise; this correlation is
+neglected.
 
 A subclass compiles four loops over a window: `linearise_motion`, `linearise_aids`, `retract`, `along_motion`.
 """
@@ -35,7 +36,7 @@ __all__ = ["Chain", "Columns", "chain_of"]
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
 def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
-    """The (m, m) noise and the value of a measurement, widened to three components; and the whitener."""
+    """Extend the (m, m) noise and the value of a measurement to three components, and compute the whitener."""
     for i in range(3):
         values[i] = value[i] if i < value.size else 0.0
         for j in range(3):
@@ -45,20 +46,20 @@ def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Ar
 
 @kernel("void(i8, i8[::1], i8, f8[:, :, ::1], f8[:, :, ::1])")
 def through_motion(first: int, row: Integers, coupled: int, transition: Array, jacobian: Array) -> None:
-    """Take Jacobians at folds back to their nodes, in place.
+    """Convert Jacobians with respect to the states at folds to Jacobians with respect to their nodes, in place.
 
     Parameters
     ----------
     first : int
-        Aid to begin with.
+        Index of the first aiding factor that is converted.
     row : (M,) int array
-        Of each aid among the folds; -1 for those that are not folded.
+        Index of the fold of each aiding factor; -1 for factors without a fold.
     coupled : int
-        States from this one on only decay, each on its own.
+        States from this index on are independent and only decay.
     transition : (K, n, n) array
-        Of the folds.
+        Transition matrices from the nodes to the K folds.
     jacobian : (M, 3, n) array
-        Overwritten.
+        Jacobians with respect to the states at the folds; overwritten.
     """
     n = transition.shape[1]
     at_node = np.empty(n)
@@ -84,24 +85,24 @@ def add_motion_noise(
     first: int, row: Integers, components: Integers, jacobian: Array, motion_noise: Array, noise: Array,
     whitener: Array, bare: Integers,
 ) -> None:  # fmt: skip
-    """Add the noise of the motion up to a fold to that of the measurements there, ``R + H Q H'``, once.
+    """Add the noise Q of the motion up to a fold to the noise R of the measurements there, ``R + H Q H'``, once.
 
     Parameters
     ----------
     first : int
-        Aid to begin with.
+        Index of the first aiding factor that is changed.
     row : (M,) int array
-        Of each aid among the folds; -1 for those that are not folded.
+        Index of the fold of each aiding factor; -1 for factors without a fold.
     components : (M,) int array
         Number of components of each measurement.
     jacobian : (M, 3, n) array
-        H, with respect to the state at the fold.
+        Jacobian H with respect to the state at the fold.
     motion_noise : (K, n, n) array
-        Q of the folds, from their nodes.
+        Process noise Q of the motions from the nodes to the folds.
     noise, whitener : (M, 3, 3) arrays
-        Overwritten.
+        Noise R of the measurements and its inverse Cholesky factor; overwritten.
     bare : (M,) int array
-        1 where it has not been added yet; overwritten with 0.
+        1 if the motion noise has not been added yet; overwritten with 0.
     """
     n = jacobian.shape[2]
     cross = np.empty(n)
@@ -209,31 +210,31 @@ class Chain(ABC):
     Parameters
     ----------
     front : ErrorModel
-        With `carry`.
+        The model of the newest state. It must have the method `carry`.
 
     Attributes
     ----------
     size : int
-        n, of the model's error.
+        Number n of components of the model's error.
     nodes : Columns
-        ``time`` and the arrays of the model that `node_arrays` names.
+        The nodes: ``time`` and the arrays of the model that `node_arrays` names.
     motions : Columns
-        Of the factor that leads to a node from the one before: ``transition``, ``noise``, ``whitener`` (n, n);
-        ``begin_shift``, ``end_shift`` (n,); as linearised last, ``jacobian`` (n, n) and ``residual`` (n,); ``weight``.
+        The motion factors, each from the previous node to a node: ``transition``, ``noise``, ``whitener`` (n, n);
+        ``begin_shift``, ``end_shift`` (n,); of the last linearisation, ``jacobian`` (n, n) and ``residual`` (n,);
+        ``weight``.
     aids : Columns
-        ``node`` (number since the start of the run), ``fold`` (likewise, or -1), ``instrument`` (index into ``names``),
-        ``components``, ``time``, ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 where the noise lacks
-        that of the motion yet); as linearised last ``residual`` (3,), ``jacobian`` (3, n); ``weight``. In ascending
-        order of their nodes.
+        The aiding factors in ascending order of their nodes: ``node`` (number since the start of the run), ``fold``
+        (number since the start of the run, or -1), ``instrument`` (index into ``names``), ``components``, ``time``,
+        ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 if the noise of the motion has not been added to
+        the noise yet); of the last linearisation ``residual`` (3,), ``jacobian`` (3, n); ``weight``.
     folds : Columns
-        Times between nodes at which there are measurements: ``node`` (number of the node before), ``time``,
-        ``transition`` and ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since, the
-        model's arrays as predicted then, and with ``now_`` before their names as the shifted node leads to;
-        ``jacobian`` (n, n).
+        Times between nodes with measurements: ``node`` (number of the previous node), ``time``, ``transition`` and
+        ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since the prediction, the predicted
+        arrays of the model, and, with the prefix ``now_``, those from the shifted node; ``jacobian`` (n, n).
     fold_base : int
-        Number of the first of them since the start of the run.
+        Number of the first fold of the window since the start of the run.
     names : tuple of str
-        Of the instruments.
+        Names of the instruments.
     base : int
         Number of the first node of the window since the start of the run.
     ahead : float
@@ -247,9 +248,9 @@ class Chain(ABC):
     def __init__(self, front: ErrorModel):
         self.front = front
 
-    #: Arrays of the model that a node keeps beside those of its ``state``.
+    #: Further arrays of the model that a node stores, in addition to those of its ``state``.
     node_arrays: tuple[str, ...] = ()
-    #: Components of the model's error from this one on have no part in the motion of others, and only decay.
+    #: Components of the model's error from this index on are independent and only decay.
     coupled: ClassVar[int] = 10**9
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
@@ -289,7 +290,7 @@ class Chain(ABC):
         self.ahead = 0.0
 
     def set_prior(self, covariance: Array, shift: Array) -> None:
-        """What is believed of the first node: its covariance, and the mean less the node."""
+        """Set the prior of the first node: its covariance, and its mean minus the node."""
         self.prior, self.prior_shift = covariance.copy(), shift.copy()
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
@@ -345,17 +346,17 @@ class Chain(ABC):
         return covariance
 
     def linearise(self, measurement: Measurement) -> Linearised | None:
-        """A measurement at the front, not attached yet."""
+        """Linearise a measurement at the front, without attaching it."""
         return self.front.measure(measurement)
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
-        """The (m, m) noise of a measurement at the front; None where it says nothing usable."""
+        """The (m, m) noise of a measurement at the front; None if it cannot be used."""
         return self.front.nominal_noise(measurement)
 
     def attach(self, measurement: Measurement, noise: Array) -> None:
-        """Make a measurement at the front, with the (m, m) noise, a factor on the newest node.
+        """Add a measurement at the front, with the (m, m) noise, as a factor on the newest node.
 
-        The noise of the motion between is added where it is linearised first.
+        The noise of the motion between them is added at the first linearisation.
         """
         aids, ahead = self.aids, self.ahead > 0.0
         aids.append(
@@ -379,18 +380,18 @@ class Chain(ABC):
         return self.fold_base + len(folds) - 1
 
     def settle(self, moved: Array) -> None:
-        """Set the front to the newest node, or, where it has run ahead of it, by how much that was ``moved``."""
+        """Set the front to the newest node. If it is later than the node, correct it by ``moved``, the node's shift."""
         if self.ahead == 0.0:
             self.front.restore([self.nodes.newest(name) for name in self.front.state])
         else:
             self.front.correct(self._transition @ moved)
 
     def detach(self, count: int) -> None:
-        """Take the newest aiding factors off again."""
+        """Remove the newest aiding factors."""
         self.aids.pop(count)
 
     def drop(self, count: int) -> None:
-        """Take the oldest nodes off the window, with their factors."""
+        """Remove the oldest nodes and their factors from the window."""
         self.base += count
         self.nodes.drop(count)
         self.motions.drop(count)
@@ -400,7 +401,7 @@ class Chain(ABC):
         self.folds.drop(folds)
 
     def copy_states(self) -> list[Array]:
-        """What `retract` changes, for `restore_states`."""
+        """Copies of the arrays that `retract` changes, for `restore_states`."""
         changed = [self.nodes[name].copy() for name in self.front.state]
         shifts = self.motions["begin_shift"], self.motions["end_shift"], self.folds["shift"], self.prior_shift
         return [*changed, *(shift.copy() for shift in shifts)]
@@ -417,19 +418,19 @@ class Chain(ABC):
         return self.front.estimate(covariance)
 
     def factors_from(self, node: int) -> tuple[int, int]:
-        """The first rows of motions and aids that have to do with a node of the window or a later one."""
+        """The indices of the first motion and aiding factors of a node of the window, or of a later one."""
         return max(node - 1, 0), int(np.searchsorted(self.aids["node"], self.base + node)) if node else 0
 
     @abstractmethod
     def linearise_motion(self, first: int = 0) -> None:
-        """Fill ``residual`` and ``jacobian`` of the motion factors from a row on, for the nodes as they are.
+        """Compute ``residual`` and ``jacobian`` of the motion factors from an index on, at the present nodes.
 
-        With x the state after a motion, ``residual`` is the newer node less x, ``jacobian`` the derivative of x with
-        respect to the older node.
+        With the state x predicted by a motion, ``residual`` is the newer node minus x, and ``jacobian`` is the
+        derivative of x with respect to the older node.
         """
 
     def linearise_aids(self, first: int = 0) -> None:
-        """Fill ``residual`` (measured less predicted) and ``jacobian`` (of the prediction) from a row on."""
+        """Compute ``residual`` (measured minus predicted) and ``jacobian`` (of the prediction) from an index on."""
         aids, folds = self.aids, self.folds
         jacobian, row = aids["jacobian"], aids["node"] - self.base
         if not len(folds) or first == len(aids):
@@ -454,13 +455,13 @@ class Chain(ABC):
         first : int
             Index of the first measurement to be predicted.
         row : (M,) int array
-            Of each aid in ``states``; -1 for those to be left alone.
+            Index of the state of each aiding factor in ``states``; -1: the factor is not computed.
         states : Columns
-            Nodes or folds.
+            The states at which the measurements are predicted: nodes or folds.
         prefix : str
-            Of the names of the model's state in them.
+            Prefix of the names of the model's arrays in ``states``.
         jacobian : (M, 3, n) array
-            Of the prediction with respect to the state there.
+            Overwritten with the Jacobians of the predictions with respect to these states.
         """
 
     def observe_own(self, first: int, row: NDArray[np.int64], jacobian: Array, *state: Array) -> None:
@@ -486,33 +487,33 @@ class Chain(ABC):
 
     @abstractmethod
     def move_folds(self, first: int) -> None:
-        """Fill ``now_...`` and ``jacobian`` of the folds, from a row on, for the nodes as they are."""
+        """Compute ``now_...`` and ``jacobian`` of the folds from an index on, at the present nodes."""
 
     @abstractmethod
     def retract(self, step: Array) -> None:
-        """Add a (K, n) step to the nodes and to the shifts of the motion factors; take it off the prior's."""
+        """Add a (K, n) step to the nodes and to the shifts of the motion factors; subtract it from the prior shift."""
 
     @abstractmethod
     def along_motion(self, step: Array) -> Array:
-        """A (K, n) step that leaves the same motion errors as a given one does in the linear solution.
+        """A (K, n) step along the exact motion, with the motion errors of the linear solution.
 
-        The first node takes its step; each later node goes where the motion leads from there, plus the motion error
-        that the linearised factors say. Where rotations are large, a straight step leaves the motion, which is stiff,
-        at second order (the Maratos effect: J. Nocedal, S. J. Wright, *Numerical Optimization*, 2006, section 15.5).
+        The first node has its given step. Each later node is the exact prediction from the node before, plus the motion
+        error of the linear solution. If rotations are large, a straight step violates the stiff motion factors at
+        second order (the Maratos effect: J. Nocedal, S. J. Wright, *Numerical Optimization*, 2006, section 15.5).
         """
 
     def turned(self, covariance: Array, shift: Array) -> Array:
-        """A covariance about a state, about another that is away by a (n,) shift; a hook, as `relative_shift`."""
+        """A covariance at one state, transformed to another state at an (n,) shift; subclasses may override it."""
         return covariance
 
     def relative_shift(self, shift: Array, step: Array) -> Array:
-        """A (n,) shift as seen from where a step leads; a hook for those whose errors do not simply subtract."""
+        """An (n,) shift, relative to the state after a step; models with rotations override it."""
         return shift - step
 
 
 @singledispatch
 def chain_of(model: Any) -> Chain:
-    """The chain of a model, for a graph; a file with a chain of its own registers it for its model's class.
+    """The chain of a model, for a graph. A third party registers its own chain for the class of its model.
 
     Raises
     ------

@@ -1,14 +1,14 @@
-"""Models with states for what is correlated in the errors of position fixes.
+"""Models with states for the time-correlated errors of position fixes.
 
-The error of a GNSS fix is white noise and a slow part: orbits, clocks, ionosphere and mild multipath, correlated over
-minutes. Taken for white, a hundred fixes of the same error count as a hundred independent ones, and the filter is sure
-of a position that they share. A first-order Gauss-Markov state for each component tells the filter what it cannot
-average away (P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013, section
-14.2; A. Gelb (ed.), *Applied Optimal Estimation*, 1974, section 3.6).
+The error of a GNSS fix is white noise plus a slow part: orbits, clocks, ionosphere and mild multipath, correlated over
+minutes. If the slow part is modelled as white noise, a hundred fixes with the same error count as a hundred independent
+ones, and the covariance becomes too small. With a first-order Gauss-Markov state for each component the filter does not
+average this error (P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013,
+section 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, 1974, section 3.6).
 
-A datasheet may say the size and the correlation time of the slow part (``bias_instability``, ``correlation_time``);
-every model of simnav then has these states. Here a fix has them also where its datasheet is silent, and a slow error
-of a certain size at least: reflections are no part of a datasheet.
+If a datasheet gives the size and the correlation time of the slow part (``bias_instability``, ``correlation_time``),
+every model of simnav has these states. Here every fix has them, with at least a given size of the slow error, because
+datasheets do not include multipath.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def with_correlated_fixes(instruments: Instruments, slow: float, slow_time: floa
     instruments : Instruments
         Datasheets of the run's instruments.
     slow : float
-        Least sigma of the slow error over that of the white noise.
+        Smallest sigma of the slow error, as a multiple of that of the white noise.
     slow_time : float
-        Its correlation time where a datasheet says nothing of a slow error [s].
+        Correlation time of the slow error, if the datasheet gives none [s].
     """
     sheets = []
     for sheet in instruments.values():
@@ -81,10 +81,10 @@ class CorrelatedFixes(Suitable):
     Parameters
     ----------
     slow : float
-        Sigma of the slow error over that of the datasheet's white noise, which stays; a larger one of the datasheet
-        holds. 0: the plain filter.
+        Smallest sigma of the slow error, as a multiple of the datasheet's white noise, which is not changed. A larger
+        slow error of the datasheet is used as it is. 0: the plain filter.
     slow_time : float
-        Correlation time of the slow error [s], where the datasheet gives none.
+        Correlation time of the slow error, if the datasheet gives none [s].
     """
 
     def __init__(self, slow: float = 1.0, slow_time: float = 120.0):

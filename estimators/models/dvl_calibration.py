@@ -6,9 +6,10 @@ error k [-] and delay tau [s]. A DVL measurement that is stamped t reads ::
     z = (1 + k) D u,    D = I - [eta x] + [eta x]^2 / 2
     u = C' v + w x (l + dl) - u' tau,    u' = f + C' g - w x C' v
 
-with w the body rate relative to the Earth, f the specific force and g gravity; u' is the acceleration of the body as
-its own axes see it. D is a rotation to second order: two degrees to first order look like a scale factor of 5e-4.
-With M = (1 + k) D and errors that are estimate minus truth, the Jacobian is
+with the velocity v north-east-down, the direction cosine matrix C from body axes to north-east-down, the lever arm l,
+the body rate w relative to the Earth, the specific force f and gravity g; u' is the derivative of u in body axes. D is
+a rotation to second order: a first-order rotation by two degrees would act like a scale factor of 5e-4. With M = (1 +
+k) D and errors that are estimate minus truth, the Jacobian is
 
 - velocity ``M C'``; attitude ``M C' [v x]``; gyroscope bias ``M [l x]``
 - eta ``(1 + k) ([u x] - ([(eta x u) x] + [eta x] [u x]) / 2)``; dl ``M [w x]``; k ``D u``; tau ``-M u'``

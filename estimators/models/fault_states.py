@@ -1,7 +1,7 @@
-"""States for the errors that faults make last, behind any model: only for estimators that are told of the faults.
+"""States for lasting errors of faults, after the states of any model: only for estimators that know the faults.
 
-An error that is correlated in time is no noise. Whoever knows that it is there has it in the state, and the other
-instruments tell it apart:
+A time-correlated error is not white noise. If it is known to be there, it is a state, and the other instruments make it
+observable:
 
 - multipath, a first-order Gauss-Markov process: a state of its stationary sigma and correlation time for each component
 - a bias step: a constant of the size of the step, seen while it acts
@@ -32,11 +32,11 @@ class FaultState(NamedTuple):
     instrument : str
         Name of the instrument.
     sigma : (d,) array
-        Of each component; no state where it is zero.
+        Standard deviation of each component; a component with 0 has no state.
     correlation_time : float
-        [s]; infinite for a constant.
+        Correlation time [s]; infinite for a constant.
     factor : callable
-        Time of a measurement [s] to what the state is multiplied by; 0 where the fault does not touch it.
+        Function from the time of a measurement [s] to the factor of the state in it; 0 if the fault does not affect it.
     """
 
     instrument: str

@@ -7,21 +7,25 @@ Error: estimate minus truth; position ``(R_M + h) dlat, (R_N + h) cos(lat) dlon,
 rotation vector phi of C_est C_true' [rad], all in north-east-down, and the biases [rad/s], [m/s^2]. Its dynamics
 (phi-angle form, Groves 2013, section 14.2.4, with his signs turned to estimate minus truth):
 
+with the position, velocity and attitude errors dr, dv and phi, the bias errors db_g and db_a and db for both of them,
+the specific force f_n, the Earth rate w_ie, the transport rate w_en, w_in = w_ie + w_en and their errors dw, the
+velocity v, gravity g, the Earth's radius R, the correlation time T and the direction cosine matrix C:
+
 - dr' = dv + (curvature terms of order v/R) dr
 - dv' = -[f_n x] phi - C db_a - (2 w_ie + w_en) x dv - (2 dw_ie + dw_en) x v + 2 g/R dr_D
 - phi' = -w_in x phi - dw_in - C db_g
 - db' = -db/T + noise
 
-Beyond the 15 there are calibration states, as the datasheets ask for them: a bias for every component of an aiding
-instrument that has a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor
-and the current, north and east, through which it is carried. The current belongs to the water: when the vessel turns,
-the part of it along the keel changes at once, and a bias along the keel could not follow. With instruments of white
-noise only and no log, n is 15; with ``calibrate=False`` it always is, and those errors count as white noise.
+In addition there are calibration states that depend on the datasheets: a bias for every component of an aiding
+instrument with a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor, and
+the current, north and east, for a speed log. The current has a fixed direction over ground: when the vessel turns, its
+component along the keel changes at once, which a bias along the keel could not describe. If all instruments have white
+noise only and there is no log, n is 15. With ``calibrate=False`` n is always 15, and these errors count as white noise.
 
-An IMU's scale factor and misalignment are not states. On a level vehicle gravity turns the accelerometers' into a bias,
-which is added to the turn-on bias; the gyroscopes' act in turns, as noise in proportion to the turn rate, averaged over
-`TURN_TIME` so that a seaway does not count. Quantization carries its residual over, so that its sum stays within a
-step: it counts for nothing.
+An IMU's scale factor and misalignment are not states. On a level vehicle the errors of the accelerometers act like a
+bias under gravity, which is added to the turn-on bias. The errors of the gyroscopes act in turns, as noise in
+proportion to the turn rate, averaged over `TURN_TIME` so that wave motion does not count. The quantization residual is
+added to the next increment, so that its sum stays within one step; it is neglected.
 """
 
 from __future__ import annotations
@@ -90,7 +94,7 @@ _GRAVITY = 9.81
 
 @kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
 def _carry(transition: Array, rate: Array, elapsed: float, error: Array) -> None:
-    """Take errors, the columns of an (n, k) array, through a motion in place; arguments: `propagate_covariance`."""
+    """Propagate errors, the columns of an (n, k) array, in place; for the arguments see `propagate_covariance`."""
     m, columns = transition.shape[0], error.shape[1]
     X = np.zeros((m, columns))
     for i in range(m):
@@ -123,30 +127,30 @@ class InertialModel(ErrorModel):
     bias : (6,) array
         Biases of gyroscopes [rad/s] and accelerometers [m/s^2].
     calibration : (n - 15,) array
-        Of the aiding instruments.
+        Calibration states of the aiding instruments.
     bias_at, scale_at : dict of str to int
         Index in the error state of an instrument's first bias, and of its scale factor.
     aid_parameters : dict of str to Aid
-        What `simnav.estimators.models.measurements.observe_inertial` is told of an instrument: its code, its lever arm,
-        and its places in ``bias_at`` and ``scale_at``, -1 for none.
+        Parameters of each instrument for `simnav.estimators.models.measurements.observe_inertial`: code, lever arm, and
+        the indices of its first bias and of its scale factor (-1: none).
     own : dict of str to OwnObservation
         The instruments whose kind has a measurement equation of its own; their code is `OWN`.
     noise : dict of str to (d, d) array
-        White noise of an instrument.
+        Covariance of the white noise of each instrument.
     uncalibrated : set of str
         Instruments whose noise grows with the velocity (`simnav.estimators.models.measurements.uncalibrated_noise`).
     raw_rate, raw_force : (3,) array
         Angular rate at the time of the state (extrapolated) and specific force of the last IMU sample, as measured.
     transition, process_noise : (15, 15) array
-        Of the last propagation.
+        Transition matrix and process noise of the last propagation.
     """
 
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("_memory", "_turn", "_clock")
     attitude_at = 6
     moving = (slice(0, 6), slice(6, 9))
-    #: Whether the kernels of `simnav.estimators.models.inertial_update` stand for `measure` and `correct`. A model that
-    #: does one of these in a way of its own says False.
+    #: True if the kernels of `simnav.estimators.models.inertial_update` may replace `measure` and `correct`. A model
+    #: with another form of one of these methods sets it to False.
     fused: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
@@ -368,9 +372,7 @@ class InertialModel(ErrorModel):
     def _state(self) -> State:
         return self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration
 
-    def observe_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...]
-    ) -> tuple[Array, Array] | None:
+    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is position, velocity, DCM, angular rate, bias and calibration."""
         *moving, calibration = state
         own, size = self.own[name], _NAV + len(calibration)
@@ -378,14 +380,14 @@ class InertialModel(ErrorModel):
         return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
-        """As of the datasheet, but for what depends on the state."""
+        """The noise of the datasheet; None if the noise depends on the state."""
         name = measurement.instrument
         if name in self._fused and self.aid_parameters[name][0] != HEADING:  # which may say nothing
             return self.noise[name]
         return super().nominal_noise(measurement)
 
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
-        """What a measurement says of the state (`simnav.estimators.models.inertial_update`)."""
+        """Linearise a measurement and project the covariance (`simnav.estimators.models.inertial_update`)."""
         name = measurement.instrument
         if name not in self._fused:
             return super().innovate(measurement, covariance)
@@ -399,7 +401,7 @@ class InertialModel(ErrorModel):
         return innovation, cross, predicted, noise
 
     def absorb(self, observation: Observation, covariance: Array, correction: Array) -> float:
-        """Correct by what a measurement says (`simnav.estimators.models.inertial_update`)."""
+        """Correct the state and its covariance (`simnav.estimators.models.inertial_update`)."""
         if not self._fused:
             return super().absorb(observation, covariance, correction)
         innovation, cross, predicted, noise = observation

@@ -1,9 +1,10 @@
 """The chain of the inertial model: preintegrated IMU factors, and all aids of a window linearised at once.
 
-Between two nodes the front integrated the IMU samples from x' to y' and made F on the way. From another node x, with
-the shift ``s = x - x'`` (rotation phi, biases b), the same samples lead to ``f(x) = y' + F s + c``, where c is what
-rotating the increments adds beyond the first order: with ``E = exp(phi x)`` and the vectors u_p, u_v of the specific
-force's double and single integral in north-east-down, which stand in F (its block of the attitude is ``-[u x]``),
+Between two nodes the front integrated the IMU samples from the state x' to y', and computed the transition matrix F.
+From another node x, with the shift ``s = x - x'`` (rotation phi, biases b), the same samples lead to ``f(x) = y' + F s
++ c``. c is the effect of the rotation of the increments beyond the first order. With ``E = exp(phi x)`` and the vectors
+u_p, u_v of the double and single integral of the specific force in north-east-down, which are part of F (its block of
+the attitude is ``-[u x]``),
 
 - ``c_p = (E - 1 - phi x) u_p + (E - 1) F_pb b``, and c_v likewise with u_v and F_vb; the derivative by the attitude
   is ``-[E (u_p + F_pb b) x]``
@@ -66,11 +67,11 @@ def _compose(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -
 
 @kernel()
 def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
-    """Where the motion takes a node that is shifted by s: the shift ``moved`` at its end, and its derivative J.
+    """Propagate a shift s of a node through a motion: the shift ``moved`` at its end, and its derivative J.
 
-    The equations are those of the module. J must hold F, or what this function left there at another shift: only the
-    rows of position, velocity and attitude and the columns of attitude and biases depend on the shift. Biases and
-    calibration states only decay, each on its own.
+    The equations are those of the module. J must hold F, or the result of an earlier call: only the rows of position,
+    velocity and attitude and the columns of attitude and biases depend on the shift. Biases and calibration states are
+    independent and only decay.
     """
     n = s.size
     m = min(n, 15)
@@ -179,15 +180,15 @@ def _linearise_motion(
     Parameters
     ----------
     first : int
-        Factor to begin with.
+        Index of the first factor that is computed.
     transition : (K, n, n) array
-        Phi of each motion, on the trajectory that was predicted.
+        Transition matrix F of each motion, along the predicted trajectory.
     begin_shift, end_shift : (K, n) arrays
-        By how much the nodes at both ends have been moved since then.
+        Shifts of the nodes at both ends since the prediction.
     residual : (K, n) array
-        Overwritten: newer node minus where the motion leads from the older one.
+        Overwritten with the newer node minus its prediction from the older one.
     jacobian : (K, n, n) array
-        Overwritten: derivative of where it leads with respect to the older node.
+        Overwritten with the derivative of the prediction with respect to the older node.
     """
     count, n = begin_shift.shape
     moved = np.empty(n)
@@ -205,7 +206,7 @@ def _along_motion(
     Parameters
     ----------
     transition, jacobian, residual, begin_shift, end_shift
-        As of `_linearise_motion`.
+        The linearised motion factors, as in `_linearise_motion`.
     step : (K + 1, n) array
         Step of each node that solves the linear problem.
     along : (K + 1, n) array
@@ -236,13 +237,13 @@ def _linearise_aids(
     Parameters
     ----------
     first : int
-        Measurement to begin with.
+        Index of the first measurement that is computed.
     measured : (M,) int, (M,) int and (M, 3) arrays
-        Number of the state of each measurement, -1: none of these states; number of its instrument; what was measured.
+        Number of the state of each measurement (-1: none of these states); number of its instrument; its value.
     aids : tuple of arrays
-        Of each instrument, what is in `simnav.estimators.models.measurements.Aid`.
+        Parameters of each instrument, see `simnav.estimators.models.measurements.Aid`.
     states : tuple of (K, ...) arrays
-        The states, likewise.
+        The states, see `simnav.estimators.models.measurements.State`.
     residual : (M, 3) array
         Overwritten: measured minus predicted.
     jacobian : (M, 3, n) array

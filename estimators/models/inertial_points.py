@@ -3,17 +3,17 @@
 A point is retracted from the model's state as a correction is: metres north-east-down over the radii, velocity and
 biases added, the attitude turned by ``exp(phi x)`` from the left. Calibration states are linear, and only decay.
 
-The points are not taken through every IMU sample. The model's own state is (`InertialModel.propagate`), and over pieces
-of at most `PIECE` seconds its motion is turned back, by the exact inverse of the mechanization, into one equivalent
+The points are not propagated through every IMU sample. Only the model's own state is (`InertialModel.propagate`). For
+pieces of at most `PIECE` seconds, the exact inverse of the mechanization converts its motion into one equivalent
 sample: the mean rate and specific force that lead from its velocity and attitude at the start to those at the end
-(preintegration, with coning, sculling and the present bias in it). Every point is mechanized through that sample, less
-the difference of its biases. Against taking each point through all samples, an error of 1 mrad or 10 cm/s differs by
-under 1e-4 of itself after a second at sea (a test); the cost is a fiftieth.
+(preintegration, including coning, sculling and the present bias). Every point is propagated with this sample, minus the
+difference of its biases. Compared with the propagation of each point through all samples, an error of 1 mrad or 10 cm/s
+differs by less than 1e-4 of itself after a second at sea (a test); the cost is a fiftieth.
 
-Instruments are read through their true functions, with one exception, the EKF's too: the products of a scale factor or
-a misalignment with the errors of velocity and attitude are left out. They are parts in a thousand where the data fit;
-where a disturbance has driven a scale factor to an absurd value (a constant 0.5 m/s^2 on the accelerometers of paper
-003: to -0.45), the products hold it there, with 13 m of error where there is 0.5 m without them.
+The readings of instruments are computed by their nonlinear functions, with one exception, as in the EKF: the products
+of a scale factor or a misalignment with the errors of velocity and attitude are neglected. Normally they are of the
+order of a thousandth. If a disturbance has led to a wrong scale factor (a constant 0.5 m/s^2 on the accelerometers in
+the scenario of Zhan et al. 2026: -0.45), these products keep it at this value, with an error of 13 m instead of 0.5 m.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ PIECE = 0.5
 
 @kernel()
 def _turn(dcm: Array, r0: float, r1: float, r2: float, turned: Array) -> None:
-    """``turned = exp(r x) dcm``."""
+    """Compute ``turned = exp(r x) dcm``."""
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
     rotate_left(dcm, r0, r1, r2, a, b, turned)
 
@@ -58,7 +58,7 @@ def propagate_points(
     position: Array, velocity: Array, dcm: Array, next_velocity: Array, next_dcm: Array, interval: float,
     gyro_decay: float, accelerometer_decay: float, errors: Array,
 ) -> None:  # fmt: skip
-    """Take points through one piece of a state's motion, in place.
+    """Propagate points through one piece of a state's motion, in place.
 
     Parameters
     ----------
@@ -71,11 +71,11 @@ def propagate_points(
     next_dcm : (3, 3) array
         Rotation at the end.
     interval : float
-        Length [s].
+        Length of the piece [s].
     gyro_decay, accelerometer_decay : float
         Inverse of the biases' correlation times [1/s].
     errors : (k, n) array
-        Of the points with respect to the state at the start; afterwards at the end.
+        Differences of the points from the state at the start; overwritten with those at the end.
     """
     c, d = dcm, next_dcm
     memory = np.zeros(6)
@@ -138,19 +138,19 @@ def propagate_points(
 
 @kernel(f"void({AID}, {STATE}, f8[:, ::1], f8[:, ::1])")
 def observe_points(aid: Aid, state: State, errors: Array, differences: Array) -> None:
-    """What an instrument should read at points, minus what it should read at the state.
+    """The predicted readings of an instrument at points, minus that at the state.
 
-    In position and calibration the readings are linear (see the module), and so computed; the rest is the instrument's
-    own function at the point.
+    The readings are linear in position and calibration (see the module). For the other states the nonlinear function of
+    the instrument is evaluated at the point.
 
     Parameters
     ----------
     aid, state
-        As of `simnav.estimators.models.measurements.observe_inertial`.
+        Parameters of the instrument and the state, as in `simnav.estimators.models.measurements.observe_inertial`.
     errors : (k, n) array
-        Of the points.
+        Differences of the points from the state.
     differences : (k, d) array
-        Filled.
+        Overwritten with the differences of the readings.
     """
     code, arm, bias_at, scale_at = aid
     position, velocity, dcm, rate, bias, calibration = state
@@ -196,12 +196,12 @@ def observe_points(aid: Aid, state: State, errors: Array, differences: Array) ->
 
 
 class InertialPoints(InertialModel, PointModel):
-    """`InertialModel` with points.
+    """`InertialModel` with sigma points.
 
     Parameters
     ----------
     calibrate : bool
-        As there.
+        False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
     """
 
     def propagate_points(self, errors: Array, until: float) -> Array:

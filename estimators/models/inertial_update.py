@@ -1,7 +1,7 @@
-"""One measurement of the inertial state in few kernels: observed, weighed and corrected for.
+"""The update of the inertial state by one measurement, in few kernels.
 
-With an adaptation there are two kernels, because it may change the noise between them; without one there is a single
-kernel.
+With an adaptation there are two kernels, because it may change the noise between them. Without an adaptation there is a
+single kernel.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
 def innovate_inertial(
     aid: Aid, value: Array, state: State, covariance: Array, innovation: Array, cross: Array, predicted: Array
 ) -> bool:
-    """Innovation of a measurement, and what the covariance says of it.
+    """Compute the innovation of a measurement, and the covariance of its prediction.
 
     Parameters
     ----------
     aid, value, state
-        As of `simnav.estimators.models.measurements.observe_inertial`.
+        Instrument, measured value and state, as in `simnav.estimators.models.measurements.observe_inertial`.
     covariance : (n, n) array
-        P.
+        Covariance P of the state's error.
     innovation : (d,) array
-        Overwritten.
+        Overwritten with the measurement minus its prediction.
     cross : (n, d) array
-        Overwritten with P H'.
+        Overwritten with P H', with the Jacobian H of the prediction.
     predicted : (d, d) array
         Overwritten with H P H'.
 
     Returns
     -------
     bool
-        False where the measurement says nothing.
+        False if there is no such measurement at this state.
     """
     jacobian = np.empty((innovation.size, covariance.shape[0]))
     if not observe_inertial(aid, value, state, innovation, jacobian):
@@ -59,18 +59,18 @@ def absorb_inertial(
     Parameters
     ----------
     covariance, cross, predicted, innovation
-        As of `innovate_inertial`.
+        The arrays of `innovate_inertial`; the covariance is updated.
     noise : (d, d) array
-        R.
+        Covariance R of the measurement noise.
     state : tuple of arrays
-        As of `innovate_inertial`; corrected.
+        The state of `innovate_inertial`, corrected.
     correction : (n,) array
         Overwritten with what was added to the state.
 
     Returns
     -------
     float
-        Normalised innovation squared; -1 where its covariance is singular, and nothing is changed.
+        Normalised innovation squared; -1 if the innovation covariance is singular, and then nothing is changed.
     """
     d = innovation.size
     spread = np.empty((d, d))
@@ -88,13 +88,13 @@ def absorb_inertial(
 def assimilate_inertial(
     aid: Aid, value: Array, state: State, covariance: Array, noise: Array, correction: Array
 ) -> tuple[float, float]:
-    """`innovate_inertial` and `absorb_inertial` in one.
+    """Do `innovate_inertial` and `absorb_inertial` in one kernel.
 
     Returns
     -------
     nis : float
-        Normalised innovation squared; -1 where the measurement says nothing or its covariance is singular, and nothing
-        is changed.
+        Normalised innovation squared; -1 if there is no such measurement at the state or the innovation covariance is
+        singular, and then nothing is changed.
     size : float
         Norm of the innovation.
     """

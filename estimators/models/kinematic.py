@@ -30,7 +30,7 @@ SEAWAY = 0.2
 class KinematicModel(ErrorModel):
     """The model of the module; six states.
 
-    A receiver's bias and slow errors cannot be told from the position: they add to the estimate's covariance.
+    The bias and the slow errors of a receiver are not observable. They are added to the covariance of the estimate.
 
     Parameters
     ----------

@@ -1,21 +1,22 @@
-"""Measurement models of the inertial state: what each kind of instrument should read, and its Jacobian.
+"""Measurement models of the inertial state: the predicted reading of each kind of instrument, and its Jacobian.
 
-One helper, `observe_inertial`, is all of them, for a filter that takes one measurement at a time and for a window that
-takes many. With position p, velocity v, DCM C, lever arm l, body rate relative to the Earth w (Groves 2013, section
-14.3):
+One function, `observe_inertial`, computes all of them, for a filter with one measurement at a time and for a window
+with many. With position p, velocity v, direction cosine matrix C, lever arm l, body rate relative to the Earth w,
+height h and ``(.)_D`` for a down component (Groves 2013, section 14.3):
 
 - GNSS position: ``p + C l``; attitude ``-[C l x]``
 - GNSS velocity: ``v + C (w x l)``; attitude ``-[C (w x l) x]``; gyroscope bias ``C [l x]``
-- DVL: ``u = C' v + w x l``, seen as ``(1 + s) u + u x a + b`` (scale s, misalignment a, bias b);
+- DVL: ``u = C' v + w x l``, measured as ``(1 + s) u + u x a + b`` (scale factor s, misalignment a, bias b);
   velocity ``C'``; attitude ``C' [v x]``; gyroscope bias ``[l x]``
 - heading: ``atan2(C_10, C_00)``; attitude ``(tan(pitch) cos(yaw), tan(pitch) sin(yaw), 1)``
 - depth: ``-h + (C l)_D``; the mean sea surface is taken as the ellipsoid
-- speed log: forward component of the DVL's, of the velocity through the water ``v - c``, with the current c (north,
-  east) as two states behind the bias; current ``-C'``
+- speed log: forward component as for the DVL, of the velocity through the water ``v - c``, with the current c (north,
+  east) as two states after the bias; current ``-C'``
 - terrain fix: horizontal part of ``p + C l``
 
-A bias adds to every one of them, with a Jacobian of 1. The effect of scale and misalignment on the Jacobians of the
-other states is of second order, and left out. The noise is the datasheet's, and the gyroscopes' over the lever arm.
+After each quantity the Jacobians with respect to the states are given. A bias is added to all of them, with a Jacobian
+of 1. The effect of scale factor and misalignment on the Jacobians of the other states is of second order and neglected.
+The noise is that of the datasheet plus that of the gyroscopes times the lever arm.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ __all__ = [
     "white_noise", "wrap",
 ]  # fmt: skip
 
-#: A heading needs the forward axis this far from the vertical: the cosine of the pitch [-].
+#: Smallest cosine of the pitch at which there is a heading [-].
 LEAST_LEVEL = 0.1
-#: Of the inertial state, before the calibration.
+#: Number of components of the inertial state, without the calibration.
 NAVIGATION_STATES = 15
 
 GNSS_POSITION, TERRAIN_FIX, GNSS_VELOCITY, DVL, SPEED_LOG, HEADING, DEPTH = range(7)
@@ -56,9 +57,9 @@ CODES: Mapping[str, int] = {
 #: In the place of a code: the kind of instrument has a function of its own (`simnav.kinds.Kind.observation`).
 OWN = -1
 
-#: What is known of an instrument: one of `CODES`; its lever arm (3,), body axes [m]; the place in the error state of
-#: its first bias, and of its scale factor (behind a DVL's scale factor come three misalignments, behind a log's bias
-#: the current, north and east), -1 for none.
+#: The parameters of an instrument: one of `CODES`; its lever arm (3,), body axes [m]; the index in the error state of
+#: its first bias, and of its scale factor, -1 for none. After a DVL's scale factor come three misalignments, after a
+#: log's bias the current, north and east.
 Aid: TypeAlias = tuple[int, Array, int, int]
 #: The state at which a measurement is observed: position (3,), latitude, longitude [rad] and height [m]; velocity (3,),
 #: north, east, down [m/s]; rotation from body to north-east-down (3, 3); body rate relative to the inertial frame, as
@@ -82,25 +83,25 @@ def radii(latitude: float) -> tuple[float, float]:
 
 @kernel()
 def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
-    """Innovation and Jacobian of one measurement (equations in the module).
+    """Compute innovation and Jacobian of one measurement (equations in the module).
 
     Parameters
     ----------
     aid : tuple
-        The instrument, see `Aid`.
+        Parameters of the instrument, see `Aid`.
     value : (d,) array
-        As measured.
+        Measured value.
     state : tuple of arrays
-        See `State`.
+        The state at which the measurement is predicted, see `State`.
     innovation : (d,) array
-        Filled: measured minus predicted, in the units of ``KINDS[kind].errors``.
+        Overwritten with measured minus predicted, in the units of ``KINDS[kind].errors``.
     jacobian : (d, n) array
-        Filled, zeros included; n may be 12 where there are no calibration states.
+        Overwritten with the Jacobian of the prediction, including zeros; n may be 12 without calibration states.
 
     Returns
     -------
     int
-        d; 0 where the measurement says nothing (a heading near the vertical).
+        Number d of components; 0 if there is no such measurement at this state (a heading near the vertical).
     """
     code, arm, bias_at, scale_at = aid
     position, velocity, dcm, rate, bias, calibration = state
@@ -202,12 +203,12 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
 
 @kernel(f"i8({AID}, f8[::1], {STATE}, f8[::1], f8[:, ::1])")
 def observe(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
-    """`observe_inertial`, to be called from Python."""
+    """Call `observe_inertial` from Python."""
     return observe_inertial(aid, value, state, innovation, jacobian)
 
 
 def white_noise(sheet: Datasheet, faster: Array | float, rate_variance: float) -> Array:
-    """(d, d) noise: the instrument's own, what is ``faster`` than a state can follow, and the rate's over the arm."""
+    """(d, d) noise: that of the instrument, biases ``faster`` than a state, and gyroscope noise times the lever arm."""
     noise = np.diag(sheet.sigma**2 + faster)
     arm = sheet.lever_arm
     if sheet.equation == kinds.VELOCITY:
@@ -220,7 +221,7 @@ def white_noise(sheet: Datasheet, faster: Array | float, rate_variance: float) -
 
 
 def uncalibrated_noise(sheet: Datasheet, predicted: Array) -> Array:
-    """(d, d) noise that stands for a scale factor and a misalignment without states, at a ``predicted`` velocity."""
+    """(d, d) noise in place of a scale factor and a misalignment without states, at a ``predicted`` velocity."""
     u, m = predicted**2, sheet.misalignment**2
     variance = sheet.scale**2 * u
     if sheet.equation == kinds.BODY_VELOCITY:

@@ -74,7 +74,7 @@ class NineStateModel(InertialModel):
         self._unused[:] = 0.0
         super().propagate(self._unused, until)
         F = self.transition[:9, :9]
-        # Of the inertial model's noise there is left that of a time without IMU data.
+        # Of the inertial model's noise only that of a time without IMU data is used.
         covariance[:] = F @ covariance @ F.T + self.process_noise[:9, :9] + elapsed * self._motion
         covariance += covariance.T.copy()
         covariance *= 0.5

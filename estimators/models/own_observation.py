@@ -1,4 +1,4 @@
-"""Readings of instruments whose kind has a measurement equation of its own, in plain NumPy.
+"""Measurement equations of kinds of instruments that are Python functions.
 
 A kind may name one of the compiled equations (`simnav.kinds.EQUATIONS`), or be declared with a function that predicts a
 reading and gives its Jacobian (`simnav.kinds.Observation`; see ``docs/how-to/add-an-instrument.md``). Such functions
@@ -21,7 +21,7 @@ from simnav.types import KINDS, Array, Datasheet
 
 __all__ = ["OwnObservation"]
 
-#: Components of the error that an observation's Jacobian is about: position, velocity, attitude.
+#: Number of columns of an observation's Jacobian: position, velocity, attitude.
 _COMPONENTS = 9
 
 
@@ -31,12 +31,12 @@ class OwnObservation:
     Parameters
     ----------
     sheet : Datasheet
-        Of a kind with an observation.
+        Datasheet of an instrument whose kind has an observation function.
 
     Raises
     ------
     ValueError
-        While running: if the kind's function raises, or returns anything but finite arrays of the right shapes.
+        During a run, if the function of the kind raises, or does not return finite arrays of the right shapes.
     """
 
     def __init__(self, sheet: Datasheet):
@@ -48,12 +48,12 @@ class OwnObservation:
     def point(
         self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array
     ) -> NavigationPoint:
-        """The state, for the function; ``rate`` is the gyroscopes' output and ``bias`` theirs."""
+        """The state for the function; ``rate`` is the output of the gyroscopes and ``bias`` their bias."""
         turning = rate - bias[:3] - dcm.T @ earth_rate(position[0])
         return NavigationPoint(time, position, velocity, dcm, turning)
 
     def predict(self, point: NavigationPoint) -> tuple[Array, Array] | None:
-        """The (d,) reading at a state and its (d, 9) Jacobian; None where the state has none."""
+        """The (d,) reading at a state and its (d, 9) Jacobian; None if there is no reading at the state."""
         try:
             result = self._observation(point, self.sheet)
         except Exception as error:
@@ -98,20 +98,20 @@ class OwnObservation:
         point : NavigationPoint
             The state at which the reading is predicted.
         value : (d,) array
-            As measured.
+            Measured value.
         calibration : (size - 15,) array
             Calibration states of the instruments.
         size : int
-            n, of the error state.
+            Number n of components of the error state.
         bias_at : int
-            Place in the error state of the instrument's first bias; -1 for none.
+            Index in the error state of the instrument's first bias; -1 for none.
 
         Returns
         -------
         innovation : (d,) array
-            Reading minus prediction, in the units of the kind.
+            Measurement minus prediction, in the units of the kind's errors.
         jacobian : (d, n) array
-            Of the prediction.
+            Jacobian of the prediction with respect to the error state.
         """
         predicted = self.predict(point)
         if predicted is None:
@@ -127,21 +127,22 @@ class OwnObservation:
         return self.kind.difference(value, reading), jacobian
 
     def differences(self, point: NavigationPoint, errors: Array, bias_at: int) -> Array | None:
-        """What the instrument should read at k states, minus what it should read at one.
+        """The predicted readings of the instrument at k states, minus that at one state.
 
         Parameters
         ----------
         point : NavigationPoint
-            The state that the k states are compared with.
+            The state with which the k states are compared.
         errors : (k, n) array
-            Of the states with respect to the point, by the rule of `simnav.estimators.models.base.ErrorModel.correct`.
+            Differences of the states from the point, as in `simnav.estimators.models.base.ErrorModel.correct`.
         bias_at : int
             Index of the instrument's first bias state; negative if it has none.
 
         Returns
         -------
         (k, d) array or None
-            None where the point has no reading; a state near it that has none takes the point's Jacobian.
+            Differences of the readings; None if there is no reading at the point. For a state without a reading the
+            Jacobian at the point is used.
         """
         predicted = self.predict(point)
         if predicted is None:

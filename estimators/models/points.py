@@ -1,7 +1,7 @@
-"""What a model is to a sigma-point solver: its true, nonlinear motion and measurements, for many states at once.
+"""The form of a model for a sigma-point solver: its nonlinear motion and measurements, for many states at once.
 
-A point is a state near the model's own, given by its error with respect to it (``point = model retracted by error``, by
-the same rule as `ErrorModel.correct`). All points travel as one (k, n) array of errors.
+A point is a state near the model's own, given by its difference from it (``point = model retracted by error``, as in
+`ErrorModel.correct`). All points are one (k, n) array of such errors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["PointModel"]
 
 
 class PointModel(ErrorModel):
-    """An `ErrorModel` that moves and observes k points beside its own state."""
+    """An `ErrorModel` that propagates and observes k points in addition to its own state."""
 
     @abstractmethod
     def propagate_points(self, errors: Array, until: float) -> Array:
@@ -24,9 +24,9 @@ class PointModel(ErrorModel):
         Parameters
         ----------
         errors : (k, n) array
-            Of the points with respect to the state; overwritten by their errors with respect to the advanced state.
+            Differences of the points from the state; overwritten with those from the propagated state.
         until : float
-            Time to which the points are moved [s].
+            Time to which state and points are propagated [s].
 
         Returns
         -------

@@ -42,7 +42,7 @@ BLOCK = 0.2
 TURN_TIME = 60.0
 #: What a step without IMU data adds: velocity [m/s/sqrt(s)] and attitude [rad/sqrt(s)] random walk.
 HELD_VELOCITY, HELD_ATTITUDE = 0.3, 0.03
-#: Samples beyond these are no measurements of a marine vehicle [rad/s], [m/s^2].
+#: Samples above these limits are not plausible for a marine vehicle [rad/s], [m/s^2].
 LARGEST_RATE, LARGEST_FORCE = 50.0, 500.0
 #: Relative growth of gravity from the equator to the poles [-].
 GRAVITY_FLATTENING = 0.0053024
@@ -72,7 +72,7 @@ def _usable(w0: float, w1: float, w2: float, f0: float, f1: float, f2: float) ->
 
 @kernel()
 def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: float) -> None:
-    """The matrix F of the error over one block."""
+    """Compute the system matrix F of the error dynamics for one block."""
     height = block[3]
     s, cl = sin(block[2]), cos(block[2])
     meridian, prime = radii_scalar(s)
@@ -122,7 +122,7 @@ def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: fl
 
 @kernel()
 def _advance_rows(F: Array, dt: float, M: Array, first: int, A: Array, B: Array) -> None:
-    """``M = (I + F dt + F F dt^2 / 2) M`` from a column on, with work space A, B; F is sparse."""
+    """Compute ``M = (I + F dt + F F dt^2 / 2) M`` from a column on; F is sparse, and A, B are work space."""
     n = M.shape[1]
     for i in range(15):
         for j in range(first, n):
@@ -166,14 +166,14 @@ def _add_noise(M: Array, block: Array, noise: Array) -> None:
 
 @kernel("void(f8[:, ::1], i8, f8[::1], f8[:, ::1], f8[:, ::1])")
 def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array, process_noise: Array) -> None:
-    """Transition matrix and process noise of the error over successive blocks.
+    """Compute transition matrix and process noise of the error over successive blocks.
 
     Parameters
     ----------
     blocks : (k, 22) array
-        As `advance_inertial` fills them.
+        The blocks from `advance_inertial`.
     count : int
-        How many of them.
+        Number of blocks that are used.
     noise : (9,) array
         Gyroscope and accelerometer white noise density; decay and noise density of the gyroscopes' bias, of the
         accelerometers'; ``scale^2 TURN_TIME`` and ``misalignment^2 TURN_TIME`` of the gyroscopes; nominal interval.
@@ -187,7 +187,7 @@ def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array,
     for k in range(count):
         block = blocks[k]
         _dynamics(F, block, noise[2], noise[4])
-        # Half the noise enters before the block and half after: second order in its length.
+        # Half of the noise is added before the block and half after it: accurate to second order in its length.
         _add_noise(M, block, noise)
         for half in range(2):
             if half == 1:  # (Phi Q)' to the left of which Phi makes Phi Q Phi'
@@ -209,18 +209,18 @@ def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array,
 def next_stretch(
     clock: Array, samples: Samples, i: int, t: float, until: float, nominal: float
 ) -> tuple[int, float, float, bool]:
-    """The stretch from a time on in which one sample holds, or none.
+    """Find the next interval that is covered by one sample, or by none.
 
     Parameters
     ----------
     clock : (15,) array
-        As of `advance_inertial`; what it says of samples is updated.
+        The clock of `Moving`; its entries about samples are updated.
     samples : tuple of arrays
-        See `Samples`.
+        The IMU samples, see `Samples`.
     i : int
-        Index of the first that may not be used up.
+        Index of the first sample that may not be completely used.
     t, until, nominal : float
-        Start of the stretch, its latest end, and the nominal interval [s].
+        Start of the interval, its latest end, and the nominal sample interval [s].
 
     Returns
     -------
@@ -258,7 +258,7 @@ def next_stretch(
     elif i < n:
         stop, hold = min(time[i] - interval[i], until), True
     elif t < clock[1] + 1.5 * nominal:
-        stop = min(clock[1] + 2.0 * nominal, until)  # the step ends between samples: carry the last one on
+        stop = min(clock[1] + 2.0 * nominal, until)  # the step ends between samples: the last sample is extrapolated
     else:
         hold = True
     return i, stop, whole, hold
@@ -271,30 +271,30 @@ def next_stretch(
 def advance_inertial(
     state: Moving, samples: Samples, first: int, until: float, noise: Array, blocks: Array
 ) -> tuple[int, int]:
-    """Advance an inertial state to a time that need not be a sample's, in place.
+    """Propagate an inertial state to a time, which need not be the time of a sample, in place.
 
-    A sample that spans ``until`` is used in part, the rest by the next call. Where samples are missing or absurd the
-    state is held at its velocity and attitude.
+    A sample that spans ``until`` is used in part, and the rest by the next call. If samples are missing or implausible,
+    velocity and attitude are held.
 
     Parameters
     ----------
     state : tuple of arrays
-        See `Moving`; overwritten.
+        The state with its memory of the samples, see `Moving`; updated.
     samples : tuple of arrays
-        See `Samples`.
+        The IMU samples, see `Samples`.
     first : int
-        Index of the first that is not used up.
+        Index of the first sample that is not completely used.
     until : float
-        Time to which the state is moved [s].
+        Time to which the state is propagated [s].
     noise : (9,) array
-        As in `accumulate_error`.
+        Noise parameters of the IMU, see `accumulate_error`.
     blocks : (m, 22) array
-        Filled; m must suffice.
+        Overwritten with the blocks for `accumulate_error`; m must be large enough.
 
     Returns
     -------
     int, int
-        Index of the first sample that is not used up, and number of blocks.
+        Index of the first sample that is not completely used, and number of blocks.
     """
     position, velocity, dcm, memory, bias, turn, clock = state
     eps = 1e-7
@@ -336,7 +336,7 @@ def advance_inertial(
                 block[7 + r] += dcm[r // 3, r % 3] * dt
             t = stop
         length = end - begin
-        # The sum took the attitude at the ends of the samples; their middles are half a sample earlier.
+        # The sum has the attitude at the ends of the samples; their middles are half a sample earlier.
         shift = 0.5 * min(nominal, length)
         for r in range(9):
             block[7 + r] = (block[7 + r] - shift * (dcm[r // 3, r % 3] - before[r])) / length
@@ -369,7 +369,7 @@ def advance_inertial(
 def propagate_inertial(
     state: Moving, samples: Samples, first: int, until: float, noise: Array, transition: Array, process_noise: Array
 ) -> int:
-    """`advance_inertial` and `accumulate_error` in one; returns the index of the first sample not used up."""
+    """Do `advance_inertial` and `accumulate_error`; return the index of the first sample not completely used."""
     clock = state[-1]
     blocks = np.empty((int((until - clock[0]) / BLOCK) + 2, BLOCK_COLUMNS))
     first, count = advance_inertial(state, samples, first, until, noise, blocks)
@@ -382,20 +382,21 @@ def propagate_covariance(
     covariance: Array, transition: Array, process_noise: Array, calibration: Array, rate: Array, density: Array,
     elapsed: float,
 ) -> None:  # fmt: skip
-    """``P = Phi P Phi' + Q`` in place, where the states from the m-th on are Gauss-Markov biases of their own.
+    """Compute ``P = Phi P Phi' + Q`` in place; the states from index m on are independent Gauss-Markov biases.
 
     Parameters
     ----------
     covariance : (n, n) array
-        Covariance of the errors; overwritten.
+        Covariance P of the errors; overwritten.
     transition, process_noise : (m, m) arrays
-        Of the first m states.
+        Transition matrix Phi and process noise Q of the first m states.
     calibration : (n - m,) array
-        Values of the others; they decay.
+        Values of the other states, which decay; updated.
     rate, density : (n - m,) arrays
-        Inverse of their correlation times [1/s], and their noise densities.
+        Inverse correlation times of the other states [1/s], and their noise densities.
     elapsed : float
-        [s]. The discretisation is exact, so that a stationary state stays stationary in a step of any length.
+        Length of the step [s]. The discretisation is exact, so a stationary state stays stationary in a step of any
+        length.
     """
     n, m = covariance.shape[0], transition.shape[0]
     X = np.zeros((m, n))

@@ -1,4 +1,4 @@
-"""Which instruments give fixes, and which measure a speed."""
+"""The division of instruments into fixes and logs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ _OF_RECEIVERS, _OF_LOGS = (VELOCITY,), (BODY_VELOCITY, WATER_SPEED)
 
 
 def fixes_and_logs(instruments: Instruments) -> dict[str, bool]:
-    """Which instruments give fixes, or the velocity of a receiver (True), and which are logs (False)."""
+    """For each instrument: True for fixes and the velocity of a receiver, False for logs."""
     fix = {name: sheet.role == "fix" or sheet.equation in _OF_RECEIVERS for name, sheet in instruments.items()}
     return {name: fix[name] for name, sheet in instruments.items() if fix[name] or sheet.equation in _OF_LOGS}

@@ -1,19 +1,20 @@
 """The ship dead-reckoning model: position, speed, heading, turn rate and current, for a ship without an INS.
 
 State: latitude and longitude; forward speed u through the water; heading psi; turn rate r; current c (north, east);
-and, as the datasheets ask for them, a bias for each compass and log and a scale factor for each log. Motion:
+and, if the datasheets give them, a bias for each compass and log and a scale factor for each log. Motion, with the
+horizontal position p, the correlation time T of a state, and ' for the time derivative:
 
 - p' = u (cos psi, sin psi) + c
-- u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases after
+- u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases as in
   `simnav.estimators.models.base.gauss_markov`
 
-Speed and heading as states, with log and compass as measurements of them, let their biases be found while there is GNSS
-and carry the position through an outage. Height, roll and pitch are not estimated; a lever arm is turned by the heading
-alone, and what heel does to it is noise. Sideways motion through the water (waves, leeway) is noise on measured
-velocities and in the estimate's velocity.
+Speed and heading are states, and log and compass are measurements of them. So their biases are estimated while there is
+GNSS, and the position is propagated through an outage. Height, roll and pitch are not estimated. A lever arm is turned
+by the heading only; the effect of heel is noise. Sideways motion through the water (waves, leeway) is noise of measured
+velocities and of the estimate's velocity.
 
-After Jiang et al. (2026), J. Mar. Sci. Eng. 14(5), 472: position, speed, heading, log bias, compass bias, 1 Hz; the
-turn rate and the current are ours, since a log measures through the water.
+After Jiang et al. (2026), J. Mar. Sci. Eng. 14(5), 472: position, speed, heading, log bias, compass bias, 1 Hz. The
+turn rate and the current are additions, because a log measures the speed through the water.
 """
 
 from __future__ import annotations
@@ -77,19 +78,20 @@ class ShipModel(ErrorModel):
     x : (n,) array
         The other states; the first two numbers are zero.
     transition : (n, n) array
-        Of the last propagation.
+        Transition matrix of the last propagation.
     decay, density : (n,) array
-        Inverse of the correlation times [1/s], and noise densities.
+        Inverse correlation times of the states [1/s], and their noise densities.
     aids : dict of str to (3,) array of int, (7,) array, int
-        The instruments observed, as `simnav.estimators.models.ship_kernels` has them, and their number of components.
+        Parameters of each observed instrument for `simnav.estimators.models.ship_kernels`, and its number of
+        components.
     own : dict of str to ShipObservation
-        The instruments observed whose kind has a measurement equation of its own.
+        The observed instruments whose kind has a measurement equation of its own.
     bias_at, scale_at : dict of str to int
         Index in the state of an instrument's first bias, and of its scale factor.
     """
 
     state = ("position", "x")
-    moving = (slice(0, 0), slice(0, 0))  # no IMU that could be disturbed: the noise of the motion covers manoeuvres
+    moving = (slice(0, 0), slice(0, 0))  # there is no IMU: the process noise covers manoeuvres
 
     def __init__(
         self,
@@ -163,7 +165,7 @@ class ShipModel(ErrorModel):
         P = np.zeros((n, n))
         P[:2, :2] = start.covariance[:2, :2]
         P[range(2, n), range(2, n)] = [s.variance for s in states]
-        # The initial ground velocity is a measurement of u and c, whose prior for u says nothing.
+        # The initial velocity over ground is a measurement of u and c; the prior of u has no information.
         P[U, U] = 1e4
         north, east = start.velocity[:2].tolist()
         self.x[U] = cos(psi) * north + sin(psi) * east
@@ -215,9 +217,7 @@ class ShipModel(ErrorModel):
         observe_ship(code, aid, self.position, self.x, first, second, residual, jacobian, noise)
         return Linearised(residual, jacobian, noise)
 
-    def observe_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...]
-    ) -> tuple[Array, Array] | None:
+    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
         found = self.own[name].measure(time, value, *state)
         return None if found is None else (found.innovation, found.jacobian)

@@ -1,11 +1,11 @@
 """The chain of the ship model: dead-reckoning factors between the nodes, and all aids of a window linearised at once.
 
-There is nothing to preintegrate. The motion is a closed form, and a motion factor is the model's own step over its
-time, taken again from wherever the older node is now: exact at any distance, without a shift. Its noise is the one with
-which the front ran ahead.
+No preintegration is needed. The motion has a closed form, and a motion factor is the propagation of the model from the
+present state of the older node: it is exact for any shift of the node. Its noise is that of the propagation of the
+front.
 
-In the terms of Jiang et al. (2026), section 2: the part of a motion factor that moves position and heading is its DR
-factor, the Gauss-Markov transition of log and compass biases its DR error factor (eqs. 4-6, a random walk), and the
+In the terms of Jiang et al. (2026), section 2: the part of a motion factor for position and heading is the DR factor of
+the paper, the Gauss-Markov transition of log and compass biases its DR error factor (eqs. 4-6, a random walk), and the
 prior of the first node its marginalization factor (eqs. 12-17).
 """
 
@@ -47,9 +47,9 @@ def _linearise_motion(
     Parameters
     ----------
     first : int
-        Factor to begin with.
+        Index of the first factor that is computed.
     time : (K + 1,) array
-        Of the nodes [s].
+        Times of the nodes [s].
     position, x : (K + 1, 3), (K + 1, n) arrays
         States of the nodes (see `simnav.estimators.models.ship_kernels`).
     rate : (n,) array
@@ -57,9 +57,9 @@ def _linearise_motion(
     turn_time : float
         Correlation time of the turn rate [s].
     residual : (K, n) array
-        Overwritten: newer node minus where the motion leads from the older one.
+        Overwritten with the newer node minus its prediction from the older one.
     jacobian : (K, n, n) array
-        Overwritten: derivative of where it leads with respect to the older node.
+        Overwritten with the derivative of the prediction with respect to the older node.
     """
     count, n = residual.shape
     p, y, decay = np.empty(3), np.empty(n), np.empty(n)
@@ -95,13 +95,13 @@ def _linearise_aids(
     Parameters
     ----------
     first : int
-        Measurement to begin with.
+        Index of the first measurement that is computed.
     measured : (M,) int, (M,) int and (M, 3) arrays
-        Number of the state of each measurement, -1: none of these states; number of its instrument; what was measured.
+        Number of the state of each measurement (-1: none of these states); number of its instrument; its value.
     codes, aids : (i,), (i, ...) arrays
-        Of each instrument, as `simnav.estimators.models.ship_kernels.residual_of` takes them.
+        Parameters of each instrument for `simnav.estimators.models.ship_kernels.residual_of`.
     position, x : (K, 3), (K, n) arrays
-        The states.
+        The states at which the measurements are predicted.
     residual : (M, 3) array
         Overwritten: measured minus predicted.
     jacobian : (M, 3, n) array

@@ -124,9 +124,9 @@ def advance_ship(
     position: Array, x: Array, covariance: Array, transition: Array, rate: Array, density: Array, turn_time: float,
     elapsed: float,
 ) -> None:  # fmt: skip
-    """Advance a state and its covariance, in place.
+    """Propagate a state and its covariance, in place.
 
-    Half of a step's noise enters before it and half after: second order in its length.
+    Half of a step's noise is added before it and half after it, which is accurate to second order in its length.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def advance_ship(
     covariance : (n, n) array
         Covariance of the errors of position and states.
     transition : (n, n) array
-        Overwritten.
+        Overwritten with the transition matrix of the step.
     rate, density : (n,) arrays
         Inverse correlation times [1/s] and noise densities.
     turn_time : float
@@ -267,7 +267,7 @@ def observe_ship(
     code: Integers, aid: Array, position: Array, x: Array, first: float, second: float, residual: Array,
     jacobian: Array, noise: Array,
 ) -> None:  # fmt: skip
-    """One measurement, linearised.
+    """Linearise one measurement.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""How it is estimated: filters over any model."""
+"""Solvers: the estimation algorithms, over any model."""

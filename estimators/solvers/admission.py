@@ -1,4 +1,4 @@
-"""Which measurements of a step a solver takes, and in which order."""
+"""The selection and order of the measurements of a step that a solver uses."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from simnav.types import KINDS, Instruments, Measurement, Measurements
 
 __all__ = ["LATE", "Admission"]
 
-#: A measurement this much older than the state [s] still counts as of its time.
+#: A measurement that is older than the state by at most this counts as simultaneous [s].
 LATE = 1e-4
 
 
 class Admission:
-    """Lets pass what can be used: of known instruments, plausible, in order, not older than the state, each once.
+    """Selects the usable measurements: of known instruments, plausible, not older than the state, each only once.
 
     Parameters
     ----------
     instruments : Instruments
         Datasheets of the run's instruments.
     observed : iterable of str
-        Names of the instruments that are used at all; others are passed over without a word.
+        Names of the instruments that the model uses. Measurements of others are ignored and not counted.
 
     Attributes
     ----------
     skipped : int
-        Measurements that were left out so far.
+        Number of rejected measurements so far.
     """
 
     def __init__(self, instruments: Instruments, observed: Iterable[str]):

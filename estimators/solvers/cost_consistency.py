@@ -1,14 +1,15 @@
-"""The chi-square test of a window's cost: does the window explain its measurements?
+"""The chi-square test of a window's cost: whether the residuals of a window agree with model and noise.
 
-At the least-squares solution, twice the cost is a sum of squares of unit variance. If model and noise are right it is
-distributed as chi-square with as many degrees of freedom as there are aiding components: the prior and the motion have
-as many components as there are unknowns. Where it stays improbably large, the window has not found the solution, or
-its model is wrong. Either way its covariance, which does not depend on the residuals, promises too much. It is then
-multiplied by the *variance factor*, twice the cost over the degrees of freedom.
+At the least-squares solution, twice the cost is a sum of squares of unit variance. If model and noise are right, it has
+a chi-square distribution. Its degrees of freedom are the number of aiding components, because prior and motion have as
+many components as there are unknowns. If the cost stays improbably large, the window has not found the solution, or its
+model is wrong. In both cases its covariance, which does not depend on the residuals, is too small. It is then
+multiplied by the *variance factor*, twice the cost divided by the degrees of freedom.
 
-A weight counts for the part of a component that it leaves. Weighted residuals are smaller than that, so the test of a
-robust window errs on the quiet side. Successive windows share most of their measurements, so that one bad epoch makes
-many windows improbable: the test speaks only when the cost has been improbable for `PATIENCE` epochs in a row.
+In a robust window the degrees of freedom are the sum of the weights of the components. Weighted residuals are smaller
+than this, so the test detects less. Successive windows share most of their measurements, so one bad epoch makes the
+cost of many windows improbable. Therefore the test reports an inconsistency only if the cost has been improbable for
+`PATIENCE` epochs in a row.
 
 Source: P. J. G. Teunissen, *Testing Theory*, VSSD, 2006 (overall model test); the normal approximation is E. B. Wilson
 and M. M. Hilferty, "The distribution of chi-square", Proc. Nat. Acad. Sci. 17(12), 1931.
@@ -27,12 +28,12 @@ PATIENCE = 5
 
 
 def chi_square_deviate(value: float, freedom: float) -> float:
-    """The standard normal deviate that is as improbable as a value of chi-square.
+    """The standard normal deviate with the same tail probability as a value of chi-square.
 
     Parameters
     ----------
     value : float
-        Of chi-square, 0 or more.
+        Value of the chi-square variable, 0 or more.
     freedom : float
         Degrees of freedom, above 0.
 
@@ -54,7 +55,7 @@ class ConsistencyTest:
     variance_factor : float
         The sum over its degrees of freedom, of the last epoch; NaN before the first.
     inconsistent : bool
-        Whether it has been improbable for `PATIENCE` epochs.
+        Whether the sum has been improbable for `PATIENCE` epochs in a row.
     """
 
     def __init__(self) -> None:
@@ -63,7 +64,7 @@ class ConsistencyTest:
 
     @property
     def inconsistent(self) -> bool:
-        """Whether the solver does not explain its measurements."""
+        """Whether the sum has been improbable for `PATIENCE` epochs in a row."""
         return self._improbable >= PATIENCE
 
     def judge(self, squares: float, freedom: float) -> None:
@@ -77,10 +78,10 @@ class CostTest(ConsistencyTest):
 
     @property
     def inflation(self) -> float:
-        """What the covariance is to be multiplied by: the variance factor where inconsistent, else 1."""
+        """Factor on the covariance: the variance factor if the window is inconsistent, otherwise 1."""
         return max(1.0, self.variance_factor) if self.inconsistent else 1.0
 
     def add(self, cost: float, freedom: float) -> None:
-        """Take the cost of an epoch, half a sum of squares, and its degrees of freedom; none without any."""
+        """Add the cost of an epoch (half the sum of squares) and its degrees of freedom; 0 degrees are ignored."""
         if freedom > 0.0:
             self.judge(2.0 * cost, freedom)

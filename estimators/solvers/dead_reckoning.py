@@ -1,14 +1,14 @@
-"""Dead reckoning: heading and speed, carried forward; no position is ever measured.
+"""Dead reckoning: heading and speed are integrated from the initial position; no position is measured.
 
 Heading
-    With an IMU, the gyroscopes' from the initial heading on, drawn slowly (`COMPASS_TIME`) to the compass if there is
-    one; roll and pitch are the gyroscopes', drawn slowly (`LEVEL_TIME`) to the accelerometers' vertical. Without an
-    IMU, the compass as it is.
+    With an IMU, the gyroscopes are integrated from the initial heading, with a slow correction (`COMPASS_TIME`) to the
+    compass if there is one. Roll and pitch are integrated likewise, with a slow correction (`LEVEL_TIME`) to the
+    vertical of the accelerometers. Without an IMU, the heading is that of the compass.
 Speed
-    The newest reading of the DVL; of the speed log where there is no DVL, or it has been silent for `SILENCE` seconds.
-    Between readings and in a silence the last velocity in body axes is held.
+    The newest reading of the DVL, or of the speed log if there is no DVL or no DVL reading for `SILENCE` seconds.
+    Without new readings the last velocity in body axes is held.
 Height
-    The depth sensor's if there is one, else the integral of the DVL's vertical velocity.
+    From the depth sensor if there is one, otherwise the integral of the DVL's vertical velocity.
 
 The covariance follows from the datasheets: heading error (with the gyroscopes' bias, or the compass's errors), biases
 of the speed forward and starboard (bias, scale factor, misalignment, current), and white noise.
@@ -57,7 +57,8 @@ class DeadReckoningEstimator(Solver):
     Parameters
     ----------
     current : float
-        Sigma of the current that a speed log cannot see, each component [m/s]; for the covariance only.
+        Standard deviation of each component of the current, which a speed log does not measure [m/s]; it is used for
+        the covariance only.
     """
 
     refuses: ClassVar[Mapping[str, str]] = {

@@ -1,26 +1,26 @@
 """Carlson's federated Kalman filter: a local filter for each aiding sensor, fused by a master.
 
-All local filters share one inertial reference, the state of the model; each holds its own correction x_i to it and the
-covariance P_i of what is left, and sees one sensor. Information is shared out so that no local filter counts what
-another counts too: with shares beta_i that sum to 1, local filter i starts with P_0 / beta_i and has the process noise
-Q / beta_i. At a fusion epoch the master adds up
+All local filters share one inertial reference, the state of the model. Each local filter has its own correction x_i of
+the reference, the covariance P_i of the remaining error, and one sensor. The information is divided, so that it is not
+counted twice: with shares beta_i that sum to 1, local filter i starts with P_0 / beta_i and has the process noise
+Q / beta_i. P_0 is the initial covariance and Q the process noise. At a fusion epoch the master sums up
 
     P_f^-1 = sum P_i^-1,    P_f^-1 x_f = sum P_i^-1 x_i
 
-over the states that all have in common, and feeds x_f back to the shared reference. Then
+over the common states, and feeds x_f back to the shared reference. Then
 
-- *with reset*, every local filter takes P_f / beta_i and x_f (Carlson's fusion-reset mode). Where all fuse after every
-  measurement this is the centralized filter exactly, as long as no sensor has states of its own.
-- *without reset*, every local filter goes on with what it knows (no-reset mode): it is never told what the others saw,
-  so that a fault of one stays in one (but for the shared reference, about which all are linear), at the price of a
-  worse estimate. The sum is then an upper bound of the error: it is conservative by design, not by mistake.
+- *with reset*, every local filter continues with P_f / beta_i and x_f (Carlson's fusion-reset mode). If all fuse after
+  every measurement and no sensor has states of its own, this is exactly the centralised filter.
+- *without reset*, every local filter continues with its own estimate (no-reset mode). It receives no information from
+  the other sensors, so a fault of one sensor stays in one filter (except for the shared reference, about which all are
+  linearised), but the estimate is worse. P_f is then an upper bound of the covariance: it is conservative by design.
 
-Why a bound: the errors of all local filters together begin with the covariance ``11' (x) P_0`` and share the noise
-``11' (x) Q``. Both are at most ``diag(P_0 / beta_i)`` and ``diag(Q / beta_i)``, and motion and updates, block by block
-and linear, keep it so: the actual joint covariance is at most ``diag(P_i)``, and the fused one, with the weights
-``W_i = P_f P_i^-1``, at most ``sum W_i P_i W_i' = P_f``. It is exact where all local filters have the same gain, thus
-for sensors of one kind, or with a reset after every measurement. In the tests the variances of position are up to a
-quarter above, that of a bias up to twice.
+P_f is a bound for this reason: the joint error of all local filters starts with the covariance ``11' (x) P_0`` and has
+the noise ``11' (x) Q``. Both are at most ``diag(P_0 / beta_i)`` and ``diag(Q / beta_i)``, and motion and updates, block
+by block and linear, keep it so: the actual joint covariance is at most ``diag(P_i)``, and the fused one, with the
+weights ``W_i = P_f P_i^-1``, at most ``sum W_i P_i W_i' = P_f``. It is exact where all local filters have the same
+gain, thus for sensors of one kind, or with a reset after every measurement. In the tests the variances of position are
+up to a quarter above, that of a bias up to twice.
 
 Calibration states belong to the local filter of their sensor. They are not fused; given the common states they are
 independent of the other filters' (which holds exactly at one time only, and is the price of the architecture: with them
@@ -28,10 +28,10 @@ P_f is a bound with reset, too, because their local filter sees only its share o
 reset keeps what a local filter knows of them given the common states: with ``G = P_bc P_cc^-1`` it changes P_cc, takes
 b along by G, and leaves the conditional covariance of b as it is.
 
-Between two fusions the estimate is the reference, propagated: measurements wait for the master. That wait is the
-federated filter's loss in the AUV smoothing paper (2022), which fuses when the slowest sensor has delivered; so does
-the default here. A sensor that is away needs no reconfiguration: its local filter predicts, and its share is its
-prediction. All measurements are linearised about the shared reference.
+Between two fusions the estimate is the propagated reference: measurements have an effect at the next fusion only. This
+delay is the reason for the loss of the federated filter in the AUV smoothing paper (2022), which fuses at the rate of
+the slowest sensor; the default here is the same. In an outage of a sensor its local filter only predicts, so nothing
+has to be reconfigured. All measurements are linearised about the shared reference.
 
 Source: N. A. Carlson, *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and
 Electronic Systems 26(3), 1990; *Post-processing algorithm based on factor graph optimization for AUV integrated
@@ -64,7 +64,7 @@ SAME = 1e-6
 
 
 class _Local(NamedTuple):
-    """A local filter, or the master's own share: its part of the information, own states, correction, covariance."""
+    """A local filter, or the master's own share: share of the information, own states, correction, covariance."""
 
     share: float
     own: NDArray[np.intp]
@@ -84,11 +84,12 @@ class FederatedEstimator(KalmanEstimator):
     fusion_period : float, optional
         Time between fusions [s]; 0 fuses after every measurement; None: the period of the slowest sensor.
     reset_locals : bool
-        Whether the local filters are told the fused state.
+        Whether the local filters are reset to the fused state after a fusion.
     master_share : float
-        Information that the master keeps for itself, in [0, 1); it propagates it, and fuses it with the others.
+        Share of the information of the master itself, in [0, 1). The master propagates it and fuses it with the others.
     shares : tuple of float, optional
-        Of the aiding sensors in the scenario's order, above 0; with the master's they sum to 1. Empty: equal shares.
+        Shares of the aiding sensors in the scenario's order, above 0; with ``master_share`` they sum to 1. Empty: equal
+        shares.
     """
 
     pieces = ("model", "adaptation")

@@ -1,7 +1,8 @@
-"""The full graph: nothing leaves the window, every step estimates the whole trajectory again.
+"""The full graph: no node leaves the window, and every step estimates the whole trajectory again.
 
-In real time it costs the square of the length of the run, and differs from a sliding window only where measurements
-long past are linearised or weighed anew. At the end it is the batch solution: the maximum a posteriori trajectory.
+In real time its cost grows with the square of the length of the run. It differs from a sliding window only by the new
+linearisation and new weights of old measurements. At the end it is the batch solution: the maximum a posteriori
+trajectory.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ class FullGraph(WindowEstimator):
     Parameters
     ----------
     model, adaptation, weighting, isolation, tolerance, iterations, spacing
-        As for `WindowEstimator`.
+        The pieces and settings of the window, as for `WindowEstimator`.
 
     Attributes
     ----------
     smoothed_covariance : (T, 9, 9) array
-        Of the trajectory that `smooth` returned.
+        Covariances of the trajectory that `smooth` returned.
     """
 
     slow = True

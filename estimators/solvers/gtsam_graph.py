@@ -48,26 +48,27 @@ def observe_tangent(
     aid: tuple[int, Array], value: Array, origin: Array, axes: Array, state: tuple[Array, Array, Array, Array, Array],
     error: Array, jacobian: Array,
 ) -> int:  # fmt: skip
-    """Prediction less measurement, and its Jacobian, of a state in a `TangentFrame`.
+    """Compute prediction minus measurement, and its Jacobian, for a state in a `TangentFrame`.
 
     Parameters
     ----------
     aid, value
-        Code and lever arm, and what was measured, as in `simnav.estimators.models.measurements.observe_inertial`.
+        Code and lever arm, and measured value, as in `simnav.estimators.models.measurements.observe_inertial`.
     origin, axes : arrays
-        Of the frame.
+        Origin and axes of the frame, see `TangentFrame`.
     state : (3, 3), (3,), (3,), (3,) and (6,) arrays
         Rotation from body to frame; position and velocity in the frame; body rate as measured; biases of the
         accelerometers and of the gyroscopes.
     error : (3,) array
-        Filled.
+        Overwritten with prediction minus measurement.
     jacobian : (3, 15) array
-        Filled: by rotation and displacement in body axes, velocity in the frame, bias.
+        Overwritten with the Jacobian with respect to rotation and displacement in body axes, velocity in the frame, and
+        bias.
 
     Returns
     -------
     int
-        Number of components; 0 where the measurement says nothing.
+        Number of components; 0 if there is no such measurement at this state.
     """
     code, arm = aid
     rotation, place, speed, rate, bias = state
@@ -92,12 +93,12 @@ def observe_tangent(
 
 
 class Observation(NamedTuple):
-    """A measurement on a node, as it takes to make its factor.
+    """The data of the factor of a measurement on a node.
 
     Attributes
     ----------
     measurement : Measurement
-        The measurement.
+        The measurement of the factor.
     noise : (m, m) array
         Covariance of its noise.
     node : int

@@ -70,9 +70,9 @@ def imu_pieces(
     bias : (6,) array
         Gyroscopes, accelerometers: taken off for coning and sculling, and put on again.
     samples : tuple of arrays
-        See `simnav.estimators.models.propagation.Samples`.
+        The IMU samples, see `simnav.estimators.models.propagation.Samples`.
     first : int
-        The first that is not used up.
+        Index of the first sample that is not completely used.
     until, nominal : float
         End of the stretch, and the nominal interval [s].
     pieces : (m, 8) array
@@ -124,12 +124,12 @@ def _own(values: Array) -> Array:
 
 
 class Preintegration:
-    """What happened since the newest node: GTSAM's preintegrated measurements, and where they lead.
+    """The motion since the newest node: GTSAM's preintegrated measurements, and the state that they predict.
 
     Parameters
     ----------
     densities : (9,) array
-        As in `simnav.estimators.models.propagation.accumulate_error`.
+        Noise parameters of the IMU, see `simnav.estimators.models.propagation.accumulate_error`.
     variance : (6,) array
         Initial variances of the biases, gyroscopes first.
     frame : TangentFrame

@@ -216,9 +216,9 @@ class FixedLagEstimator(GtsamEstimator):
     Parameters
     ----------
     window : int
-        Steps with nodes that are kept; what is older is marginalised.
+        Number of steps with nodes that are kept; older nodes are marginalised.
     threshold, iterations
-        As for `GtsamEstimator`.
+        Limits of the updates of the solver, as for `GtsamEstimator`.
     """
 
     def __init__(self, window: int = 20, threshold: float = 1.0, iterations: int = 5):
@@ -381,7 +381,7 @@ class GncEstimator(BatchEstimator):
     Parameters
     ----------
     window, threshold, iterations, most
-        As for `BatchEstimator`.
+        Settings of the real-time estimates and of the batch, as for `BatchEstimator`.
     loss : {"tls", "gm"}
         Truncated least squares, or Geman and McClure.
     probability : float

@@ -1,16 +1,17 @@
-"""An EKF for each of several initial headings, until the measurements tell which one is right.
+"""An EKF for each of several initial headings, until the measurements decide which one is right.
 
-The error equations of an EKF are linear in the attitude error, which holds to about twenty degrees. A vessel that
-starts without a heading is outside of that: one filter with a standard deviation of 100 degrees linearises about the
-wrong heading and may settle on it. So the initial density of the heading is written as a mixture of narrow Gaussians
-round the circle, and each has a filter of its own. A filter's weight is multiplied by the likelihood of every
-innovation, N(v; 0, S); a filter of negligible weight is dropped, and of two filters that have come to the same heading
-one is dropped, its weight given to the other. When one is left, it is the plain EKF.
+The error equations of an EKF are linear in the attitude error, which is valid up to about twenty degrees. A start
+without a known heading is outside of this range: a single filter with a standard deviation of 100 degrees linearises
+about the wrong heading and may converge to a wrong one. So the initial density of the heading is written as a mixture
+of narrow Gaussians around the circle, and each has a filter of its own. The weight of a filter is multiplied by the
+likelihood of every innovation v, N(v; 0, S), with the innovation covariance S. A filter with a negligible weight is
+removed. If two filters reach the same heading, one of them is removed, and the other gets its weight. The last
+remaining filter is the plain EKF.
 
-The estimate is the mean of the mixture, its covariance holds the spread between the filters. A gross error must not
-decide: a normalised innovation squared counts as no more than its `_CLIP` quantile.
+The estimate is the mean of the mixture, and its covariance includes the spread between the filters. To limit the
+influence of a gross error, a normalised innovation squared is limited to its `_CLIP` quantile.
 
-Where the start is known to `above_deg` or better there is one filter from the beginning.
+If the initial heading is known to ``above_deg`` or better, there is one filter from the beginning.
 
 Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; H. W.
 Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*, Automatica 7(4), 1971; for large
@@ -38,9 +39,9 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["HeadingBank", "initial_headings"]
 
-#: A measurement less probable than this counts as just so probable.
+#: Smallest probability of a measurement in the likelihood.
 _CLIP = 0.9999
-#: A filter of less weight is dropped.
+#: A filter with a smaller weight than this is removed.
 _LEAST = 1e-4
 #: Sigma of a filter's heading over the distance to the next filter, at the start.
 _OVERLAP = 0.6
@@ -61,7 +62,7 @@ def initial_headings(sigma: float, spacing: float) -> tuple[Array, Array]:
     Returns
     -------
     offsets, weights : (k,) array
-        Over three sigma to both sides, or once round the circle; the weights sum to 1.
+        Offsets within three sigma on both sides, or once round the circle [rad], and weights that sum to 1.
     """
     if 6.0 * sigma >= 2.0 * pi:
         count = ceil(2.0 * pi / spacing)
@@ -122,7 +123,7 @@ class HeadingBank(Solver):
     model : ErrorModel or ModelChoice
         The model of each filter.
     above_deg : float
-        With an initial heading known better than this [deg], one sigma, there is one filter only.
+        A bank is used if the standard deviation of the initial heading is above this [deg].
     spacing_deg : float
         Largest distance between neighbouring initial headings [deg].
     """
@@ -189,7 +190,7 @@ class HeadingBank(Solver):
         return estimate
 
     def _judge(self) -> None:
-        """Weigh the filters by their likelihoods; drop those that do not count, and doubles."""
+        """Update the weights by the likelihoods; remove filters with negligible weights, and duplicates."""
         logs = []
         for h in self._hypotheses:
             assert isinstance(h.filter, _Scored)

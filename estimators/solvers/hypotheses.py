@@ -1,7 +1,8 @@
-"""The filters of solution separation: one for each hypothesis of what is wrong.
+"""The filters of solution separation: one for each fault hypothesis.
 
-A hypothesis is that an instrument, the start or the IMU is wrong. Its filter does without the instrument, believes the
-start less, or believes the IMU less. Each filter keeps how well it agrees with the instruments that it uses.
+A hypothesis says that an instrument, the initial state or the IMU is wrong. Its filter does not use the instrument, has
+a larger initial covariance, or has a larger noise of the IMU. Each filter records how well it agrees with the
+instruments that it uses.
 """
 
 from __future__ import annotations
@@ -21,15 +22,14 @@ from simnav.types import Array, Estimate, InitialState, Instruments
 
 __all__ = ["Exclusion", "Hypothesis", "ImuHypothesis", "WatchedFilter", "disturbed_imu", "uncertain_start"]
 
-#: By these factors the sigmas of the start are larger in the filter that does not believe it: position and attitude,
-#: velocity. With a velocity that is as uncertain as the heading, the measurements of a log make a filter surer of its
-#: heading than it is.
+#: Factors on the initial sigmas in the filter with a wrong initial state: of position and attitude, and of velocity. If
+#: the velocity were as uncertain as the heading, the measurements of a log would make the heading variance too small.
 _WRONG_START, _WRONG_VELOCITY = 30.0, 3.0
-#: Its attitude is known at least so well, for otherwise a filter is not linear [rad].
+#: Largest initial sigma of the attitude in this filter; above it the filter is not in its linear range [rad].
 _TILT, _HEADING = radians(5.0), radians(45.0)
-#: White noise of an IMU that is not believed, of gyroscopes [rad/s/sqrt(Hz)] and accelerometers [m/s^2/sqrt(Hz)].
+#: White noise of an IMU that is assumed to be wrong: gyroscopes [rad/s/sqrt(Hz)], accelerometers [m/s^2/sqrt(Hz)].
 _DISTURBED_RATE, _DISTURBED_FORCE = radians(0.5), 0.5
-#: Factor by which the variances of position and velocity grow where the motion is not believed.
+#: Factor on the variances of position and velocity if the motion is assumed to be wrong.
 _LOOSENED = 100.0
 #: Index of the bias of the vertical gyroscope in the state of an inertial model.
 _VERTICAL_GYROSCOPE = 11
@@ -40,7 +40,7 @@ _AGREES = 0.999
 
 
 class Exclusion(Adaptation):
-    """Leaves the excluded instruments and single gross errors out; notes since when an excluded one has agreed.
+    """Rejects excluded instruments and single gross errors; records since when an excluded instrument has agreed.
 
     Attributes
     ----------
@@ -51,9 +51,9 @@ class Exclusion(Adaptation):
     gross : set of (str, float)
         Instrument and time of the gross errors of a step.
     usual : dict of str to float
-        What the normalised innovation squared of an instrument is usually, by component; it counts where it is above 1.
+        Long-term mean of the normalised innovation squared of an instrument, by component; it is used if above 1.
     linear : bool
-        False while the heading is not known: an improbable measurement is no gross error then.
+        False while the heading is not known. An improbable measurement is then not taken as a gross error.
     """
 
     def __init__(self) -> None:
@@ -66,13 +66,13 @@ class Exclusion(Adaptation):
         self._agrees, self._gross = chi_square_limits(_AGREES), chi_square_limits(_NOT_GROSS)
 
     def begin_again(self, excluded: Collection[str] = ()) -> None:
-        """Forget what was learned of the instruments, and leave other ones out."""
+        """Reset the records of the instruments, and set the excluded ones."""
         self.excluded = set(excluded)
         self.agrees_since.clear()
         self.usual.clear()
 
     def contradicting(self, time: float) -> set[str]:
-        """The instruments whose measurements have been improbable for so long that they are no gross errors."""
+        """The instruments whose measurements have been improbable for longer than a gross error lasts."""
         return {name for name, since in self._failing.items() if time - since >= _PATIENCE}
 
     def adapt(self, innovation: Innovation) -> Array | None:
@@ -101,20 +101,20 @@ class WatchedFilter(KalmanEstimator):
     mean_nis: dict[str, float]
 
     def take_over(self, other: WatchedFilter) -> None:
-        """Go on from the state of another one."""
+        """Copy the state of another filter."""
         self.model.take_over(other.model)
         self.covariance[...] = other.covariance
         self.mean_nis = dict(other.mean_nis)
 
     def watch(self, estimate: Estimate, components: Mapping[str, int], fading: float) -> None:
-        """Take a step into the means; components by instrument."""
+        """Update the means with a step; ``components`` are those of each instrument."""
         for name, m in components.items():
             nis = float(estimate.diagnostics.get(f"nis.{name}", np.nan))
             if nis == nis:
                 self.mean_nis[name] = fading * self.mean_nis.get(name, 1.0) + (1.0 - fading) * nis / m
 
     def doubt_motion(self) -> None:
-        """Believe position, velocity and attitude less; the attitude within the limits of a linear filter."""
+        """Inflate the covariance of position, velocity and attitude; the attitude within the linear range."""
         first = self._first_variances.copy()
         attitude = self.model.moving[1]
         first[attitude] = np.maximum(first[attitude], _TILT**2)
@@ -123,22 +123,22 @@ class WatchedFilter(KalmanEstimator):
 
 @dataclass
 class Hypothesis:
-    """That an instrument or the start is wrong.
+    """The hypothesis that an instrument or the initial state is wrong.
 
     Attributes
     ----------
     name : str
-        Of the instrument, the start or the IMU.
+        Name of the instrument, the initial state or the IMU.
     filter : WatchedFilter
-        The filter without it.
+        The filter under this hypothesis.
     start : float
-        When it began, from which its age counts [s].
+        Time of the last start of the filter [s].
     estimate : Estimate or None
-        Its estimate.
+        Last estimate of the filter.
     origin : Estimate or None
-        The estimate with which it began.
+        Estimate at the last start of the filter.
     drift : float
-        Variance of the bias of the vertical gyroscope with which it began [(rad/s)^2].
+        Variance of the bias of the vertical gyroscope at the last start [(rad/s)^2].
     """
 
     name: str
@@ -149,7 +149,7 @@ class Hypothesis:
     drift: float = 0.0
 
     def begin(self, other: WatchedFilter, estimate: Estimate, start: float) -> None:
-        """Begin anew from the state of another filter, with its estimate."""
+        """Restart from the state and the estimate of another filter."""
         self.filter.take_over(other)
         self.estimate = self.origin = estimate
         self.start = start
@@ -157,23 +157,24 @@ class Hypothesis:
         self.drift = float(variances[_VERTICAL_GYROSCOPE]) if len(variances) > _VERTICAL_GYROSCOPE else 0.0
 
     def turn(self, noise: float) -> None:
-        """State the heading no better than gyroscopes alone know it, because nothing else measures it.
+        """Increase the variance of the heading to at least that of the gyroscopes alone.
 
-        Without fixes and compass, measurements say nothing of the heading: the track since the filter began can be
-        turned about its first point. A Kalman filter that linearises along its own estimate still takes some noise for
-        information on it (G. P. Huang, A. I. Mourikis and S. I. Roumeliotis, *Observability-based rules for designing
-        consistent EKF SLAM estimators*, Int. J. of Robotics Research 29(5), 2010). So the variance of the heading is
-        at least that of dead reckoning since then, ::
+        Without fixes and compass the heading is not observable: the track since the start of the filter can be rotated
+        about its first point. A Kalman filter that linearises along its own estimate still gains false information on
+        the heading from noise (G. P. Huang, A. I. Mourikis and S. I. Roumeliotis, *Observability-based rules for
+        designing consistent EKF SLAM estimators*, Int. J. of Robotics Research 29(5), 2010). So the variance of the
+        heading is at least that of dead reckoning since then, ::
 
             P_psi(0) + P_bias(0) t^2 + N^2 t,
 
-        with the variances of the heading and of the gyroscope's bias when it began, the time t since then, and the
-        random walk N of the angle. What is missing is added along this turn, to position and velocity, too.
+        with the initial variances of the heading, P_psi(0), and of the gyroscope's bias, P_bias(0), the time t since
+        the start, and the angle random walk N. The missing variance is added along the rotation of the track, so also
+        to position and velocity.
 
         Parameters
         ----------
         noise : float
-            Of the vertical gyroscope: random walk of the angle, squared [rad^2/s].
+            Square of the angle random walk of the vertical gyroscope, N^2 [rad^2/s].
         """
         one, origin = self.estimate, self.origin
         assert one is not None
@@ -191,7 +192,7 @@ class Hypothesis:
 
 @dataclass
 class ImuHypothesis(Hypothesis):
-    """That the IMU is wrong (or right, once it is excluded); ``exclusion`` has the instruments that are wrong, too."""
+    """The hypothesis that the IMU is wrong (or right, after its exclusion); ``exclusion`` holds wrong instruments."""
 
     exclusion: Exclusion = field(default_factory=Exclusion)
 
@@ -206,7 +207,7 @@ def uncertain_start(start: InitialState) -> InitialState:
 
 
 def disturbed_imu(instruments: Instruments) -> Instruments:
-    """The same instruments with white noise of the IMU that covers a disturbance; its biases are what they were."""
+    """The same instruments with an IMU whose white noise covers a disturbance; its biases are not changed."""
     imu = instruments.imu
     if imu is None:
         return instruments

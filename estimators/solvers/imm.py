@@ -27,36 +27,37 @@ def mixture_update(
     covariance: Array, cross: Array, predicted: Array, noise: Array, residual: Array, variances: Array,
     transition: Array, probability: Array, correction: Array,
 ) -> tuple[float, float]:  # fmt: skip
-    """Kalman update with every noise level, weighed by likelihood and merged by moments, in place.
+    """Kalman update with every noise level, weighted by likelihood and merged by moments, in place.
 
-    With ``S_j = H P H' + variances_j R``, ``y_j = S_j^-1 v`` and mu_j proportional to the probability times N(v; 0,
-    S_j): the correction is ``P H' sum(mu_j y_j)``, and P loses ``P H' (sum(mu_j S_j^-1) - spread of y_j) H P``.
+    With ``S_j = H P H' + variances_j R``, ``y_j = S_j^-1 v`` and mu_j proportional to the probability of level j times
+    N(v; 0, S_j): the correction is ``P H' sum(mu_j y_j)``, and ``P H' (sum(mu_j S_j^-1) - spread of y_j) H P`` is
+    subtracted from P.
 
     Parameters
     ----------
     covariance : (n, n) array
-        P, updated.
+        Covariance P of the state's error, updated.
     cross : (n, m) array
-        P H'.
+        P H', with the Jacobian H of the measurement.
     predicted, noise : (m, m) array
-        H P H' and R.
+        H P H' and the nominal noise R.
     residual : (m,) array
-        v.
+        Innovation v.
     variances : (j,) array
-        Of each level, in units of R.
+        Variance of each level, as a multiple of R.
     transition : (j, j) array
-        Probability to go from level to level since the measurement before.
+        Probabilities of the transitions between levels from one measurement to the next.
     probability : (j,) array
-        Of each level at the measurement before; overwritten by that at this one.
+        Probability of each level at the previous measurement; overwritten by that at this one.
     correction : (n,) array
-        Overwritten.
+        Overwritten with the correction of the state.
 
     Returns
     -------
     nis : float
-        Normalised innovation squared of the first level; -1 where an S_j is singular, and nothing is changed.
+        Normalised innovation squared of the first level; -1 if an S_j is singular, and then nothing is changed.
     expected : float
-        Mean of the variances.
+        Expected variance, as a multiple of R.
     """
     n, m = cross.shape
     count = variances.size
@@ -128,17 +129,17 @@ def mixture_update(
 
 
 class ImmEstimator(KalmanEstimator):
-    """Kalman filter in which every instrument's noise jumps between levels, after a Markov chain of its own.
+    """Kalman filter in which the noise of each instrument switches between levels, by a Markov chain of its own.
 
     Blom and Bar-Shalom (1988), "The interacting multiple model algorithm for systems with Markovian switching
-    coefficients"; Bar-Shalom, Li and Kirubarajan (2001), section 11.6. The levels differ in R alone and the instruments
-    switch independently, so that with J levels and several instruments there would be J filters for each combination of
+    coefficients"; Bar-Shalom, Li and Kirubarajan (2001), section 11.6. The levels differ in R only, and the instruments
+    switch independently, so with J levels and several instruments there would be one filter for each combination of
     levels. Here the J updates of a measurement share one prediction, and their results are merged, with the spread of
-    their means, before the next: mode probabilities interact, mode-conditioned estimates do not outlive the
-    measurement (the first-order generalised pseudo-Bayesian form of the algorithm; the same as IMM where the chain
-    forgets its level from one measurement to the next). One propagation, whatever J.
+    their means, before the next measurement. The mode probabilities interact, but the mode-conditioned estimates are
+    not kept (the first-order generalised pseudo-Bayesian form of the algorithm; it is equal to IMM if successive levels
+    are independent). There is one propagation for any J.
 
-    Where the prediction is at fault (`PredictionTest`), the plain filter's update is used.
+    If the prediction is wrong (`PredictionTest`), the update of the plain filter is used.
 
     Diagnostics: ``sigma_<component>.<instrument>`` is the root of the expected variance; ``quiet.<instrument>`` the
     probability of the lowest level.
@@ -146,18 +147,18 @@ class ImmEstimator(KalmanEstimator):
     Parameters
     ----------
     model, smoother
-        As for `KalmanEstimator`.
+        Model and smoother of the filter, as for `KalmanEstimator`.
     levels : tuple of float
-        Sigmas in units of the nominal one, the first 1. Empty: as ``highest`` and ``ratio`` say.
+        Sigmas of the levels, as multiples of the nominal one; the first is 1. Empty: from ``highest`` and ``ratio``.
     highest : float
-        The highest level, where they are not given.
+        Highest level, if ``levels`` is empty.
     ratio : float
-        Largest ratio of neighbouring levels, where they are not given. Levels that are near each other stand for a
-        continuous distribution of the size, uniform in its logarithm: no size lies between them.
+        Largest ratio of neighbouring levels, if ``levels`` is empty. Closely spaced levels approximate a continuous
+        distribution of the noise, uniform in its logarithm.
     stay : float
-        Probability to stay on the lowest level from one measurement to the next.
+        Probability to stay at the lowest level from one measurement to the next.
     stay_high : float
-        Likewise for each of the others; they leave for the lowest most often.
+        Probability to stay at each of the other levels; most transitions from them go to the lowest level.
     """
 
     pieces = ("model", "smoother")
@@ -236,7 +237,7 @@ class ImmEstimator(KalmanEstimator):
 
 
 def _chain(n: int, stay: float, stay_high: float) -> Array:
-    """(n, n) probabilities from level to level; from a high one half of the leavers go to the lowest, or all of two."""
+    """(n, n) transition probabilities. Half of the transitions from a high level go to the lowest (all for n = 2)."""
     chain = np.full((n, n), (1.0 - stay) / (n - 1))
     chain[0, 0] = stay
     for i in range(1, n):

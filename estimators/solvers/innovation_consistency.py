@@ -1,13 +1,12 @@
-"""The chi-square test of a filter's innovations: does the filter explain its measurements?
+"""The chi-square test of a filter's innovations: whether the innovations agree with their covariance.
 
-If model and noise are right, a normalised innovation squared is distributed as chi-square with as many degrees of
+If model and noise are right, a normalised innovation squared has a chi-square distribution with as many degrees of
 freedom as the measurement has components, and innovations are independent of each other. So their sum over the last
-`EPOCHS` epochs is chi-square, too. Where it is improbably large for some epochs in a row, the filter is wrong, or its
-measurements are: a fault that is believed, a start beyond its sigma, a model that does not fit. The filter cannot know
-which. It reports that it is inconsistent, and goes on. Its covariance stays what it is.
+`EPOCHS` epochs is chi-square, too. If it is improbably large for some epochs in a row, the filter or its measurements
+are wrong: an undetected fault, an initial error much larger than its sigma, or a wrong model. The test cannot
+distinguish these. The filter reports that it is inconsistent, and continues; its covariance is not changed.
 
-The noise is the one that was used: a filter that has adapted its noise to a measurement explains it. Measurements that
-were left out count for nothing.
+The noise is the one in use, so an adapted noise explains a large innovation. Rejected measurements are not counted.
 
 Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Wiley,
 2001, section 5.4.2 (the time-average of the normalised innovation squared).
@@ -21,12 +20,14 @@ from simnav.estimators.solvers.cost_consistency import ConsistencyTest
 
 __all__ = ["InnovationTest"]
 
-#: Epochs over which innovations are summed up: as many as a window has.
+#: Number of epochs over which innovations are summed: the default length of a window.
 EPOCHS = 20
 
 
 class InnovationTest(ConsistencyTest):
-    """The test of the module; its sum is that of the last `EPOCHS` epochs that brought measurements."""
+    """The test of the module: the sum is that of the normalised innovations squared, over the last `EPOCHS` epochs with
+    measurements.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,12 +35,12 @@ class InnovationTest(ConsistencyTest):
         self._epochs: deque[tuple[float, int]] = deque(maxlen=EPOCHS)
 
     def add(self, nis: float, freedom: int) -> None:
-        """Take a normalised innovation squared, and its degrees of freedom."""
+        """Add a normalised innovation squared, and its degrees of freedom."""
         self._sum += nis
         self._freedom += freedom
 
     def end_epoch(self) -> None:
-        """Test; an epoch without measurements says nothing."""
+        """Test the sum at the end of an epoch. An epoch without measurements is ignored."""
         if not self._freedom:
             return
         self._epochs.append((self._sum, self._freedom))

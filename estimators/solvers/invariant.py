@@ -1,12 +1,13 @@
 """The invariant extended Kalman filter on SE_2(3) with biases, on the rotating Earth.
 
-Attitude C, velocity v and position p are one element X of the group SE_2(3) of double direct isometries; its error is
-not a difference. With X the truth, Y the estimate and xi = (phi, nu, rho) the 9 components of the error:
+Attitude C, velocity v and position p are one element X of the group SE_2(3) of double direct isometries, and its error
+is not a difference. With the truth X, the estimate Y and the 9 components xi = (phi, nu, rho) of the error:
 
-- left-invariant ``X^-1 Y = exp(xi)``: the differences of v and p as the body sees them. GNSS position and velocity,
-  terrain fix and depth (``y = X d``) are invariant measurements: their Jacobian in body axes is constant.
-- right-invariant ``Y X^-1 = exp(xi)``: the differences after the attitude error is taken back. DVL (``y = X^-1 d``) is
-  an invariant measurement, and so is a heading or another known direction seen from the body.
+- left-invariant ``X^-1 Y = exp(xi)``: the differences of v and p in body axes. GNSS position and velocity,
+  terrain fix and depth (``y = X d`` with a known vector d) are invariant measurements: their Jacobian in body axes is
+  constant.
+- right-invariant ``Y X^-1 = exp(xi)``: the differences after the correction of the attitude error. DVL (``y = X^-1 d``)
+  is an invariant measurement, and so is a heading or another known direction that is measured in body axes.
 
 Biases and calibration states have plain differences (Barrau's "imperfect" filter).
 
@@ -21,8 +22,8 @@ T. The linearised propagation and the gain are the same in any coordinates. Two 
   Right: ``xi = (phi, dv + v x phi, dp + p x phi)``, so ``N = I`` but ``dv <- dv - (v+ - v) x phi``, likewise dp.
   Only the change of p enters: the origin does not matter.
 
-Thus a wrong heading is corrected without the covariance being wrong afterwards, which is what the filter is for: it
-converges from initial headings that the EKF does not.
+So the covariance is still correct after the correction of a large heading error, and the filter converges from initial
+headings from which the EKF does not.
 
 **How far the theory goes.** Log-linear error propagation needs group-affine dynamics: exact for a flat Earth that does
 not turn and known biases. Coriolis, transport rate, gravity's change with place, and the biases break it; they are in
@@ -60,11 +61,11 @@ class InvariantKalmanEstimator(KalmanEstimator):
     Parameters
     ----------
     model : InertialModel
-        Position, velocity and attitude are the first nine components of its error.
+        The model; position, velocity and attitude are the first nine components of its error.
     adaptation : Adaptation, optional
         Chooses the noise of each measurement; default: the datasheet's.
     error : "left" or "right"
-        Which error is invariant.
+        The invariant error: the left- or the right-invariant one.
     """
 
     pieces = ("model", "adaptation")
@@ -100,7 +101,7 @@ class InvariantKalmanEstimator(KalmanEstimator):
         return nis
 
     def _correct(self, dx: Array) -> None:
-        """Correct on the group, and take the covariance of the invariant error along."""
+        """Correct the state on the group, and transform the covariance of the invariant error."""
         turn, P = dx[6:9], self.covariance
         J, across = left_jacobian(turn), skew(turn)
         dx[0:3], dx[3:6] = J @ dx[0:3], J @ dx[3:6]

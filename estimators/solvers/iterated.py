@@ -1,14 +1,15 @@
-"""The iterated extended Kalman filter: each measurement is linearised again at what it makes of the state.
+"""The iterated extended Kalman filter: each measurement is linearised again at the corrected state.
 
 The update is Gauss-Newton on the maximum a posteriori problem of one measurement. With the state before the
 measurement as x0, the correction dx_i so far (dx_0 = 0), and innovation r_i and Jacobian H_i at x0 corrected by dx_i::
 
     dx_{i+1} = K_i (r_i + H_i J_i dx_i),    K_i = P G_i' (G_i P G_i' + R)^-1,    G_i = H_i J_i
 
-J is the derivative of the error at the corrected state by the correction: the identity, but the left Jacobian of
-SO(3) for the attitude. The iteration ends when dx changes by less than ``threshold`` sigma in every component, or after
-``limit`` linearisations. The covariance is updated with the last one and brought to the corrected state by J. An
-adaptation sees the first innovation, and what it decides holds for all.
+P is the covariance before the measurement, R the covariance of its noise and K the gain. J is the derivative of the
+error at the corrected state with respect to the correction: the identity, except the left Jacobian of SO(3) for the
+attitude. The iteration ends when dx changes by less than ``threshold`` sigma in every component, or after ``limit``
+linearisations. The covariance is updated with the last linearisation and transformed to the corrected state by J. An
+adaptation receives the first innovation, and its noise is used in all iterations.
 
 Source: A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.3; B. M. Bell and F. W. Cathey,
 *The iterated Kalman filter update as a Gauss-Newton method*, IEEE TAC 38(2), 1993; on manifolds: G. Bourmaud et al.,
@@ -30,14 +31,14 @@ __all__ = ["Iteration", "absorb_iterated", "poor_heading"]
 
 
 class Iteration(NamedTuple):
-    """Whether and how a filter linearises a measurement again.
+    """The settings of repeated linearisation of a measurement.
 
     Attributes
     ----------
     above_deg : float
-        Only while the heading's standard deviation is above this [deg]; 0: always.
+        Measurements are iterated while the standard deviation of the heading is above this [deg]; 0: always.
     limit : int
-        Most linearisations of one measurement; 1 is the EKF.
+        Largest number of linearisations of one measurement; 1 is the EKF.
     threshold : float
         Change of the correction at which it has converged, in sigmas before the measurement.
     """
@@ -47,7 +48,7 @@ class Iteration(NamedTuple):
     threshold: float = 1e-3
 
     def check(self) -> Iteration:
-        """Itself; ValueError where a value makes no sense."""
+        """Return the settings; ValueError if a value is out of range."""
         if not self.above_deg >= 0.0:
             raise ValueError(f"the iteration begins above a heading sigma of 0 deg or more, not {self.above_deg}")
         if self.limit < 1:
@@ -57,7 +58,7 @@ class Iteration(NamedTuple):
         return self
 
     def applies(self, model: ErrorModel, covariance: Array) -> bool:
-        """Whether measurements are to be iterated, by the (n, n) covariance of the model's error."""
+        """Whether measurements are iterated at this (n, n) covariance of the model's error."""
         if self.above_deg == 0.0:
             return True
         if model.attitude_at is None:
@@ -72,8 +73,8 @@ def poor_heading(iterate_above_deg: float | None = None) -> Iteration | None:
     Parameters
     ----------
     iterate_above_deg : float, optional
-        While the heading's standard deviation is above this [deg], measurements are linearised again until the
-        correction stands still, as in ``iekf``. None: never; 0: always.
+        While the standard deviation of the heading is above this [deg], each measurement is linearised repeatedly until
+        the correction converges, as in ``iekf``. None: never; 0: always.
     """
     return None if iterate_above_deg is None else Iteration(iterate_above_deg)
 
@@ -95,21 +96,21 @@ def absorb_iterated(
     measurement : Measurement
         The measurement to be used.
     observation : tuple
-        The measurement as linearised at the state, with the noise that is to be used.
+        The measurement linearised at the state, with the noise that is used.
     covariance : (n, n) array
-        Updated.
+        Covariance of the model's error, updated.
     correction : (n,) array
-        Overwritten with what was added to the state.
+        Overwritten with the correction of the state.
     iteration : Iteration
-        When the iteration ends.
+        Limits of the iteration.
 
     Returns
     -------
     nis : float
-        Normalised innovation squared of the first linearisation; -1 where an innovation's covariance is singular, and
-        nothing is changed.
+        Normalised innovation squared of the first linearisation; -1 if the covariance of an innovation is singular, and
+        then nothing is changed.
     count : int
-        Linearisations.
+        Number of linearisations.
     """
     residual, cross, predicted, noise = observation
     before, first_nis = model.snapshot(), -1.0

@@ -3,11 +3,11 @@
 Every measurement is used at its own time of validity: the state is propagated to it, inside the step. The covariance is
 updated in Joseph's form (`simnav.estimators.algebra.joseph`).
 
-The filter tests its innovations, as a window tests its cost: where they stay improbably large, the diagnostic
-``inconsistent`` is 1 (`simnav.estimators.solvers.innovation_consistency`).
+The filter tests its innovations. If they stay improbably large, the diagnostic ``inconsistent`` is 1
+(`simnav.estimators.solvers.innovation_consistency`).
 
-Measurements that cannot be used are counted, in the diagnostic ``skipped``: values that mean nothing (not finite, not
-on Earth), those older than the state, repetitions, and innovations whose covariance is singular.
+The diagnostic ``skipped`` is the number of measurements that could not be used: not finite or implausible, older than
+the state, repeated, or with a singular innovation covariance.
 
 Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 """
@@ -34,26 +34,26 @@ __all__ = ["KalmanEstimator"]
 
 
 class KalmanEstimator(Solver):
-    """The filter of the module. Those that observe or correct otherwise are subclasses: other solvers.
+    """The filter of the module. Solvers that predict or correct in another way are subclasses.
 
     Parameters
     ----------
     model : ErrorModel or ModelChoice
-        What is estimated, how it moves and how it is observed.
+        States, dynamics and measurement equations.
     adaptation : Adaptation, optional
-        None: every measurement counts with its nominal noise.
+        Chooses the noise of each measurement; None: the nominal noise.
     iteration : Iteration, optional
-        None: every measurement is linearised once. Where measurements are iterated, the diagnostic ``iterations`` is
-        the most linearisations that one of them took.
+        Settings of repeated linearisation; None: every measurement is linearised once. With it the diagnostic
+        ``iterations`` is the largest number of linearisations of a measurement.
     smoother : Smoother, optional
         Smooths the trajectory after the last update.
 
     Attributes
     ----------
     model : ErrorModel
-        From `reset` on.
+        The model of the run, from `reset` on.
     covariance : (n, n) array
-        Of the model's error.
+        Covariance of the model's error.
     """
 
     pieces: ClassVar[tuple[str, ...]] = ("model", "adaptation", "iteration", "smoother")
@@ -61,8 +61,8 @@ class KalmanEstimator(Solver):
         "weighting": "WeightedKalmanEstimator is the filter that takes one",
         "isolation": "a filter sees one measurement at a time, so that none can agree with another",
     }
-    #: Whether the model may do in one go what `_observe` and `_absorb` do (`ErrorModel.assimilate`), where the noise is
-    #: the nominal one. A solver that does one of the two in a way of its own says False.
+    #: True if `ErrorModel.assimilate` may replace `_observe` and `_absorb` when the noise is the nominal one. A solver
+    #: with another form of one of these methods sets it to False.
     assimilates: ClassVar[bool] = True
 
     model: ErrorModel
@@ -103,7 +103,7 @@ class KalmanEstimator(Solver):
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
-        """The model of a run; a hook."""
+        """The model of a run; subclasses may override it."""
         return self._choice.choose(instruments, self.label)
 
     def update(self, measurements: Measurements) -> Estimate:
@@ -135,16 +135,16 @@ class KalmanEstimator(Solver):
 
     @property
     def smoothed_covariance(self) -> Array:
-        """(T, 9, 9) array: of the trajectory that `smooth` returned."""
+        """(T, 9, 9) covariances of the trajectory that `smooth` returned."""
         assert self.smoother is not None, "it has no smoother"
         return self.smoother.smoothed_covariance
 
     def _propagate(self, until: float) -> None:
-        """Advance the state and the covariance; a hook."""
+        """Propagate the state and the covariance to a time; subclasses may override it."""
         self.model.propagate(self.covariance, until)
 
     def _advance(self, until: float) -> None:
-        """`_propagate`, the smoother looking on."""
+        """Call `_propagate`, and record the stretch for the smoother."""
         assert self.smoother is not None
         begin = self.model.time
         if until > begin:
@@ -153,27 +153,28 @@ class KalmanEstimator(Solver):
             self.smoother.arrive(self.model, self.covariance, until - begin)
 
     def _estimate(self) -> Estimate:
-        """The estimate at the end of a step; a hook."""
+        """The estimate at the end of a step; subclasses may override it."""
         return self.model.estimate(self.covariance)
 
     def _observe(self, m: Measurement) -> Observation | None:
-        """What a measurement says of the state; None where nothing usable; a hook."""
+        """The linearised measurement; None if it cannot be used. Subclasses may override it."""
         if not self._stepwise:
             return self.model.innovate(m, self.covariance)
         self._linearised = self.model.measure(m)
         return None if self._linearised is None else self._linearised.project(self.covariance)
 
     def _absorb(self, observation: Observation) -> float:
-        """Correct the state and the covariance, with the noise that is to be used; a hook.
+        """Correct the state and the covariance with the given noise; subclasses may override it.
 
-        Returns the normalised innovation squared, -1 where nothing was changed; ``_correction`` is what was added.
+        It returns the normalised innovation squared, or -1 if nothing was changed. ``_correction`` is the correction of
+        the state.
         """
         if not self._stepwise:
             return self.model.absorb(observation, self.covariance, self._correction)
         return ErrorModel.absorb(self.model, observation, self.covariance, self._correction)
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Correct the state by one measurement; a hook."""
+        """Use one measurement: linearise it, choose its noise or reject it, and correct the state."""
         iteration = self.iteration
         if iteration is not None and not iteration.applies(self.model, self.covariance):
             iteration = None
@@ -210,7 +211,7 @@ class KalmanEstimator(Solver):
     def _note(
         self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array], noise: Array | None = None
     ) -> None:
-        """Note the innovation of a measurement, or that it was skipped (``nis`` below 0)."""
+        """Record the diagnostics of a measurement, or that it was skipped (``nis`` below 0)."""
         if nis < 0.0:
             self._admission.skipped += 1
             return

@@ -44,12 +44,12 @@ __all__ = ["LinearKalmanEstimator"]
 
 
 class LinearKalmanEstimator(KalmanEstimator):
-    """The solver of the module, over any model that can carry an error along.
+    """The solver of the module, over any model that can propagate an error.
 
     Parameters
     ----------
     model, adaptation
-        As for `KalmanEstimator`.
+        Model and adaptation of the filter, as for `KalmanEstimator`.
 
     Attributes
     ----------

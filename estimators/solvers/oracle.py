@@ -1,4 +1,4 @@
-"""The Kalman filter that is told the truth: where to linearise, the noise of each measurement, and the faults."""
+"""The Kalman filter of the oracles. It is linearised at the truth, and knows the noise and the faults."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from simnav.types import (
 
 __all__ = ["OracleEstimator"]
 
-#: All but roll and pitch, of which it is told where there is no IMU.
+#: All components except roll and pitch, which are known without an IMU.
 ESTIMATED = np.array([True, True, True, True, True, True, False, False, True])
 
 
 class OracleEstimator(KalmanEstimator):
-    """The solver of the module: the inertial model about the truth, with the true motion where there is no IMU.
+    """The solver of the module: the inertial model about the truth, with the true motion if there is no IMU.
 
-    Of the faults it knows the flags and the statistics, not what they added (`simnav.estimators.adaptations.truth`):
-    gross errors are left out, errors that last, like multipath, are states (`simnav.estimators.models.fault_states`);
-    but a disturbance of the IMU is taken off its samples. It is linearised about the truth
-    (`simnav.estimators.models.about_truth`), and told the velocity of the water. Without an IMU it is told how the
-    vessel moves (`simnav.estimators.models.true_motion`).
+    It knows the labels and the statistics of the faults, not their values (`simnav.estimators.adaptations.truth`).
+    Gross errors are rejected, and lasting errors such as multipath are states
+    (`simnav.estimators.models.fault_states`). A disturbance of the IMU is subtracted from its samples. The filter is
+    linearised about the truth (`simnav.estimators.models.about_truth`), and knows the velocity of the water. Without an
+    IMU it knows the motion of the vessel (`simnav.estimators.models.true_motion`).
 
     Parameters
     ----------
     adaptation : TrueNoise
-        What it is told of the noise.
+        Knowledge of the noise and the faults.
     smoother : Smoother, optional
-        As for `KalmanEstimator`.
+        Smooths the trajectory after the last update.
     restore : bool
-        Whether what the faults added is taken off each measurement; for the adaptation `NominalNoise`.
+        True: the errors of the faults are subtracted from each measurement; with the adaptation `NominalNoise`.
     """
 
     pieces = ("adaptation", "smoother")
@@ -84,7 +84,7 @@ class OracleEstimator(KalmanEstimator):
         return (AID,)
 
     def reveal(self, recording: Recording) -> None:
-        """Take the labels, and what is true where datasheets or the start's covariance are wrong."""
+        """Receive the labels, and the true figures if datasheets or the initial covariance are wrong."""
         self.truth.reveal(recording)
         self._imu_faults = imu_faults(recording)
         self._motion = true_motion(recording) if recording.instruments.imu is None else None
@@ -118,7 +118,7 @@ class OracleEstimator(KalmanEstimator):
         return FaultStateModel(inner, states) if states else inner
 
     def update(self, measurements: Measurements) -> Estimate:
-        """Take one step, without what a fault did to the IMU."""
+        """Process one step, after the subtraction of IMU faults."""
         imu, aids = measurements.imu, measurements.aids
         if self._motion is not None:
             first, last = np.searchsorted(self._motion.time, (measurements.start + 1e-9, measurements.time + 1e-9))

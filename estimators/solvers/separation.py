@@ -1,16 +1,17 @@
-"""The test of solution separation: how far a sub-filter may be from the main one, component by component.
+"""The test of solution separation: the limits of the difference between a sub-filter and the main filter.
 
-Both use the same measurements but for those of one instrument, so that for filters with the right model the separation
-d has the covariance
+The sub-filter uses all measurements of the main filter except those of one instrument. If the model is right, the
+difference of their estimates, the separation d, has the covariance
 
     cov(d) = P_i - P_0                                              (R. G. Brown and P. W. McBurney 1988)
 
-which gives the threshold ``T_i = K_fa sqrt(P_i - P_0)`` of position, velocity and heading. A filter without a compass
-may not know its heading well. A heading error of ``K_fa`` sigmas changes a velocity v by ``v (K_fa sigma)^2 / 2`` at
-second order, which is in no covariance. So this is added to the threshold of the horizontal velocity.
+with the covariance P_i of sub-filter i and P_0 of the main filter. This gives the threshold
+``T_i = K_fa sqrt(P_i - P_0)`` of position, velocity and heading, with the quantile K_fa of the probability of false
+alarm. The heading of a filter without a compass may be uncertain. A heading error of ``K_fa`` sigmas changes a velocity
+v by ``v (K_fa sigma)^2 / 2`` at second order, which no covariance contains. So this is added to the threshold of the
+horizontal velocity.
 
-A filter that knows its heading to no better than `KNOWN_HEADING` is not tested: filters differ by their linearisation
-there.
+A filter whose heading sigma is above `KNOWN_HEADING` is not tested, because filters then differ by their linearisation.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class SeparationTest:
     Parameters
     ----------
     false_alarm : float
-        Probability of a test to fail where nothing is wrong, in (0, 1).
+        Probability that a test fails without a fault, in (0, 1).
     filters : int
         Number of sub-filters that are tested at once.
     inertial : bool
@@ -54,7 +55,7 @@ class SeparationTest:
         self._inertial = inertial
 
     def applies(self, estimate: Estimate | None) -> bool:
-        """Whether a filter knows its heading well enough to be compared."""
+        """Whether the heading of a filter is certain enough for a comparison."""
         if not self._inertial or estimate is None or estimate.covariance is None:
             return True
         return float(estimate.covariance[8, 8]) <= KNOWN_HEADING**2
@@ -72,14 +73,14 @@ class SeparationTest:
         return own, apart
 
     def largest(self, subs: Iterable[Hypothesis], estimate: Estimate) -> float:
-        """The largest separation over its threshold, of all tested components of the sub-filters.
+        """The largest ratio of separation to threshold, over all tested components of the sub-filters.
 
         Parameters
         ----------
         subs : iterable of Hypothesis
-            The sub-filters.
+            The sub-filters that are compared.
         estimate : Estimate
-            The main filter's estimate.
+            Estimate of the main filter.
         """
         mask, largest = estimate.mask(), 0.0
         for sub in subs:

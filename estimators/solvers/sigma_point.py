@@ -58,7 +58,7 @@ def draw_points(covariance: Array, spread: float, points: Array) -> None:
     spread : float
         Distance of the points from the mean, in columns of the square root.
     points : (2 n, n) array
-        Overwritten.
+        Overwritten with the points, one in each row.
     """
     n = covariance.shape[0]
     L = covariance.copy()
@@ -75,16 +75,16 @@ class SigmaPointEstimator(KalmanEstimator):
     Parameters
     ----------
     model : PointModel
-        What is estimated, how it moves and how it is observed.
+        States, dynamics and measurement equations, for sigma points.
     adaptation : Adaptation, optional
         Chooses the noise of each measurement; default: the datasheet's.
     alpha : float
-        Scale of the points, above 0: they lie ``alpha sqrt(n + kappa)`` sigma out. Small values see the neighbourhood
-        only, as an EKF does.
+        Scale of the sigma points, above 0: their distance from the mean is ``alpha sqrt(n + kappa)`` sigma for n
+        states. With a small value the filter is like an EKF.
     beta : float
-        What is known of the fourth moments; 2 is best for a Gaussian.
+        Knowledge of the fourth moments of the distribution; 2 is optimal for a Gaussian.
     kappa : float
-        Above -n.
+        Second scale of the sigma points, above -n; it is added to the number of states n.
     """
 
     pieces = ("model", "adaptation")

@@ -1,20 +1,20 @@
 """The Rauch-Tung-Striebel smoother: the whole trajectory from all measurements, behind any Kalman filter.
 
-Forward, the filter keeps at each time t_k at which it stopped the state and the covariance P_k as it left them, the
-transition matrix Phi_k to t_{k+1}, the predicted covariance M_{k+1} there, and the correction d_{k+1} of the
-measurements used there. Backward, with c_k what the smoother adds to the filter's state (and S_k its covariance),
-c = 0 and S = P at the end,
+In the forward pass the filter stops at the times t_k of measurements and step ends. It stores the state and covariance
+P_k after the measurements there, the transition matrix Phi_k to t_{k+1}, the predicted covariance M_{k+1}, and the sum
+d_{k+1} of the corrections by the measurements. In the backward pass, c_k is the correction that the smoother adds to
+the filter's state and S_k is the smoothed covariance, with c = 0 and S = P at the end:
 
 - ``G_k = P_k Phi_k' M_{k+1}^-1``
 - ``c_k = G_k (d_{k+1} + c_{k+1})``
 - ``S_k = (P_k - G_k M_{k+1} G_k') + G_k S_{k+1} G_k'``
 
-A filter with feedback starts each stretch with a prediction of zero error, so that the difference between the smoothed
-and the predicted state, which the usual form propagates, is d + c here, in the tangent space of the filter's own
-trajectory. Corrections at one time add up; what rotations lack of commuting is of second order. c_k is applied to the
-state like any correction. In the bracket both terms are positive semi-definite, so S is.
+A filter with feedback starts each stretch with a predicted error of zero. So the difference between the smoothed and
+the predicted state, which the usual form propagates, is d + c here, in the tangent space of the filter's own
+trajectory. Corrections at one time are added; that rotations do not commute is a second-order effect. c_k is applied to
+the state like any correction. Both terms of S are positive semi-definite, so S is.
 
-The gain is solved for in units of the predicted sigmas, which keeps metres and radians per second apart.
+The gain is computed in units of the predicted sigmas, because the states have different units.
 
 Source: H. E. Rauch, F. Tung and C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal
 3(8), 1965. The forward-backward smoothing of the AUV
@@ -80,9 +80,9 @@ class Stretches:
     Attributes
     ----------
     count : int
-        Of stretches, at most `_BATCH`.
+        Number of stretches, at most `_BATCH`.
     states : list
-        Snapshots of the model at their beginnings.
+        Snapshots of the model at the beginnings of the stretches.
     covariance, transition, predicted : (k, n, n) array
         P at the beginning, Phi, and M at the end.
     correction : (k, n) array
@@ -104,17 +104,17 @@ class Stretches:
 
 
 class Smoother:
-    """The smoother of the module, a piece of `KalmanEstimator`: it looks on while the filter runs, then goes back.
+    """The smoother of the module, a piece of `KalmanEstimator`. It records the forward pass, then runs backward.
 
-    It stores three (n, n) matrices a stop: 5 kB at 15 states, 30 MB for 6000 of them.
+    It stores three (n, n) matrices for each stop: 5 kB at 15 states, 30 MB for 6000 stops.
 
     Attributes
     ----------
     stepwise : bool
-        Whether it needs the Jacobian and the noise of each measurement: the filter then linearises and corrects step by
-        step.
+        True if the smoother needs the Jacobian and the noise of each measurement. The filter then linearises and
+        corrects in separate steps.
     smoothed_covariance : (T, 9, 9) array
-        Of the trajectory that `smooth` returned.
+        Covariances of the trajectory that `smooth` returned.
     """
 
     stepwise: ClassVar[bool] = False
@@ -129,11 +129,11 @@ class Smoother:
 
     @property
     def stops(self) -> int:
-        """How many stretches have been recorded: the index of the present stop."""
+        """Number of recorded stretches, which is the index of the present stop."""
         return (len(self._stretches) - 1) * _BATCH + self._stretches[-1].count
 
     def depart(self, model: ErrorModel, covariance: Array) -> None:
-        """Note the state and its covariance, which are about to be propagated."""
+        """Record the state and its covariance before a propagation."""
         into = self._stretches[-1]
         if into.count == _BATCH:
             into = Stretches(model.size)
@@ -142,7 +142,7 @@ class Smoother:
         into.covariance[into.count] = covariance
 
     def arrive(self, model: ErrorModel, covariance: Array, elapsed: float) -> None:
-        """Note the transition and the predicted covariance."""
+        """Record the transition matrix and the predicted covariance after a propagation."""
         into = self._stretches[-1]
         k = into.count
         into.transition[k] = self._identity
@@ -153,15 +153,15 @@ class Smoother:
         self._here[:] = 0.0
 
     def use(self, correction: Array, linearised: Linearised | None, noise: Array | None) -> None:
-        """Note the correction that a measurement made; one that is ``stepwise`` is given its Jacobian and noise."""
+        """Record the correction by a measurement; a ``stepwise`` smoother also receives its Jacobian and noise."""
         self._here += correction
 
     def end_step(self, time: float) -> None:
-        """Note that a step ends at the present stop."""
+        """Record that a step ends at the present stop."""
         self._ends.append((self.stops, time))
 
     def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
-        """From the last stop to the first: its index, the filter's state there, c and S; a hook."""
+        """For each stop, from last to first: index, state of the filter, c and S; subclasses may override it."""
         c, s = np.zeros(model.size), covariance
         yield self.stops, model.snapshot(), c, s
         ahead, stop = self._here, self.stops
@@ -184,9 +184,9 @@ class Smoother:
         Parameters
         ----------
         model : ErrorModel
-            At the end of the run; it is left there.
+            The model at the end of the run. It is in the same state afterwards.
         covariance : (n, n) array
-            Likewise.
+            Covariance of the model's error at the end of the run.
         """
         if not self._ends:
             return None

@@ -1,74 +1,79 @@
-"""Solution separation: a filter for every instrument that could be wrong, which does without it.
+"""Solution separation: one sub-filter for every instrument that may be wrong, which does not use this instrument.
 
-The main filter uses all instruments, sub-filter i all but instrument i. If instrument i is wrong, sub-filter i is right
-and the main filter is not: they separate, by more than the test of `simnav.estimators.solvers.separation` allows.
+The main filter uses all instruments, sub-filter i all except instrument i. If instrument i is wrong, sub-filter i is
+right and the main filter is wrong. Then their estimates differ by more than the test of
+`simnav.estimators.solvers.separation` allows.
 
-Where a test fails, an instrument is excluded: of those with a large separation, and of those that the main filter has
-found improbable for longer than a gross error lasts, the one whose sub-filter is in the best agreement with the
-instruments that it uses (the least mean NIS of its worst instrument over `_RECENT` seconds; residual monitoring after
-Young and McGraw). Several may agree alike (within `_TIED`, or with a mean NIS of up to `_AGREEMENT`). Then it is one on
-probation (see below), else an instrument rather than the IMU, a fix first, since without the log a vessel is lost
-sooner, else that of the largest separation. Its sub-filter becomes the main one, so that what the fault has done so far
-is undone, too.
+**Exclusion.** If a test fails, one instrument is excluded. The suspects are the instruments with a large separation,
+and those whose innovations in the main filter have been improbable for longer than a gross error lasts. The choice is
+the suspect whose sub-filter agrees best with its instruments: the smallest mean NIS (normalised innovation squared) of
+its worst instrument over `_RECENT` seconds (residual monitoring after Young and McGraw). Several sub-filters may agree
+equally well (within `_TIED`, or with a mean NIS up to `_AGREEMENT`). Then the order is: an instrument on probation (see
+below); an instrument before the IMU; a fix before a log, because dead reckoning without a log is worse; the largest
+separation. The chosen sub-filter becomes the main filter, which also removes the effect of the fault before its
+detection.
 
-What may be excluded depends on whether there is an IMU (`simnav.estimators.solvers.exclusion_rules`). Where an
-instrument is not excluded because too little is known without it, no other one is blamed in its place.
+With an IMU and without one, different rules say which instrument may be excluded
+(`simnav.estimators.solvers.exclusion_rules`). If an instrument is not excluded because the position without it is not
+accurate enough, no other instrument is excluded instead.
 
-The IMU may be wrong, too: it is disturbed, or its errors are larger than its datasheet says. Where there are a fix and
-a log to witness it, one more filter uses all measurements and takes the IMU for much noisier (`disturbed_imu`). The IMU
-is excluded, that is, this filter takes the place of the main one, where a test fails and the filter agrees with all
-instruments, and
+**IMU.** The IMU may also be wrong: disturbed, or with larger errors than its datasheet says. If there are a fix and a
+log, one more filter uses all measurements with a much larger IMU noise (`disturbed_imu`). The IMU is excluded (this
+filter becomes the main filter) if a test fails, the filter agrees with all instruments, and
 
-- no filter without an instrument agrees as well; or
-- an instrument was excluded before: one fault explains what would be two; or
-- it was begun anew, with all instruments and a motion that is not believed, between `_RECENT` and `COASTING` seconds
-  ago. This is done where all fixes and logs are excluded, or the filter that was chosen agrees with nothing
-  (`_NOTHING_AGREES`).
+- no filter without an instrument agrees equally well; or
+- an instrument was excluded before, so that one fault explains two; or
+- the filter was restarted, with all instruments and an inflated covariance of the motion, between `_RECENT` and
+  `COASTING` seconds ago. It is restarted if all fixes and logs are excluded, or if the chosen filter agrees with no
+  instrument (`_NOTHING_AGREES`).
 
-Then all instruments are used again. While the IMU is excluded nothing else is, but for single gross errors: every
-filter without an instrument would know too little. A filter that believes the IMU runs beside. When it has agreed with
-all instruments for ``recovery`` seconds (longer after every further exclusion), the IMU is believed again.
+Then all instruments are used again. While the IMU is excluded no other instrument is, except for single gross errors,
+because a filter without an instrument would be too uncertain. A filter with the IMU of the datasheet runs in parallel.
+When it has agreed with all instruments for ``recovery`` seconds (longer after every further exclusion), the IMU is used
+again.
 
-Where a fix is excluded, the sub-filter without the log is kept beside, and the other way round: the hypothesis that was
-not chosen. If the instrument that was believed fails a test in its turn, and the one excluded agrees with all others in
-that filter, the two change places. On a vessel without an IMU the compass is among them.
+**The alternative.** If a fix is excluded, the sub-filter without the log is kept, and the other way round: it is the
+alternative hypothesis. If the log then fails a test, and the excluded fix agrees with all others in that sub-filter,
+the two change places. On a vessel without an IMU the compass is one of the alternatives.
 
-A datasheet may be wrong. Whatever is said here of a NIS is said of its ratio to the mean of the last ``horizon``
-seconds, where this is above 1.
+**Wrong datasheets.** Every NIS above is divided by its mean over the last ``horizon`` seconds, if this mean is above 1.
 
-With an IMU, the start may be wrong, too: for the first `_ALIGNMENT` seconds one more filter runs, with all
-measurements and with `_WRONG_START` times the sigmas that are stated for the start. Where a test fails in this time,
-and this filter agrees with all instruments and is apart from the main one, it takes its place, since a fault rarely
-begins with the run. Until it agrees with all instruments, nothing is excluded.
+**Wrong initial state.** With an IMU, one more filter runs for the first `_ALIGNMENT` seconds. It uses all measurements,
+and the initial sigmas times `_WRONG_START`. If a test fails in this time, this filter agrees with all instruments and
+differs from the main filter, it becomes the main filter, because a fault rarely begins at the start of a run. Until it
+agrees with all instruments, nothing is excluded.
 
-A sub-filter with neither a fix nor a compass states its heading no better than by dead reckoning (`Hypothesis.turn`).
-One that does not know its heading (`KNOWN_HEADING`) is not compared, and begins anew. While the main filter does not
-know it, and for `_ALIGNMENT` seconds of a run that begins so, nothing is tested, and all begin anew from the main
-filter; there also as long as the main filter disagrees with an instrument, for ``horizon`` seconds at most.
+**Heading.** In a sub-filter with neither a fix nor a compass, the heading variance is at least that of dead reckoning
+(`Hypothesis.turn`). A sub-filter whose heading sigma is above `KNOWN_HEADING` is not compared, and is restarted. While
+this is true of the main filter, and for the first `_ALIGNMENT` seconds of a run that begins so, nothing is tested, and
+all sub-filters are restarted from the main filter. After such a beginning this continues while the main filter
+disagrees with an instrument, for ``horizon`` seconds at most.
 
-Single gross errors are none of this: a measurement that the main filter finds improbable (`_NOT_GROSS`) is left out of
-all filters, unless its instrument goes on so for `_PATIENCE` seconds.
+**Gross errors.** A single measurement that is improbable in the main filter (`_NOT_GROSS`) is rejected by all filters,
+unless the measurements of its instrument stay improbable for `_PATIENCE` seconds.
 
-An excluded instrument is tried on: when it has agreed with the main filter for ``recovery`` seconds it is used again;
-twice as long after every further exclusion, up to `_LONGEST` times. For the next ``horizon`` seconds it is on
-probation: if any test fails, it is suspected, too. Fixes and logs are out together for `COASTING` seconds at most,
-since an IMU alone is soon worse than either: then the logs are used again or, where they are silent, the fixes. Without
-an IMU the fixes are out for `DEAD_RECKONING` seconds at most. For `_RECENT` seconds after that nothing is tested, since
-the filters differ by the way back alone.
+**Readmission.** When an excluded instrument has agreed with the main filter for ``recovery`` seconds, it is used again.
+The time is doubled after every further exclusion, up to a factor of `_LONGEST`. For the next ``horizon`` seconds it is
+on probation: if any test fails, it is a suspect. Fixes and logs are excluded together for `COASTING` seconds at most,
+because an IMU alone soon has larger errors. Then the logs are used again or, if they deliver nothing, the fixes.
+Without an IMU the fixes are excluded for `DEAD_RECKONING` seconds at most. For `_RECENT` seconds after that nothing is
+tested, because the filters differ only by the correction towards these measurements.
 
 **Protection level.** For the north and the east component, with the sigmas of main and sub-filters, ::
 
     PL = max(K_0 sigma_0, max_i (T_i + K_i sigma_i))
 
-bounds the error whatever single instrument (but the IMU) is wrong, but for a risk that is shared out evenly between the
-hypotheses "none" and "instrument i", the latter weighed by the prior probability of a fault (the closed form of Blanch
-et al. 2015). The horizontal protection level is the root of the sum of the two squared. It is the diagnostic
-``protection_level`` [m].
+bounds the error if no instrument or any single instrument (except the IMU) is wrong. The sigmas are those of the main
+filter (0) and of sub-filter i, T_i is the threshold of the test, and the K are quantiles of the normal distribution.
+The risk of exceeding the level is divided equally between the hypotheses "none" and "instrument i"; the latter is
+weighted by the prior probability of a fault (the closed form of Blanch et al. 2015). The horizontal protection level is
+the root of the sum of squares of both components. It is the diagnostic ``protection_level`` [m].
 
-**Horizon.** A sub-filter without GNSS grows less certain for ever, until it tests nothing. Sub-filters are therefore
-started anew from the main filter: there are two for each instrument, the elder ``horizon / 2`` to ``horizon`` seconds
-old. So a fault that grows more slowly than the dead reckoning of that time is followed, and the protection level covers
-faults that began after the elder sub-filters. After an exclusion all of them are new.
+**Horizon.** The uncertainty of a sub-filter without GNSS grows without limit, so that in the end it detects nothing.
+Sub-filters are therefore restarted from the main filter. There are two for each instrument; the older one is
+``horizon / 2`` to ``horizon`` seconds old. So a fault that grows more slowly than the error of dead reckoning in that
+time is not detected, and the protection level covers faults that began after the start of the older sub-filters. After
+an exclusion all sub-filters are restarted.
 
 Sources: R. G. Brown and P. W. McBurney, *Self-contained GPS integrity check using maximum solution separation*,
 Navigation 35(1), 1988; M. Brenner, *Integrated GPS/inertial fault detection availability*, Navigation 43(2), 1996;
@@ -142,17 +147,18 @@ class SolutionSeparation(Solver):
     model : ErrorModel or ModelChoice
         The model of each filter.
     false_alarm : float
-        Probability of each test to fail where nothing is wrong, in (0, 1).
+        Probability that a test fails without a fault, in (0, 1).
     horizon : float
-        Age at which a sub-filter is started anew [s].
+        Age at which a sub-filter is restarted [s].
     horizon_without_imu : float
-        The same for a vessel without an IMU, whose dead reckoning is soon worse than any fix [s].
+        Age at which a sub-filter of a vessel without an IMU is restarted, because its dead reckoning is less accurate
+        [s].
     recovery : float
         Time for which an excluded instrument must agree before it is used again [s].
     risk : float
         Probability that the horizontal error exceeds the protection level. IMO A.915(22) allows 1e-5 in three hours.
     fault_probability : float
-        Prior probability that a certain instrument is wrong.
+        Prior probability that an instrument is wrong.
     """
 
     pieces: ClassVar[tuple[str, ...]] = ("model",)
@@ -252,7 +258,7 @@ class SolutionSeparation(Solver):
 
     @property
     def excluded(self) -> frozenset[str]:
-        """The instruments that are excluded now, with the IMU where it is not believed."""
+        """The instruments that are excluded now; the IMU is among them while it is disturbed."""
         return frozenset(self._exclusion.excluded | ({_IMU} if self._disturbed else set()))
 
     def update(self, measurements: Measurements) -> Estimate:

@@ -1,9 +1,9 @@
-"""A smoother for measurement noise with heavy tails: every measurement is judged by the smoothed trajectory.
+"""A smoother for measurement noise with heavy tails: the smoothed trajectory decides the weight of each measurement.
 
-A filter has to decide on a gross error when it comes. A smoother can ask the measurements that came later: where the
-fixes jump for two minutes and come back, the later ones tell that the jump was wrong. Behind the filter, this smoother
-estimates the whole trajectory again and again, each time with the noise ``R / w`` of each measurement, where w follows
-from the residual e to the smoothed trajectory of the turn before and the covariance P of that trajectory::
+A filter must decide on a gross error at once. A smoother can also use later measurements: if fixes jump for two minutes
+and come back, the later fixes show that the jump was wrong. After the filter, this smoother estimates the whole
+trajectory repeatedly, each time with the noise ``R / w`` of each measurement of m components. w follows from the
+residual e to the last smoothed trajectory, its covariance P, and the Jacobian H::
 
     w = (dof + m) / (dof + tr(R^-1 (e e' + H P H')))
 
@@ -121,12 +121,12 @@ class StudentTSmoother(Smoother):
     dof : float
         Degrees of freedom of the measurement noise, above 0; infinite: Gaussian, all weights are 1.
     passes : int
-        Most passes over the trajectory; at least 1.
+        Largest number of passes over the trajectory; at least 1.
 
     Attributes
     ----------
     weights : dict of int to list of float
-        After `smooth`: of the measurements at each stop, in the order in which they were used.
+        After `smooth`: the weights of the measurements at each stop, in the order of their use.
     """
 
     stepwise = True

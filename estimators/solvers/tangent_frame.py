@@ -53,9 +53,9 @@ def tangent_state(
     Parameters
     ----------
     origin : (3,) array
-        Of the frame, Earth-centred [m].
+        Origin of the frame, Earth-centred [m].
     axes : (3, 3) array
-        Earth-centred to frame.
+        Rotation from Earth-centred axes to those of the frame.
     local : (3, 3), (3,) and (3,) arrays
         Rotation from body to frame; position [m] and velocity relative to the Earth [m/s] in the frame.
     state : (3,), (3,) and (3, 3) arrays
@@ -128,11 +128,11 @@ class TangentFrame:
     Attributes
     ----------
     origin : (3,) array
-        Earth-centred [m].
+        Origin of the frame, Earth-centred [m].
     axes : (3, 3) array
-        Rotation from Earth-centred axes to the frame's.
+        Rotation from Earth-centred axes to those of the frame.
     rotation : (3,) array
-        Of the Earth, in the frame [rad/s].
+        Rotation rate of the Earth, in the frame [rad/s].
 
     Examples
     --------
@@ -157,12 +157,12 @@ class TangentFrame:
         return turned
 
     def state(self, rotation: Array, place: Array, speed: Array) -> tuple[Array, Array, Array, Array]:
-        """A state in the frame as we know it.
+        """Convert a state in the frame to a geodetic state.
 
         Parameters
         ----------
         rotation : (3, 3) array
-            Body to frame.
+            Rotation from body axes to the frame.
         place, speed : (3,) arrays
             Position and velocity in the local frame [m], [m/s].
 
@@ -171,9 +171,9 @@ class TangentFrame:
         position, velocity : (3,) arrays
             Latitude, longitude [rad], height [m]; north-east-down [m/s].
         dcm : (3, 3) array
-            Body to north-east-down.
+            Direction cosine matrix from body axes to north-east-down.
         error_map : (9, 9) array
-            Of an error, to north-east-down from the frame; as of `tangent_state`.
+            Matrix from an error in the frame to the error north-east-down, see `tangent_state`.
         """
         position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
         # GTSAM's arrays are in Fortran's order, or to be read only.

@@ -1,12 +1,14 @@
-"""The iterated Kalman filter with a weighting: each measurement is a window of one, weighed anew at each iteration.
+"""The iterated Kalman filter with a weighting: each measurement is a window of one node, with new weights at each
+iteration.
 
-With P the covariance of the prediction, v the innovation at the present iterate and dx the correction so far, the two
-factors of this window are the measurement, ``v' R^-1 v``, and the prediction, ``dx' P^-1 dx``, which stands for motion.
-A `simnav.estimators.weightings.base.Weighting` weighs both as it does in a window: R is divided by the weight of the
-measurement, P by that of the prediction, and the measurement is linearised again, as in
-`simnav.estimators.solvers.iterated`, until the correction stands still and the weights have settled.
+With the covariance P of the prediction, the innovation v at the present iterate, the noise R and the correction dx so
+far, the two factors of this window are the measurement, ``v' R^-1 v``, and the prediction, ``dx' P^-1 dx``, which takes
+the place of the motion. A `simnav.estimators.weightings.base.Weighting` sets the weights of both as in a window: R is
+divided by the weight of the measurement, P by that of the prediction, and the measurement is linearised again, as in
+`simnav.estimators.solvers.iterated`, until correction and weights have converged.
 
-A measurement of half its weight or less is flagged. Unlike a window the filter cannot take back later what it believed.
+A measurement with a weight of one half or less is flagged. Unlike a window, the filter cannot change earlier weights
+later.
 
 Source: B. M. Bell and F. W. Cathey, *The iterated Kalman filter update as a Gauss-Newton method*, IEEE TAC 38(2), 1993;
 for weights at each iteration, P. W. Holland and R. E. Welsch, *Robust regression using iteratively reweighted
@@ -40,11 +42,11 @@ class WeightedKalmanEstimator(KalmanEstimator):
     Parameters
     ----------
     model : ErrorModel or ModelChoice
-        What is estimated, how it moves and how it is observed.
+        States, dynamics and measurement equations.
     weighting : Weighting
         Sets the weight of each measurement.
     limit : int
-        Most iterations of a measurement.
+        Largest number of iterations of a measurement, at least 2.
     threshold : float
         Change of the correction at which it has converged, in sigmas before the measurement.
     """
@@ -131,7 +133,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
         )  # fmt: skip
 
     def _weigh(self, factors: Factors, innovation: Array, whitener: Array, iteration: int) -> bool:
-        """Ask the weighting at the present iterate; whether it has settled."""
+        """Set the weights at the present iterate; return whether they are final."""
         factors.residual[0, : len(innovation)] = innovation
         root = np.linalg.cholesky(factors.noise[0])
         factors.whitened[0] = np.linalg.solve(root, factors.residual[0])

@@ -1,35 +1,37 @@
 """A sliding window: the newest states are estimated together, anew at every step, by Gauss-Newton.
 
-Every time of a measurement is a node of the graph (`simnav.estimators.models.chain`), every measurement and every
-stretch of motion a factor. After the measurements of a step the nodes are moved to the least weighted sum of squares:
-linearise, weigh, solve (`simnav.estimators.algebra.block_tridiagonal`), retract, until the next step would be small. A
-step that raises the cost is taken back, and damped (Levenberg-Marquardt). Then the oldest epochs leave the window: what
-they say of the node that is the first now, as linearised last, is its prior (a Schur complement: G. Sibley, L.
-Matthies, G. Sukhatme, "Sliding window filter with application to planetary landing", J. Field Robotics 27(5), 2010). So
-nothing is lost but the freedom to linearise or weigh it anew, and a window of one epoch is an iterated EKF.
+Every time of a measurement is a node of the graph (`simnav.estimators.models.chain`), and every measurement and every
+motion between nodes is a factor. After the measurements of a step the nodes are moved to the minimum of the weighted
+sum of squares: linearise, weight, solve (`simnav.estimators.algebra.block_tridiagonal`), retract, until the next step
+would be small. A step that increases the cost is rejected, and repeated with damping (Levenberg-Marquardt). Then the
+oldest epochs leave the window. Their information on the new first node, at the last linearisation, is its prior (a
+Schur complement: G. Sibley, L. Matthies, G. Sukhatme, "Sliding window filter with application to planetary landing", J.
+Field Robotics 27(5), 2010). So only the later linearisation and weighting of these factors is lost, and a window of one
+epoch is an iterated EKF.
 
-An epoch's first step takes the older nodes as they were eliminated in the last one, as incremental smoothing does
+The first step of an epoch uses the elimination of the older nodes from the last epoch, as in incremental smoothing
 (M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", Int. J. Robotics Research 31(2),
-2012): only new factors are linearised and eliminated, and all nodes moved. With the residuals that this leaves the
-weighting is asked again. A weight that would change the pull of its factor by no more than the tolerance stays as it
-is; from the first node on that has to do with another one, nodes are eliminated again. Everything is linearised and
-eliminated anew where a step is large, or where it would move the nodes by more than the tolerance.
+2012): only new factors are linearised and eliminated, and all nodes are moved. Then the weighting is called with the
+new residuals. A weight is not changed if the change of its factor's influence is within the tolerance. Nodes are
+eliminated again from the first node on whose weight has changed. All factors are linearised and eliminated again if a
+step is large, or if this would move the nodes by more than the tolerance.
 
-A large step is taken only if it does not raise the cost. Motion factors are stiff: a straight step through a large
-rotation leaves the motion at second order, and the cost rises though the step is good (the Maratos effect). So a step
-that fails is tried again along the motion (`Chain.along_motion`), and damped only if that raises the cost, too.
+A large step is accepted only if it does not increase the cost. Motion factors are stiff: a straight step through a
+large rotation violates the motion factors at second order, and the cost increases although the step is good (the
+Maratos effect). So such a step is tried again along the motion (`Chain.along_motion`), and damped only if this also
+increases the cost.
 
-A window that cannot explain its measurements says so (`simnav.estimators.solvers.cost_consistency`): the diagnostic
-``inconsistent`` is 1, and the covariance that it reports is multiplied by the variance factor.
+If the cost of a window is improbable (`simnav.estimators.solvers.cost_consistency`), the diagnostic ``inconsistent`` is
+1, and the reported covariance is multiplied by the variance factor.
 
-What is believed of a measurement is decided in two places: an `Adaptation` chooses its noise when it arrives, from the
-innovation, as in a filter; a `Weighting` sees all factors of the window at every iteration.
+The weight of a measurement has two parts: an `Adaptation` chooses its noise when it arrives, from the innovation, as in
+a filter; a `Weighting` receives all factors of the window at every iteration.
 
 Sources: Guo et al. (2026), section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); Mao, Wang and
 Fu (2025), section 2;
-for the test of convergence by contraction (the step that linearising anew leads to over those before it; an epoch
-inherits it, with a doubt: a factor of 2), E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996,
-section IV.8.
+for the test of convergence by contraction (ratio of the step after a new linearisation to the steps before it; an
+epoch starts from twice the ratio of the epoch before it, at most 1),
+E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996, section IV.8.
 Eq. 15 of Mao, Wang and Fu (2025) takes the inverse of the window's prior for the newest covariance; it is that of the
 oldest state. The newest one is the last block of the elimination.
 """
@@ -58,11 +60,11 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["WindowEstimator"]
 
-#: A step of more than this, in sigmas, is checked against the cost.
+#: For a step that is larger than this the cost is checked [sigma].
 CHECKED_STEP = 1.0
-#: Damping that a rejected step starts with, and by how much it changes.
+#: Initial damping after a rejected step, and the factor of its changes.
 FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
-#: A measurement of no more than this weight is reported as faulty.
+#: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
 
 
@@ -72,34 +74,34 @@ class WindowEstimator(Solver):
     Parameters
     ----------
     model : ErrorModel, ModelChoice or Chain
-        One for which `simnav.estimators.models.chain.chain_of` knows a chain.
+        A model with a chain (`simnav.estimators.models.chain.chain_of`), or the chain itself.
     adaptation : Adaptation, optional
-        None: every measurement counts with its nominal noise. Not one that ``inflates``.
+        Chooses the noise of each measurement; None: the nominal noise. An adaptation that ``inflates`` is refused.
     weighting : Weighting, optional
-        None: every factor counts in full.
+        Sets the weight of each factor; None: every factor has the weight 1.
     isolation : Isolation, optional
-        Changes the weights where it finds out which factors are at fault; it needs a weighting.
+        Decides which factors are faulty, and changes their weights; it needs a weighting.
     window : int or None
-        Epochs (steps that bring measurements) in the window; None: all of them.
+        Number of epochs (steps with measurements) in the window; None: all of them.
     tolerance : float
-        Largest component of a step, in its sigmas, at which the nodes have converged; the step need not be taken where
-        the contraction from step to step, also of the epochs before, says that it would be smaller. Likewise the
-        largest change of a weight, and of the weight times the norm of a whitened residual, that does not count.
+        Largest component of a step, in its sigmas, at which the nodes have converged. The step is not computed if the
+        contraction from step to step, also of earlier epochs, predicts that it would be smaller. It is also the largest
+        change of a weight, and of the weight times the norm of a whitened residual, that is ignored.
     iterations : int
-        Most steps an epoch.
+        Largest number of steps in an epoch.
     spacing : float
-        Measurements at times closer to the newest node than this [s] get no node of their own (`Chain`, folds), unless
+        Measurements at times closer to the newest node than this [s] have no node of their own (`Chain`, folds), unless
         they are the last of their step. 0, and with ``every_sample``: every time of a measurement is a node.
     every_sample : bool
-        A node for every IMU sample, instead of one preintegrated factor between measurements: the graph of the
-        post-processing paper without its equivalent IMU factor.
+        True: a node for every IMU sample, instead of one preintegrated factor between measurements. This is the graph
+        of the AUV smoothing paper (2022) without its equivalent IMU factor.
 
     Attributes
     ----------
     chain : Chain
-        From `reset` on.
+        The nodes and factors of the window, from `reset` on.
     covariance : (n, n) array
-        Of the newest node.
+        Covariance of the newest node.
     """
 
     pieces = ("model", "adaptation", "weighting", "isolation")
@@ -278,23 +280,23 @@ class WindowEstimator(Solver):
             diagnostics["weight.motion"] = float(chain.motions["weight"][-1])
 
     def _converge(self, attached: int) -> tuple[int, float, Array, int]:
-        """Move the nodes to the least cost.
+        """Move the nodes to the minimum of the cost.
 
         Parameters
         ----------
         attached : int
-            New aiding factors: they are taken off again if there is no finite solution with them.
+            Number of new aiding factors. They are removed if there is no finite solution with them.
 
         Returns
         -------
         solved : int
-            Linear systems.
+            Number of linear systems that were solved.
         cost : float
             Half the weighted sum of squares at the solution.
         moved : (n,) array
-            By how much the newest node was moved.
+            Shift of the newest node.
         attached : int
-            New factors that are left.
+            Number of remaining new factors.
         """
         chain, nodes = self.chain, self.chain.nodes
         now = _Progress(np.zeros(chain.size), self._first_new(attached), min(1.0, 2.0 * self._contraction))
@@ -481,20 +483,20 @@ class WindowEstimator(Solver):
 
 @dataclass(slots=True)
 class _Progress:
-    """How far the nodes have converged in an epoch.
+    """The progress of the iteration in an epoch.
 
     Attributes
     ----------
     moved : (n,) array
-        By how much the newest node has been moved.
+        Shift of the newest node so far.
     first : int
-        First node that is to be eliminated anew.
+        First node that must be eliminated again.
     contraction : float
-        Size of the step that linearising anew leads to, over those before it.
+        Ratio of the size of the step after a new linearisation to the size of the steps before it.
     solved : int
-        Linear systems.
+        Number of linear systems that were solved.
     damping : float
-        lambda of the next step.
+        Damping lambda of the next step.
     latest : float
         Size of the last step.
     since : float

@@ -1,1 +1,1 @@
-"""Training of what an adaptation learns from recordings."""
+"""Training of adaptations from recordings."""

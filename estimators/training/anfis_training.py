@@ -1,17 +1,17 @@
-"""What the ANFIS of `simnav.estimators.adaptations.anfis` learns from: voyages of its own, on seeds never scored.
+"""The training data of the ANFIS of `simnav.estimators.adaptations.anfis`: its own voyages, on seeds that are not
+scored.
 
-This is a reconstruction: how Jiang et al. (2026) trained their network is not known. Here ships sail three voyages,
-with receivers of different quality, in five kinds of weather for GNSS: healthy; noise that grows; gross errors;
-multipath; all of them. Faults start and end at random, so that about seven fixes in ten are healthy. These are no
-scenarios of the catalogue, whose faults have fixed times: a network could learn the times instead of the signs of a
-fault.
+This is a reconstruction, because the training of Jiang et al. (2026) is not known. The data are three voyages of ships
+with receivers of different quality, in five conditions of GNSS: without faults; increased noise; gross errors;
+multipath; all of them. Faults start and end at random, and about seven fixes in ten have none. The scenarios of the
+catalogue are not used, because a network could learn the fixed times of their faults.
 
-What is learnt for each fix is ``ln(true variance / datasheet's)``, mean of north and east. The true variance is the
-white noise that the measurement really had, and of the faults that touched it the variance of multipath and the second
-moment of a gross error: their statistics, not the values that they took.
+The target for each fix is ``ln(true variance / datasheet's)``, the mean of north and east. The true variance is that of
+the white noise of the measurement, plus the variance of multipath and the second moment of a gross error, if these
+faults affected the fix. So the target has the statistics of the faults, not their values.
 
-While data are gathered, the ship's filter uses that true variance: so the innovations are those of a filter that knows
-its noise well, which is where the network brings its own.
+During the collection of data the ship's filter uses this true variance, so the innovations are those of a filter with
+the right noise, as with a trained network.
 """
 
 from __future__ import annotations
@@ -262,13 +262,13 @@ def train(
     Parameters
     ----------
     features : str
-        Key of `FEATURES`.
+        Name of the set of inputs, a key of `FEATURES`.
     data, validation : Data
         Inputs and targets for training and for validation.
     passes : int
-        At most so many.
+        Largest number of passes over the data.
     progress : callable, optional
-        As of `learn`.
+        Called after each pass with its number, training and validation error.
 
     Returns
     -------

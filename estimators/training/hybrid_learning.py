@@ -44,11 +44,11 @@ def fit_consequents(network: Sugeno, x: Array, y: Array, ridge: float = RIDGE) -
     network : Sugeno
         The network whose rules are fitted.
     x : (k, n) array
-        Inputs.
+        Inputs of k samples, scaled to [0, 1].
     y : (k,) array
-        Targets.
+        Target outputs of the k samples.
     ridge : float
-        In units of the largest eigenvalue.
+        Regularisation, as a fraction of the largest eigenvalue.
     """
     shape = network.consequents.shape
     size = shape[0] * shape[1]
@@ -73,6 +73,7 @@ def premise_gradient(network: Sugeno, x: Array, y: Array) -> tuple[Array, Array]
     Returns
     -------
     (n, m) array, (n, m) array
+        Derivatives with respect to the centres and to the widths of the memberships.
     """
     weights, rules = network.weights(x), network.rules(x)
     output = np.einsum("kr,kr->k", weights, rules)

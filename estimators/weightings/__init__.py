@@ -1,1 +1,1 @@
-"""How much each factor of a window counts."""
+"""Weightings: the weight of each factor of a window."""

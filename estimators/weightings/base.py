@@ -1,4 +1,4 @@
-"""What a weighting is: it sees all factors of a window at each iteration, and decides how much each counts."""
+"""The interface of weightings: a weighting receives all factors of a window at each iteration, and sets the weights."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ __all__ = ["Factors", "Isolation", "Weighting"]
 
 @dataclass(slots=True)
 class Factors:
-    """The factors of a window as linearised now: M of measurements (up to 3 components), N of motion (n states).
+    """The factors of a window at the present linearisation: M measurements (up to 3 components), N motion factors.
 
     Attributes
     ----------
     names : tuple of str
-        Of the instruments.
+        Names of the instruments.
     instrument : (M,) array of int
-        Index into ``names``.
+        Instrument of each measurement, as an index into ``names``.
     components : (M,) array of int
-        Of the measurement, 1 to 3.
+        Number of components of each measurement, 1 to 3.
     time : (M,) array
-        Of validity [s], in ascending order.
+        Time of validity of each measurement [s], in ascending order.
     residual : (M, 3) array
         Measured minus predicted, in the units of ``KINDS[kind].errors``; zero beyond the components.
     noise : (M, 3, 3) array
-        R; identity beyond the components.
+        Covariance R of the measurement noise; identity beyond the components.
     whitened : (M, 3) array
-        ``L^-1 residual`` with ``R = L L'``.
+        Whitened residual ``L^-1 residual`` with ``R = L L'``.
     norm : (M,) array
-        ``sqrt(residual' R^-1 residual)``.
+        Norm of the whitened residual, ``sqrt(residual' R^-1 residual)``.
     motion_time : (N,) array
-        Of the node at the end of the motion [s].
+        Time of the node at the end of each motion factor [s].
     motion_residual : (N, n) array
-        In the units of the model's error.
+        Error e of each motion factor, in the units of the n states of the model's error.
     motion_norm : (N,) array
-        ``sqrt(e' Q^-1 e)``.
+        Norm of the whitened motion residual, ``sqrt(e' Q^-1 e)``, with the process noise Q.
     weight : (M,) array
-        What each measurement's information R^-1 is multiplied by: the last iteration's, 1 for a new factor; to be
-        overwritten in place.
+        Factor on each measurement's information R^-1. It holds the value of the last iteration, 1 for a new factor, and
+        is overwritten in place.
     motion_weight : (N,) array
-        Likewise, of Q^-1.
+        Factor on the information Q^-1 of each motion factor, in the same way.
     iteration : int
-        0 at the first of an epoch; a step that was taken back is not asked about, and leaves a gap.
+        Number of the iteration in this epoch, from 0. Numbers of rejected steps are missing.
     """
 
     names: tuple[str, ...]
@@ -67,9 +67,9 @@ class Factors:
 
 
 class Weighting:
-    """Lets every factor count in full; the base of all weightings.
+    """Base class of all weightings. It gives every factor the weight 1.
 
-    One that has residuals beyond k sigma pull no harder than one of k sigma::
+    A weighting that limits the influence of residuals beyond k sigma::
 
         class Huber(Weighting):
             def weigh(self, factors):
@@ -83,28 +83,28 @@ class Weighting:
     def weigh(self, factors: Factors) -> bool:
         """Set ``factors.weight`` and ``factors.motion_weight`` in place, once an iteration.
 
-        The solver leaves a weight as it was where the change is within its tolerance.
+        The solver ignores a change of a weight that is within its tolerance.
 
         Returns
         -------
         bool
-            Whether the weights are those that are wanted at these residuals; the solver does not stop before. False
-            where the next iteration's would differ even if nothing moved, as while a cost hardens.
+            True if the weights are final for these residuals. The solver does not stop before. False if the weights of
+            the next iteration would differ at the same residuals, as in graduated non-convexity.
         """
         factors.weight[:] = 1.0
         factors.motion_weight[:] = 1.0
         return True
 
     def diagnostics(self) -> dict[str, float | Array]:
-        """Named values of the last step, recorded by epoch."""
+        """Named values of the last step, which are recorded at each epoch."""
         return {}
 
 
 class Isolation(Protocol):
-    """Decides, after a weighting, which factors are at fault (`simnav.estimators.weightings.fault_isolation`)."""
+    """Decides, after a weighting, which factors are faulty (`simnav.estimators.weightings.fault_isolation`)."""
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
 
     def judge(self, factors: Factors) -> bool:
-        """Change the weights that the weighting has set, in place; as `Weighting.weigh`."""
+        """Change the weights of the weighting in place; the result is that of `Weighting.weigh`."""

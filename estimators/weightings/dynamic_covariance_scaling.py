@@ -1,4 +1,4 @@
-"""Dynamic covariance scaling: a constraint that does not fit has its covariance scaled up.
+"""Dynamic covariance scaling: the covariance of a measurement with a large residual is increased.
 
 P. Agarwal, G. D. Tipaldi, L. Spinello, C. Stachniss and W. Burgard, "Robust map optimization using dynamic covariance
 scaling", ICRA 2013, eq. 15: with ``chi^2 = v' R^-1 v`` and a constant F, the information is multiplied by ``s^2``,
@@ -8,8 +8,8 @@ scaling", ICRA 2013, eq. 15: with ``chi^2 = v' R^-1 v`` and a constant F, the in
 It is 1 up to ``chi^2 = F``; beyond, twice the ``s = F / (F + chi^2)`` of
 `simnav.estimators.weightings.switchable_constraints` with ``F = 1/sigma_s^2``.
 
-The paper takes F = 1 whatever the number of components. Of noise with 3 components 80 % is beyond that, and the
-efficiency on Gaussian noise is 0.48. By default F is therefore that of an efficiency of 98 %: 4.96, 6.02 and 7.04 for
+The paper uses F = 1 for any number of components. With 3 components, 80 % of Gaussian noise exceeds this limit, and the
+efficiency on Gaussian noise is 0.48. The default F therefore has an efficiency of 98 %: 4.96, 6.02 and 7.04 for
 1, 2 and 3 components.
 """
 
@@ -24,7 +24,7 @@ __all__ = ["DynamicCovarianceScaling", "covariance_scaling"]
 
 
 def covariance_scaling(u: Array) -> Array:
-    """``min(1, 2 / (1 + u^2))^2`` of ``u = chi / sqrt(F)``."""
+    """The weight ``min(1, 2 / (1 + u^2))^2`` for ``u = chi / sqrt(F)``."""
     s = 2.0 / np.maximum(1.0 + u * u, 2.0)
     return s * s
 
@@ -35,9 +35,9 @@ class DynamicCovarianceScaling(MEstimator):
     Parameters
     ----------
     phi : float
-        F for every number of components, 1 in the paper; 0: as ``efficiency`` says.
+        Constant F for any number of components, 1 in the paper; 0: it follows from ``efficiency``.
     efficiency : float
-        On Gaussian noise.
+        Asymptotic efficiency on Gaussian noise, from which F follows if ``phi`` is 0.
     """
 
     def __init__(self, phi: float = 0.0, efficiency: float = 0.98, smallest: float = 1e-3):

@@ -1,12 +1,11 @@
-"""Fault isolation in a window: if fixes and logs agree with each other and not with the motion, it is the motion's.
+"""Fault isolation in a window: if fixes and logs agree with each other but not with the motion, the motion is wrong.
 
-A weighting that gives less weight to what does not fit is lost when it is the motion that is wrong (a disturbed IMU):
-nothing fits, nothing is believed, and nothing brings the window back. As in a filter
-(`simnav.estimators.adaptations.prediction`, after Zhan et al. 2026), suspicion falls on the motion where fixes and logs
-fail their chi-square tests together, several times running. But a filter cannot tell that from two instruments that are
-wrong at once. A window can ask: with the motion of that time all but taken away for one iteration, measurements that
-are right agree with each other, and measurements that are wrong still do not. Only those that agree are then believed
-in full.
+A weighting decreases the weight of factors with large residuals. If the motion is wrong (a disturbed IMU), this affects
+all measurements, and the window does not recover. As in a filter (`simnav.estimators.adaptations.prediction`, after
+Zhan et al. 2026), the motion is a suspect if fixes and logs fail their chi-square tests together, several times in a
+row. A filter cannot distinguish this from two instruments that are wrong at once, but a window can. For one iteration,
+the motion factors of that time get nearly no weight. Then correct measurements agree with each other, and wrong ones do
+not. Only those that agree get their full weight.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from simnav.types import Array, Instruments, Integers
 
 __all__ = ["FaultIsolation"]
 
-#: Weight of motion while the measurements are asked.
+#: Weight of the motion factors in the iteration that tests the measurements.
 LOOSE = 1e-6
 
 
 @kernel("Tuple((i8, i8))(f8[::1], f8, f8[::1], i8[::1], f8[::1])")
 def _failing(time: Array, tested: float, norm: Array, components: Integers, limits: Array) -> tuple[int, int]:
-    """The first measurement after a time, and how many from there on fail the test."""
+    """Index of the first measurement after a time, and the number of failed tests from there on."""
     first, failing = time.size, 0
     while first > 0 and time[first - 1] > tested:
         first -= 1
@@ -37,16 +36,16 @@ def _failing(time: Array, tested: float, norm: Array, components: Integers, limi
 
 
 class FaultIsolation:
-    """The test of the module. It changes what a weighting has chosen, and is asked after it at every iteration.
+    """The fault isolation of the module. It changes the weights of a weighting, after it at every iteration.
 
     Parameters
     ----------
     together : int
-        Fault isolation: how many times running a fix and a log have to fail before the motion is suspected; 0: never.
+        Fault isolation: number of times in a row that a fix and a log must fail before the motion is tested; 0: never.
     recent : float
-        Fault isolation: a failure of the other instrument that is older than this [s] does not count.
+        Fault isolation: age above which a failure of the other instrument does not count [s].
     sound : float
-        Fault isolation: probability of a sound measurement to pass its test.
+        Fault isolation: probability that a healthy measurement passes its test.
     """
 
     def __init__(self, together: int = 3, recent: float = 5.0, sound: float = 0.999):
@@ -72,16 +71,15 @@ class FaultIsolation:
         self._fresh = True
 
     def judge(self, factors: Factors) -> bool:
-        """Let measurements count in full where it is the motion that is at fault, or to find out.
+        """Give measurements their full weight if the motion is faulty, or for the test whether it is.
 
         Returns
         -------
         bool
-            False at the first iteration of an epoch, and in that in which they are asked: the weights are then not
-            those that are wanted.
+            False at the first iteration of an epoch, and in the iteration of the test: the weights are then not final.
         """
         if factors.iteration == 0:
-            if self._asking is not None:  # the last epoch ended before the answer
+            if self._asking is not None:  # the last epoch ended before the result of the test
                 factors.motion_weight[:] = 1.0
             self._fresh, self._asking = True, None
             return False
@@ -91,7 +89,7 @@ class FaultIsolation:
         if asked is not None:
             agreeing = self._agreeing(factors, *asked)
             if agreeing is None:
-                # What was weighed here took the motion for the outlier: back to where the question was asked.
+                # The weights of this iteration belong to the test: restore those from before it.
                 count = min(len(factors.weight), len(self._weight))
                 factors.weight[:count] = self._weight[:count]
                 factors.motion_weight[:] = self._motion_weight
@@ -112,7 +110,7 @@ class FaultIsolation:
         return False
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
-        """Test the new measurements, as the window fits them with full weight; the time in which motion is suspect."""
+        """Test the new measurements at full weight; return the interval of a suspect motion, or None."""
         first, failing_now = _failing(factors.time, self._tested, factors.norm, factors.components, self._limits)
         new = slice(first, None)
         if first == len(factors.time):
@@ -138,7 +136,7 @@ class FaultIsolation:
         return min(since for _, since, _ in failing.values()), now
 
     def _agreeing(self, factors: Factors, start: float, end: float) -> NDArray[np.bool_] | None:
-        """Which instruments fit, as the window is without its motion; None unless a fix and a log are among them."""
+        """A mask of the instruments that agree without the motion; None unless a fix and a log are among them."""
         from scipy.special import chdtri
 
         asked = (factors.time >= start) & (factors.time <= end)

@@ -1,12 +1,12 @@
-"""Gradient-adaptive weights of Guo et al. (2026): residuals over their own robust scale, for motion, GNSS and DVL.
+"""Gradient-adaptive weights of Guo et al. (2026): residuals divided by a robust scale, for motion, GNSS and DVL.
 
 For each type of factor (an instrument, or motion) over the window (eqs. 19-21),
 
     ``r~ = |r| / (s + epsilon)``,  ``s = kappa median(|r|)``,  ``w = clip(a / (1 + r~^2 / c^2), w_min, 1)``,
 
-and the information is multiplied by w (eq. 24; eqs. 22 and 23 contradict it). The window consists of all epochs that
-hold a measurement (eqs. 18 and 25 differ). The paper names three types; here, instruments other than GNSS have the
-constants of its DVL.
+with the residual r, its scale s and the constants epsilon, a, c and w_min. The information is multiplied by w (eq. 24;
+eqs. 22 and 23 contradict it). The window consists of all epochs with a measurement (eqs. 18 and 25 differ). The paper
+names three types; here, instruments other than GNSS have the constants of its DVL.
 
 Deviations from the print, unless the preset is ``"paper"``:
 
@@ -58,11 +58,11 @@ def medians(values: Array, group: Integers, fewest: int, out: Array) -> None:
     values : (M,) array
         Values of all groups.
     group : (M,) array of int
-        Of each value, below G.
+        Number of the group of each value, below G.
     fewest : int
-        A group of fewer has the median 1; at least 1.
+        Smallest number of values, at least 1; a group with fewer values has the median 1.
     out : (G,) array
-        Overwritten.
+        Overwritten with the medians.
     """
     members = np.empty(values.size)
     for g in range(out.size):
@@ -83,9 +83,10 @@ def _adapt(
     norm: Array, kappa: Array, kind: Integers, group: Integers, shapes: Array, settings: tuple[float, float, int],
     scales: Array, weight: Array,
 ) -> None:  # fmt: skip
-    """Scales of the groups and weights of the members (eqs. 19-21); kappa is that of a norm's kind.
+    """Compute the scales of the groups and the weights of their members (eqs. 19-21).
 
-    The settings are epsilon, the least scale, and how many members a group needs for a scale of its own.
+    ``kappa`` holds the constant of each norm's type. ``settings`` are epsilon, the smallest scale, and the smallest
+    number of members for which a group has a scale of its own.
     """
     epsilon, floor, fewest = settings
     scaled = np.empty(norm.size)
@@ -106,14 +107,14 @@ class GradientAdaptive(Weighting):
     Parameters
     ----------
     preset : "default" or "paper"
-        With "paper", norms and scales are as printed.
+        "paper": norms and scales as printed.
     gnss, motion, other : (a, c, w_min)
-        Constants of eq. 21 for GNSS, for the IMU, and for the DVL and all other instruments. None for the last means
+        Constants of eq. 21 for GNSS, for the IMU, and for the DVL and all other instruments. ``other=None`` means
         ``(2, 2, 0.3)``, or ``(2, 1, 0.3)`` with the preset "paper".
     epsilon : float
-        Constant of eq. 19, in sigma; with the preset "paper" in the unit of the residual.
+        Constant of eq. 19 [sigma]; with the preset "paper" in the unit of the residual.
     fewest : int
-        With fewer residuals of a type its scale is the nominal one.
+        Smallest number of residuals of a type; with fewer its scale is the nominal one.
     """
 
     def __init__(

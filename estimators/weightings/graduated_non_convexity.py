@@ -1,4 +1,4 @@
-"""Graduated non-convexity: the robust cost begins convex and hardens while the window is solved.
+"""Graduated non-convexity: the robust cost is convex at first, and becomes non-convex while the window is solved.
 
 H. Yang, P. Antonante, V. Tzoumas and L. Carlone, "Graduated non-convexity for robust spatial perception: from
 non-minimal solvers to global outlier rejection", *IEEE Robotics and Automation Letters* 5(2), 2020. With
@@ -8,9 +8,10 @@ non-minimal solvers to global outlier rejection", *IEEE Robotics and Automation 
   0 where ``u^2 >= (mu + 1) / mu``, ``sqrt(mu (mu + 1)) / u - mu`` between;
 - Geman-McClure (``"gm"``, eq. 12; mu falls from ``2 u_max^2`` to 1): ``(mu / (u^2 + mu))^2``.
 
-Here mu moves by a factor at each Gauss-Newton iteration, and a window that slides changes little from epoch to epoch:
-where no new measurement is an outlier (u > 1 once the window has been solved with it), the cost stays as hard as it
-ended. Only an outlier begins a new schedule, in which every measurement of the window is judged again.
+v is the residual, R the covariance of the noise, c the constant of the cost, u_max the largest u, and mu the parameter
+of convexity. Here mu changes by a factor at each Gauss-Newton iteration. A sliding window changes little from epoch to
+epoch. So if no new measurement is an outlier (u > 1 after the window has been solved with it), mu keeps its final
+value. Only an outlier starts a new schedule of mu, in which every measurement of the window is weighted again.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from simnav.types import Array, Instruments
 
 __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncated"]
 
-#: Where truncated least squares counts as hard: weights other than 0 and 1 between u = 0.95 and 1.05 only.
+#: Value of mu at which truncated least squares ends: only between u = 0.95 and 1.05 the weights are not 0 or 1.
 HARD = 10.0
 
 
@@ -49,12 +50,12 @@ class GraduatedNonConvexity(RobustWeighting):
     Parameters
     ----------
     cost : "tls" or "gm"
-        Truncated least squares, or Geman and McClure's.
+        Truncated least squares, or the cost of Geman and McClure.
     growth : float
-        Factor of mu from an iteration to the next; 1.4 in the paper, which has time.
+        Factor of mu from one iteration to the next, above 1; 1.4 in the paper, which allows more iterations.
     efficiency : float
-        On Gaussian noise, of the hard cost; c follows. For truncated least squares and 95 %, c^2 is near the 99 %
-        quantile of chi-square.
+        Asymptotic efficiency of the final cost on Gaussian noise, from which c follows. For truncated least squares and
+        95 %, c^2 is near the 99 % quantile of chi-square.
     """
 
     def __init__(
@@ -81,11 +82,11 @@ class GraduatedNonConvexity(RobustWeighting):
         self._fresh = True
 
     def begin(self) -> None:
-        """An epoch begins."""
+        """Start an epoch."""
         self._seen, self._fresh = self._newest, True
 
     def choose(self, factors: Factors) -> bool:
-        """Set the weights of the measurements; False while the cost hardens."""
+        """Set the weights of the measurements; return False while mu still changes."""
         square = factors.norm * factors.norm * self._scale[factors.components]
         if self._fresh:
             self._fresh = False
@@ -113,5 +114,5 @@ class GraduatedNonConvexity(RobustWeighting):
             self._mu = max(self._mu / self.growth, self._hard)
 
     def diagnostics(self) -> dict[str, float | Array]:
-        """``mu``, as the epoch ended."""
+        """The value of ``mu`` at the end of the epoch."""
         return {"mu": self._mu}

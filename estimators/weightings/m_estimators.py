@@ -1,4 +1,4 @@
-"""M-estimators: each measurement of a window counts by a function of its whitened norm.
+"""M-estimators: the weight of each measurement of a window is a function of its whitened norm.
 
 With the norm ``r = sqrt(v' R^-1 v)`` of a residual v of m components and ``u = r/c``, the weight of the information is
 
@@ -11,13 +11,13 @@ function          weight                          c for m = 1, 2, 3
 `geman_mcclure`   ``1 / (1 + u^2)^2``             3.787, 4.096, 4.337
 ================  ==============================  ====================
 
-so that iterated weighted least squares minimises ``sum rho(r)`` with ``rho'(r) = w(r) r``. One weight for all
-components of a measurement keeps it invariant to rotations of its axes; the price is that c must grow with m, for r is
-chi distributed. The constants listed are those of 95 % efficiency (`efficiency`), the textbooks' choice; the default
-is 98 %.
+so that iterated weighted least squares minimises ``sum rho(r)`` with ``rho'(r) = w(r) r``. R is the covariance of the
+measurement noise and c a constant. All components of a measurement have the same weight, so the result does not depend
+on the orientation of the axes. Then c must increase with m, because r is chi distributed. The listed constants have
+95 % efficiency (`efficiency`), as is usual in textbooks; the default is 98 %.
 
-Huber's cost alone is convex. The others redescend, and what the iteration finds depends on where it begins: here at
-the weights of the epoch before, with new measurements at full weight (`RobustWeighting`).
+Only Huber's cost is convex. The others are redescending, so the solution depends on the start of the iteration: the
+weights of the previous epoch, and full weight for new measurements (`RobustWeighting`).
 
 Source: P. J. Huber, *Robust Statistics*, 1981; Z. Zhang, "Parameter estimation techniques: a tutorial with application
 to conic fitting", *Image and Vision Computing* 15, 1997, table 1. Eq. 21 of Guo et al.
@@ -52,30 +52,30 @@ WeightFunction = Callable[[Array], Array]
 
 
 def huber(u: Array) -> Array:
-    """``min(1, 1/u)``."""
+    """Huber's weight ``min(1, 1/u)``."""
     weight: Array = 1.0 / np.maximum(u, 1.0)
     return weight
 
 
 def tukey(u: Array) -> Array:
-    """``(1 - u^2)^2``, and 0 from 1 on."""
+    """The weight of Tukey's biweight: ``(1 - u^2)^2``, and 0 from u = 1 on."""
     v = np.maximum(1.0 - u * u, 0.0)
     return v * v
 
 
 def cauchy(u: Array) -> Array:
-    """``1 / (1 + u^2)``."""
+    """The weight of Cauchy's cost, ``1 / (1 + u^2)``."""
     return 1.0 / (1.0 + u * u)
 
 
 def geman_mcclure(u: Array) -> Array:
-    """``1 / (1 + u^2)^2``."""
+    """The weight of Geman and McClure, ``1 / (1 + u^2)^2``."""
     v = 1.0 + u * u
     return 1.0 / (v * v)
 
 
 def truncated(u: Array) -> Array:
-    """1 up to 1, then 0: least squares, truncated."""
+    """The weight of truncated least squares: 1 up to u = 1, then 0."""
     return (u <= 1.0).astype(np.float64)
 
 
@@ -90,11 +90,11 @@ def efficiency(weight: WeightFunction, constant: float, components: int) -> floa
     Parameters
     ----------
     weight : callable
-        Of ``u = r/c``.
+        Weight w as a function of ``u = r/c``.
     constant : float
-        c.
+        Constant c of the weight function.
     components : int
-        m.
+        Number m of components of a measurement.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def efficiency(weight: WeightFunction, constant: float, components: int) -> floa
 
 @cache
 def constants(weight: WeightFunction, wanted: float = 0.95) -> tuple[float, float, float]:
-    """The c that gives a wanted efficiency (above 0.5 and below 1) to measurements of 1, 2 and 3 components.
+    """The constants c for measurements of 1, 2 and 3 components, from the efficiency (above 0.5 and below 1).
 
     Examples
     --------
@@ -131,14 +131,14 @@ def constants(weight: WeightFunction, wanted: float = 0.95) -> tuple[float, floa
 
 
 class MEstimator(RobustWeighting):
-    """Weighs each measurement by a function of its whitened norm.
+    """Weights each measurement by a function of its whitened norm.
 
     Parameters
     ----------
     weight : callable
-        Of ``u = r/c``; vectorised, in [0, 1].
+        Weight in [0, 1] as a function of ``u = r/c``, for arrays.
     constants : (3,) sequence of float
-        c of measurements of 1, 2 and 3 components.
+        Constants c of measurements with 1, 2 and 3 components.
     """
 
     def __init__(self, weight: WeightFunction, constants: tuple[float, float, float], smallest: float = 1e-3):
@@ -160,11 +160,11 @@ class TunedMEstimator(MEstimator):
     Parameters
     ----------
     weight : callable
-        As for `MEstimator`.
+        Weight in [0, 1] as a function of ``u = r/c``, for arrays.
     efficiency : float
-        On Gaussian noise, above 0.5 and below 1. The textbooks' 0.95 lets an estimate differ from the best one by 23 %
-        of its sigma; 0.98 by 14 %, and is not worse with gross errors of 5 to 30 sigma in 5 % of the measurements
-        (``docs/explanation/windows.md``).
+        Asymptotic efficiency on Gaussian noise, above 0.5 and below 1. With 0.95, as in textbooks, an estimate differs
+        from the optimal one by 23 % of its sigma; with 0.98 by 14 %. 0.98 is not worse with gross errors of 5 to 30
+        sigma in 5 % of the measurements (``docs/explanation/windows.md``).
     """
 
     def __init__(self, weight: WeightFunction, efficiency: float = 0.98, smallest: float = 1e-3):

@@ -1,15 +1,16 @@
-"""Max-mixture: a measurement is of the nominal noise or of a wide one, whichever is the more probable.
+"""Max-mixture: the noise of a measurement is the nominal or a wide one, whichever is the more probable.
 
 E. Olson and P. Agarwal, "Inference on networks of mixtures for robust robot mapping", *International Journal of
 Robotics Research* 32(7), 2013, eq. 6: the sum of a Gaussian mixture is replaced by its largest component. Of the two,
 
     ``(1 - p) N(v; 0, R)``  and  ``p N(v; 0, s^2 R)``,
 
-of m components and normalised, the second is the larger where
+for a residual v of m components with the nominal noise R, the second is the larger if
 
-    ``v' R^-1 v > 2 (m ln s + ln((1 - p)/p)) / (1 - 1/s^2)``;
+    ``v' R^-1 v > 2 (m ln s + ln((1 - p)/p)) / (1 - 1/s^2)``.
 
-its information is ``1/s^2`` of the nominal. Without the normalisation ``s^-m`` the wide one would always win.
+Then the information is ``1/s^2`` of the nominal one. Both densities are normalised; without the factor ``s^-m`` the
+wide one would always be larger. p is the probability of the wide noise, and s the ratio of the sigmas.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ def _component(u: Array, wide: float) -> Array:
 
 
 class MaxMixture(MEstimator):
-    """The weighting of the module; an outlier's information is small and never nothing.
+    """The weighting of the module. The information of an outlier is small but never zero.
 
     Parameters
     ----------
     spread : float
-        s, of the wide component's sigma over the nominal.
+        Ratio s of the sigma of the wide component to the nominal one, above 1.
     probability : float
-        p, that a measurement is of the wide component.
+        Prior probability p that a measurement has the wide noise.
     """
 
     def __init__(self, spread: float = 10.0, probability: float = 0.05):

@@ -1,9 +1,9 @@
-"""What robust weightings share: measurements are weighed by their residuals, and so is motion.
+"""The common part of robust weightings: measurements and motion are weighted by their residuals.
 
-With measurements alone being weighed, a motion that is wrong (a disturbed IMU) is not seen as such: no measurement
-fits, none is believed, and the window follows the IMU to wherever it goes. In a graph, motion is a factor like any
-other, and is weighed too, as in Guo et al. (2026) (`weigh_motion`). Where fixes and logs contradict the motion
-together, `simnav.estimators.weightings.fault_isolation` finds out which of them is wrong.
+If only measurements were weighted and the motion is wrong (a disturbed IMU), all measurements would get small weights,
+and the window would follow the IMU. In a graph, motion is a factor like any other, and is weighted, too, as in Guo et
+al. (2026) (`weigh_motion`). If fixes and logs contradict the motion together,
+`simnav.estimators.weightings.fault_isolation` decides which of them is wrong.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["RobustWeighting", "weigh_motion"]
 
 @cache
 def _quantile(n: int) -> float:
-    """99.9 % quantile of chi of n components (Wilson and Hilferty 1931)."""
+    """99.9 % quantile of the chi distribution with n degrees of freedom (Wilson and Hilferty 1931)."""
     return float(n**0.5 * (1.0 - 2.0 / (9.0 * n) + 3.0902 * (2.0 / (9.0 * n)) ** 0.5) ** 1.5)
 
 
@@ -34,27 +34,29 @@ def _weigh_motion(quantile: float, norm: Array, weight: Array) -> None:
 
 
 def weigh_motion(factors: Factors) -> None:
-    """Weigh motion by ``min(1, (c/r)^2)`` of its whitened norm r, c being the 99.9 % quantile of chi of n components.
+    """Set the weights of motion factors to ``min(1, (c/r)^2)``, with the whitened norm r.
 
-    The noise believed of a motion grows to what its residual shows. On sound data the weights are 1: the residuals of
-    motion in a window are smaller than its noise.
+    c is the 99.9 % quantile of the chi distribution with n degrees of freedom. So the noise of a motion factor
+    increases to the size of its residual. Without faults the weights are 1, because the residuals of motion in a window
+    are smaller than its noise.
     """
     _weigh_motion(_quantile(factors.motion_residual.shape[1]), factors.motion_norm, factors.motion_weight)
 
 
 class RobustWeighting(Weighting):
-    """A weighting that begins each epoch with the weights of the last; a subclass gives `choose`.
+    """A weighting that starts each epoch with the weights of the last one; a subclass defines `choose`.
 
-    A new measurement counts in full at an epoch's first iteration and is weighed by what is then left of its residual.
-    So one that contradicts a window that is sure is suppressed, and one that corrects a window that is unsure, as
-    after an outage, is not: whitened by R alone, its residual before the solution would look like an outlier's.
+    A new measurement has its full weight at the first iteration of an epoch, and is then weighted by its residual after
+    this iteration. So a measurement that contradicts a well-known state gets a small weight. A measurement that
+    corrects an uncertain state, as after an outage, keeps its weight, although its residual before the solution,
+    whitened by R alone, is as large as that of an outlier.
 
     Parameters
     ----------
     smallest : float
-        Least weight. A redescending function can lock a window out that is wrong itself: the good measurements then
-        have no weight, and nothing pulls it back. With 0.001, an error of 30 sigma pulls by 0.03 sigma, and many
-        good measurements together bring the window back, if slowly. 0 is the literature's form.
+        Smallest weight of a measurement. With a redescending function a window with a wrong state gives good
+        measurements no weight, and never recovers. With 0.001, an error of 30 sigma has the influence of 0.03 sigma, so
+        many good measurements together correct the window, though slowly. 0 is the form in the literature.
     """
 
     def __init__(self, smallest: float = 1e-3):
@@ -73,8 +75,8 @@ class RobustWeighting(Weighting):
         return settled
 
     def begin(self) -> None:
-        """An epoch begins; a hook."""
+        """Start an epoch; subclasses may override it."""
 
     @abstractmethod
     def choose(self, factors: Factors) -> bool:
-        """Set the weights of the measurements; as `Weighting.weigh`."""
+        """Set the weights of the measurements; the result is that of `Weighting.weigh`."""

@@ -1,4 +1,4 @@
-"""Switchable constraints, the switches eliminated in closed form.
+"""Switchable constraints, with the switches eliminated in closed form.
 
 N. Sünderhauf and P. Protzel, "Switchable constraints for robust pose graph SLAM", IROS 2012: each measurement gets a
 switch s, its residual becomes s v, and a prior of sigma_s holds the switch at 1. Of the two residuals
@@ -6,13 +6,13 @@ switch s, its residual becomes s v, and a prior of sigma_s holds the switch at 1
 
     ``s^2 chi^2 + (s - 1)^2 / sigma_s^2``,
 
-which is least, for any given state, at
+v is the residual and ``R = L L'`` the covariance of its noise. For any given state the cost is smallest at
 
     ``s = F / (F + chi^2)``,  ``F = 1/sigma_s^2``,
 
-and is there ``F chi^2 / (F + chi^2)``. That s lies in [0, 1] by itself. So instead of carrying a switch for each
-measurement, its information is multiplied by ``s^2``, and the minimum is the same. The cost left is
-Geman and McClure's with ``c = 1/sigma_s``: the two methods differ in how they choose c
+where it is ``F chi^2 / (F + chi^2)``. This s is in [0, 1]. So instead of a state for each switch, the information of
+each measurement is multiplied by ``s^2``, and the minimum is the same. The resulting cost is that of
+Geman and McClure with ``c = 1/sigma_s``: the two methods differ only in the choice of c
 (Agarwal et al. 2013; the duality of Black and Rangarajan 1996).
 """
 
@@ -29,9 +29,9 @@ class SwitchableConstraints(MEstimator):
     Parameters
     ----------
     sigma : float
-        sigma_s, of the switch's prior, for measurements of one component; for m it is ``sigma / sqrt(m)``, so that the
-        measurement that just fits, ``chi^2 = m``, has the same switch. The paper's is 1, at which the efficiency on
-        Gaussian noise is 44 to 66 %; at 0.3 it is 93 to 98 %.
+        Standard deviation sigma_s of the prior of a switch, for measurements of one component. For m components it is
+        ``sigma / sqrt(m)``, so that a measurement with the expected ``chi^2 = m`` has the same switch. The paper has 1,
+        with an efficiency on Gaussian noise of 44 to 66 %; with 0.3 it is 93 to 98 %.
     """
 
     def __init__(self, sigma: float = 0.3, smallest: float = 1e-3):

@@ -69,13 +69,13 @@ class Progress:
     done, total : int
         Results that are there already count as done.
     failed : int
-        Of those computed now.
+        Number of failures among the results computed now.
     elapsed : float
-        [s] since the stage began.
+        Time since the stage began [s].
     left : float or None
-        Time left [s]; None as long as nobody knows.
+        Time left [s]; None while it is not known.
     note : str
-        The kernel or run that was finished last.
+        Name of the kernel or run that was finished last.
     """
 
     stage: str
@@ -89,18 +89,18 @@ class Progress:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a campaign did.
+    """Summary of what a campaign computed.
 
     Attributes
     ----------
     folder : Path
         Folder of the results.
     total : int
-        Results that were asked for.
+        Number of results that were requested.
     skipped : int
-        Of these, those that were there already.
+        Number of these results that existed already.
     statuses : mapping of str to int
-        How many of those computed now have which status.
+        Number of results computed now, by status.
     seconds : float
         Wall-clock time of the campaign [s].
     """
@@ -166,7 +166,7 @@ def run_campaign(
     scenarios, estimators, seeds
         What is run: every estimator on every scenario with every seed.
     folder : path
-        Of the results; made if it is not there.
+        Folder of the results; it is made if it does not exist.
     workers, retry, keep_trials, covariance_interval, confinement, minutes
         As for `simnav.leaderboard.interface.campaign`.
     timeout : float, optional
@@ -199,7 +199,7 @@ def run_campaign(
     StoreError
         If the folder cannot be used, or the disk is full. What is there stays valid.
     KeyboardInterrupt
-        By the user; all finished results are on disk.
+        If the user stops the campaign; all finished results are on disk.
     """
     started = time.monotonic()
     report = progress or (lambda p: None)

@@ -83,7 +83,7 @@ def _keep(folder: Path, files: Mapping[str, bytes]) -> None:
 def run_on_cluster(
     units: Iterator[tuple[int, Unit]], scheduler: str | None, workers: int
 ) -> Iterator[tuple[int, Counter[str]]]:
-    """Run units on a Dask cluster, and yield what became of them as they end; their results are on disk then.
+    """Run units on a Dask cluster, and yield the outcome of each when it ends; its results are then on disk.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def run_on_cluster(
     scheduler : str or None
         Address; None starts a cluster of processes on this machine.
     workers : int
-        Of a cluster on this machine.
+        Number of workers of a cluster on this machine.
 
     Raises
     ------

@@ -24,9 +24,9 @@ class Entrant:
     name, parameters, label, search
         As of `EstimatorRequest`; a file is named by its absolute path.
     reference : bool
-        One of simnav's own references: it is told the truth.
+        Whether it is one of simnav's references, which receive the truth.
     source : str
-        Digest.
+        Digest of the source of the estimator.
     code : bytes
         The class itself, where no other process can import it.
     point : str

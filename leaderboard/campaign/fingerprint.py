@@ -243,13 +243,13 @@ def variant(recording: str, label: str, name: str, parameters: Mapping[str, Any]
     Parameters
     ----------
     recording : str
-        From `recording_digest`.
+        Digest of the recording, from `recording_digest`.
     label, name : str
-        Of the estimator.
+        Label and name of the estimator.
     parameters : mapping
         That were set. Where one names a file, its content counts.
     source : str
-        From `estimator_source`.
+        Digest of the source, from `estimator_source`.
     """
     values = json.dumps(dict(parameters), sort_keys=True, default=str)
     files = [text for pair in named_files(parameters.values()) for text in pair]

@@ -1,4 +1,4 @@
-"""Run code that nobody vouches for: in a process of its own, with limits of time and memory.
+"""Run code that is not trusted in a process of its own, with limits of time and memory.
 
 On POSIX the process is a fork: it starts in milliseconds, with all kernels warm, and the recording
 is shared, not copied. Elsewhere it is spawned. Memory is limited twice: the kernel refuses private
@@ -53,7 +53,7 @@ class Outcome:
     reason : str
         One sentence; empty if ok.
     value : object
-        What the function returned; None unless ok.
+        Value that the function returned; None unless the status is ok.
     seconds : float
         Wall-clock time.
     peak_memory : int

@@ -27,7 +27,7 @@ def beside_oracles(
     Parameters
     ----------
     scenarios : sequence of Scenario
-        Of the campaign.
+        Scenarios of the campaign.
     everyone : sequence of EstimatorRequest
         The estimators of the campaign.
 

@@ -38,7 +38,7 @@ def record_within(scenario: Scenario, seed: int, seconds: float) -> Recording:
     Parameters
     ----------
     scenario : Scenario
-        What is recorded.
+        The scenario to record.
     seed : int
         Seed of the run.
     seconds : float

@@ -41,7 +41,7 @@ class EstimatorRequest:
     parameters : mapping
         Keyword arguments of its constructor.
     label : str
-        What tables call it; default: name and parameters.
+        Name in tables. Default: name and parameters.
     cls : type or None
         The class itself, where it was given as such: workers are sent it, for they may not find it by its name.
     point : str
@@ -88,7 +88,7 @@ def request(given: EstimatorLike, parameters: Mapping[str, Any] | None = None) -
     given : str, Path, type, EstimatorRequest or pair
         The estimator: a name, a file, a class, a request, or one of these with parameters.
     parameters : mapping, optional
-        That are added, unless they are given already.
+        Parameters that are added, unless they are given already.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def requests(given: Estimators, parameters: Mapping[str, Any] | None = None) -> 
     given : estimators
         A text may name several, separated by commas.
     parameters : mapping, optional
-        Of several estimators each gets those that it has.
+        Parameters to set. Each estimator gets the parameters that its constructor has.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
     Raises
     ------
     RequestError
-        Where two estimators have one label: tables could not tell them apart.
+        If two estimators have the same label: tables could not distinguish them.
     """
     by_label: dict[str, EstimatorRequest] = {}
     for r in found:

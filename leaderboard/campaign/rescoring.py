@@ -72,9 +72,9 @@ def rescore_results(
     folder, names, scenarios, progress
         As there.
     keys : collection of str, optional
-        Of the results; default: all that have a trial.
+        Keys of the results. Default: all results that have a stored trial.
     seal : Seal
-        Of results with sealed seeds; then only these are scored.
+        Seal of results with sealed seeds; only these results are then scored.
 
     Returns
     -------

@@ -28,7 +28,7 @@ class Seal:
     key : bytes
         32 bytes, from the content of the file; none for public seeds.
     file : Path, optional
-        That estimators must not read.
+        File of the key, which estimators must not read.
     """
 
     key: bytes = b""

@@ -37,7 +37,7 @@ class EstimatorRun:
     parameters : mapping
         Parameters of the estimator that were set.
     reference : bool
-        Told the truth.
+        Whether the estimator receives the truth (a reference row).
     status, reason : str
         As in `simnav.trial.trial`.
     seconds : float

@@ -93,7 +93,7 @@ def code_of(path: Path, package: str) -> Code:
     path : Path
         The file.
     package : str
-        That its relative imports are relative to; empty for a file that belongs to none.
+        Package to which relative imports refer; empty for a file outside a package.
 
     Raises
     ------

@@ -55,7 +55,7 @@ def require_unseen(entrants: Sequence[Entrant], scenarios: Sequence[Scenario], s
     Parameters
     ----------
     entrants, scenarios, seeds
-        Of a campaign that is not sealed.
+        Estimators, scenarios and seeds of a campaign that is not sealed.
 
     Raises
     ------

@@ -38,7 +38,7 @@ class Verification:
     folder : str
         Folder of the results.
     results : int
-        In the folder.
+        Number of results in the folder.
     seal : str
         Hash of the key; empty for public seeds.
     other_seals : int

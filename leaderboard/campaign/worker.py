@@ -45,13 +45,13 @@ class Unit:
     seed : int
         The seed.
     entrants : tuple of (Entrant, str)
-        With the keys of their results.
+        Estimators, each with the key of its result.
     recording, simulator : str
         As in `Result`.
     folder : Path
         Folder of the results.
     limits : Limits
-        Of an estimator.
+        Limits of an estimator.
     scores : OwnScores
         Scores of others that workers must be sent.
     scoring : str
@@ -63,7 +63,7 @@ class Unit:
     confinement : str
         ``process``, ``bubblewrap`` or ``none``.
     seal : Seal
-        From which the seed is derived; `seed` is then the number of the run.
+        Seal from which the seed is derived; `seed` is then the number of the run.
     """
 
     scenario: Scenario

@@ -1,4 +1,4 @@
-"""``simnav bench``: time and memory of an epoch, beside estimators that come with simnav."""
+"""``simnav bench``: time and memory of an epoch, compared with estimators that come with simnav."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ def command(
     estimator: FilesOrNames,
     scenario: Annotated[str, typer.Option("--scenario", "-s", help="A name or a TOML file.")] = "open-sea",
     against: Annotated[
-        list[str] | None, typer.Option(help="Rows beside them, separated by commas. Default: one of each family.")
+        list[str] | None, typer.Option(help="Rows for comparison, separated by commas. Default: one of each family.")
     ] = None,
     epochs: Annotated[int, typer.Option(min=2, help="Epochs that are run.")] = 120,
-    rounds: Annotated[int, typer.Option(min=1, help="Runs; an epoch counts with its least time.")] = 3,
+    rounds: Annotated[int, typer.Option(min=1, help="Runs; the smallest time of an epoch counts.")] = 3,
     set_: Set = None,
     seed: Seed = 0,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Measure time and memory of an epoch, beside estimators that come with simnav."""
+    """Measure time and memory of an epoch, compared with estimators that come with simnav."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.ranking.costs import cost_table

@@ -26,12 +26,14 @@ _ROWS = 12
 def command(
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file; a simulated one.")],
     runs: Annotated[int, typer.Option("--runs", "-n", min=1, help="Seeds over which it is averaged.")] = 12,
-    smoothed: Annotated[bool, typer.Option("--smoothed", help="The bound of smoothed output.")] = False,
+    smoothed: Annotated[
+        bool, typer.Option("--smoothed", help="Bound of smoothed output, not of real-time output.")
+    ] = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="Write every epoch to this file.")] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Show the posterior Cramer-Rao bound of a scenario by epoch: clean, flags known, flags unknown (mix)."""
+    """Show the posterior Cramer-Rao bound of a scenario by epoch: without faults, faults known, faults unknown."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
 

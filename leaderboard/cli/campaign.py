@@ -64,16 +64,17 @@ def command(
     workers: Workers = 2,
     time_limit: TimeLimit = None,
     memory_limit: MemoryLimit = 2048,
-    retry: Annotated[bool, typer.Option("--retry", help="Run failures again that are in the folder.")] = False,
+    retry: Annotated[bool, typer.Option("--retry", help="Run the failed runs of the folder again.")] = False,
     keep_trials: Annotated[
-        bool, typer.Option("--keep-trials", help="Keep what estimators give now, for 'simnav rescore'.")
+        bool, typer.Option("--keep-trials", help="Keep the estimates, for 'simnav rescore'.")
     ] = False,
     covariance_interval: Annotated[
-        float, typer.Option(min=0.0, help="Least seconds between two covariances that are kept. 0 keeps all.")
+        float, typer.Option(min=0.0, help="Smallest time between two kept covariances [s]. 0 keeps all.")
     ] = 0.0,
     backend: Annotated[Backend, typer.Option(help="Processes of this machine, or a Dask cluster.")] = Backend.LOKY,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Of the Dask scheduler, e.g. tcp://host:8786; implies dask.")
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Address of the Dask scheduler, e.g. tcp://host:8786; implies dask."),
     ] = None,
     shard: Annotated[
         str, typer.Option(metavar="K/N", help="Do part K of N of the runs; 'simnav merge' puts the parts together.")

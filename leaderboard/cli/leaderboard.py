@@ -16,7 +16,9 @@ __all__ = ["command"]
 def command(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the site.")] = Path("site"),
-    papers: Annotated[Path, typer.Option(help="What 'simnav reproduce' wrote; gets pages.")] = Path("reproduced"),
+    papers: Annotated[Path, typer.Option(help="Folder that 'simnav reproduce' wrote; its papers get pages.")] = Path(
+        "reproduced"
+    ),
     sweeps: Annotated[
         Path, typer.Option(help="Folder with the folders of sweeps; the pages of scenarios show them.")
     ] = Path("results"),
@@ -26,7 +28,7 @@ def command(
     figures: Annotated[bool, typer.Option("--print", help="Write the charts as SVG and PNG, too.")] = False,
     against: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Results of another campaign: how well its order agrees."),
+        typer.Option(metavar="FOLDER", help="Results of another campaign, for the rank correlation."),
     ] = None,
     workers: Workers = 2,
     json: Json = False,

@@ -20,7 +20,7 @@ _TEMPLATE = Path(__file__).parent / "estimator.py.jinja"
 
 
 def command(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the estimator, like my-filter.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the estimator, such as my-filter.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. Default: my_filter.py.")] = None,
     json: Json = False,
     debug: Debug = False,

@@ -57,7 +57,9 @@ Estimators = Annotated[
         help="Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter. Default: all.",
     ),
 ]
-Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a parameter of the estimators.")
+]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the run.")]
 FirstSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the first run; the others count up.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes.")]

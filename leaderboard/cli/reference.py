@@ -27,7 +27,7 @@ def command(
         typer.Option("--output", "-o", help="File of the figures. Default: the one that comes with simnav."),
     ] = None,
     results: Annotated[
-        Path, typer.Option(help="Keep the runs in this folder; started again, it goes on there.")
+        Path, typer.Option(help="Keep the runs in this folder; started again, it continues there.")
     ] = Path("results/reference"),
     workers: Workers = 2,
     json: Json = False,

@@ -18,14 +18,14 @@ def command(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="Folder of 'simnav campaign --keep-trials'.")],
     score: Annotated[
         list[str] | None,
-        typer.Option("--score", help="Names of scores, by commas. Default: those that are missing."),
+        typer.Option("--score", help="Names of scores, separated by commas. Default: those that are missing."),
     ] = None,
     scenario: OwnScenarios = None,
-    key: Annotated[Path | None, typer.Option(metavar="KEYFILE", help="The key, where the seeds are sealed.")] = None,
+    key: Annotated[Path | None, typer.Option(metavar="KEYFILE", help="Key file, if the seeds are sealed.")] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Compute new scores, or others again, without running an estimator."""
+    """Compute new scores, or existing scores again, without running an estimator."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
 

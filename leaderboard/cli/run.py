@@ -74,9 +74,7 @@ def command(
             unseen = [f"{name} ({kind})" for name, kind in report.unseen(e).items()]
             if unseen:
                 left = "it out" if len(unseen) == 1 else "them out"
-                out.remark(
-                    f"{e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}"
-                )
+                out.remark(f"{e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}")
         if drawn is not None:
             out.print(f"figure: {drawn}")
         if shown is not None:

@@ -19,7 +19,9 @@ def command(
     scenario: ScenarioName,
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.npz).")],
     seed: Seed = 0,
-    csv: Annotated[Path | None, typer.Option(help="Folder for the same as CSV files, one an instrument.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option(help="Folder for the recording as CSV files, one for each instrument.")
+    ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:

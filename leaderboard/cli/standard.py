@@ -29,7 +29,7 @@ def run(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Run what is missing of the standard result, or has changed since."""
+    """Run the missing and outdated parts of the standard result."""
     with session(json, debug) as out:
         from simnav.leaderboard import publishing
 
@@ -75,7 +75,7 @@ def carry(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Carry the standard result over to the code of today, where repeated runs give the same scores."""
+    """Carry the standard result over to the code of today, if repeated runs give the same scores."""
     with session(json, debug) as out:
         from simnav.leaderboard import publishing
 

@@ -39,11 +39,9 @@ def command(
     dial: Annotated[list[str], typer.Option(help=_DIAL)],
     estimator: Annotated[list[str], typer.Option("--estimator", "-e", help=_ESTIMATOR)],
     runs: Annotated[int, typer.Option("--runs", "-n", min=1, help="Seeds a value.")] = 30,
-    limit: Annotated[
-        float | None, typer.Option(help="Error that must not be passed, in the unit of the score.")
-    ] = None,
+    limit: Annotated[float | None, typer.Option(help="Threshold of the error, in the unit of the score.")] = None,
     score: Annotated[str, typer.Option(help="A score that is better when lower.")] = "horizontal_rmse",
-    plot: Annotated[Path | None, typer.Option(help="Draw it into this file: .png, .svg or .pdf.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of the results. Default: results/sweep-SCENARIO.")
     ] = None,
@@ -55,7 +53,7 @@ def command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Turn a dial of a scenario: the error of estimators against it, and where each of them breaks."""
+    """Vary a quantity of a scenario (a dial): the error of estimators against it, and their breaking points."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
 

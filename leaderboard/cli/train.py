@@ -39,7 +39,7 @@ class _Features(StrEnum):
 
 @app.callback()
 def _root() -> None:
-    """Learn the parameters of an estimator anew."""
+    """Train the parameters of an estimator."""
 
 
 @app.command("anfis")

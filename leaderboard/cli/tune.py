@@ -26,28 +26,29 @@ def command(
     family: Annotated[
         list[str] | None,
         typer.Option(
-            "--family", "-f", help="Training families, commas between. Default: training-voyages,training-clean."
+            "--family", "-f", help="Training families, separated by commas. Default: training-voyages,training-clean."
         ),
     ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME=LOW:HIGH", help="What is varied; with :log or :integer behind. Default: as last time."
+            metavar="NAME=LOW:HIGH",
+            help="A parameter and its bounds; :log or :integer may follow. Default: those of the stored tuning.",
         ),
     ] = None,
     runs: Annotated[int, typer.Option("--runs", "-n", min=2, help="Voyages of each family for the search.")] = 20,
     unseen: Annotated[int, typer.Option(min=2, help="Voyages of each family for the comparison.")] = 20,
-    evaluations: Annotated[int, typer.Option(min=2, help="Of the objective.")] = 40,
+    evaluations: Annotated[int, typer.Option(min=2, help="Evaluations of the objective.")] = 40,
     method: Annotated[str, typer.Option(help="differential-evolution or nelder-mead.")] = "differential-evolution",
     seed: FirstSeed = 0,
     search_seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
     set_: Set = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write what was chosen to this file.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the chosen values to this file.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Write a figure of the search: .png, .svg or .pdf.")] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Choose parameters of an estimator on training families, never on what is ranked."""
+    """Choose parameters of an estimator on training families, never on ranked scenarios."""
     with session(json, debug) as out:
         from simnav.leaderboard import interface
         from simnav.leaderboard.results.errors import RequestError

@@ -29,15 +29,15 @@ def command(
     scenario: OwnScenarios = None,
     estimator: Estimators = None,
     present: Annotated[
-        bool, typer.Option("--present", help="Of a bundle: use the packages that are here, not a new environment.")
+        bool, typer.Option("--present", help="For a bundle: use the installed packages, not a new environment.")
     ] = False,
     tolerance: Annotated[
-        float | None, typer.Option(min=0.0, help="Of a bundle: relative difference that is accepted. [1e-6]")
+        float | None, typer.Option(min=0.0, help="For a bundle: relative difference that is accepted. [1e-6]")
     ] = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Check results or a submission, and repeat some of the runs to the bit."""
+    """Check results or a submission, and repeat some of the runs, bit for bit."""
     with session(json, debug) as out:
         if results.is_file():
             from simnav.leaderboard import publishing

@@ -27,7 +27,7 @@ def stanford_diagrams(diagrams: Mapping[str, Stanford], *, title: str = "") -> F
     Parameters
     ----------
     diagrams : mapping of str to Stanford
-        By label; at least one.
+        Diagrams by label, at least one.
     title : str
         Title of the figure.
 

@@ -64,7 +64,7 @@ def rank_correlations(board: Ranking, other: Ranking) -> list[RankCorrelation]:
     Returns
     -------
     list of RankCorrelation
-        Of tracks with `LEAST` rows in common or more.
+        Correlations of the tracks that have at least `LEAST` rows in common.
     """
     same = board is other
     found = []

@@ -73,7 +73,7 @@ class Reference:
     estimator : str
         Whose error it is; empty where there is none, and the figures are in metres.
     runs : int
-        Of how many runs it is the geometric mean.
+        Number of runs in the geometric mean.
     spread : float
         Standard deviation of the logarithm of its error from run to run.
     stored : bool
@@ -144,7 +144,7 @@ class Row:
         Interval of the rank: the rows above ``rank_low`` are told from it and better, those below ``rank_high`` are
         told from it and worse. The intervals of all rows hold together with 95 % probability.
     tier : int or None
-        From 1, the best; within a tier no row is told from another one of it.
+        Tier, from 1 (the best). Rows of one tier do not differ significantly.
     may_be_best : bool
         Whether it belongs to the set that holds the best row with 95 % probability.
     provisional : bool
@@ -157,7 +157,7 @@ class Row:
     worst, p95 : float
         Largest ratio of a run, and the one that 95 % of the runs do not exceed.
     runs, failed : int
-        How many runs count, and how many of them failed.
+        Number of runs that count, and number of failures among them.
     failed_low, failed_high : float
         95 % interval of the share of runs that fail.
     p_value : float or None
@@ -224,9 +224,9 @@ class ScenarioRow(Row):
     Attributes
     ----------
     median : float
-        Of the ranked score over the completed runs, in its unit; NaN without any.
+        Median of the ranked score over the completed runs, in its unit; NaN without completed runs.
     statuses : dict of str to int
-        How many runs ended how.
+        Number of runs, by status.
     ratios : dict of str to float
         Ratio to the reference figure of each unit of the test: by seed, or by recording.
     """
@@ -243,7 +243,7 @@ class TrackRow(Row):
     Attributes
     ----------
     covered, scenarios : int
-        How many scenarios of the track it has run, of how many.
+        Number of scenarios of the track that it has run, and number of all.
     ratios : dict of str to float
         Score by scenario, of those that it has run.
     """
@@ -266,13 +266,13 @@ class ScenarioRanking:
     score : str
         Key of `simnav.scoring.SCORES` that is ranked.
     reference : Reference
-        What the ratios are to.
+        Reference, whose error is the denominator of the ratios.
     unit : str
-        ``seed`` or ``recording``: what the tests and intervals take for independent.
+        ``seed`` or ``recording``: the unit that tests and intervals treat as independent.
     units : int
         How many of them the ranked rows have, at least.
     remarks : tuple of str
-        Sentences that a table has to show: what cannot be told, and why.
+        Sentences that a table has to show: which conclusions the data do not allow, and why.
     rows : tuple of ScenarioRow
         In order of score; then those not ranked, then the references.
     unsuitable : dict of str to str
@@ -302,21 +302,21 @@ class TrackRanking:
     Attributes
     ----------
     track : str
-        In kebab-case.
+        Name of the track in kebab-case.
     title : str
-        For people.
+        Title of the track, for display.
     score : str
         Key of `simnav.scoring.SCORES` that is ranked.
     relative : bool
         Whether the figures are multiples of a reference figure; otherwise they are in the unit of the score.
     unit : str
-        ``seed`` or ``recording``: what the tests and intervals take for independent.
+        ``seed`` or ``recording``: the unit that tests and intervals treat as independent.
     units : int
         How many of them the ranked rows have, at least, in a scenario (all recordings of the track are counted).
     scenarios : tuple of str
         Versioned ids.
     remarks : tuple of str
-        Sentences that a table has to show: what cannot be told, and why.
+        Sentences that a table has to show: which conclusions the data do not allow, and why.
     rows : tuple of TrackRow
         In order of score; then those not ranked, then the references.
     """

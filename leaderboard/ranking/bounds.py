@@ -33,7 +33,7 @@ class BoundReport:
     runs : int
         Seeds over which they are averaged.
     smoothed : bool
-        Of smoothed output; otherwise of output in real time.
+        Whether the bound is for smoothed output; otherwise for output in real time.
     bounds : tuple of simnav.estimators.bound.Bound
         ``clean``: without faults; ``flags``: faults known as they come; ``mix``: only their statistics known.
     """

@@ -23,7 +23,7 @@ def real_time_twin(label: str, score: str, boards: Collection[Mapping[str, Runs]
     label : str
         Of the estimator. Only a registered name declares anything; with other parameters a label is none.
     score : str
-        That is ranked.
+        The score that is ranked.
     boards : collection of mapping
         Runs by estimator on each scenario.
 

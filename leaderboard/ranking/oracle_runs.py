@@ -38,7 +38,7 @@ class OracleRuns:
     Attributes
     ----------
     runs : dict of int to OracleRun
-        By seed.
+        Runs of the oracle, by seed.
     """
 
     def __init__(self, scenario: Scenario, folder: str | os.PathLike[str]):

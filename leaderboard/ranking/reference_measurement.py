@@ -49,7 +49,7 @@ def measure(
     runs : int
         Seeds a scenario, at most 1000. Of a recorded one each recording is taken once.
     folder : path
-        Of the runs; started again, it goes on where it was.
+        Folder of the runs. Started again, the measurement continues where it stopped.
     workers : int
         Number of processes.
     progress : callable, optional

@@ -24,13 +24,13 @@ def remarks(
     Parameters
     ----------
     separation : Separation or None
-        Of the ranked rows.
+        Separation of the ranked rows.
     unit : str
         ``seed`` or ``recording``.
     rows : sequence of Row
         Rows of the ranking.
     references : sequence of Reference
-        Of the scenarios.
+        References of the scenarios.
     """
     found = []
     ranked = [r for r in rows if r.ranked]

@@ -32,7 +32,7 @@ class _Report:
     results : sequence of Result
         The results that the report is made from.
     ranking : Ranking
-        Of these results.
+        Ranking of these results.
     """
 
     results: Sequence[Result]
@@ -90,7 +90,7 @@ class EvaluationReport(_Report):
     standings : tuple of Standing
         One for each estimator in question and scenario.
     folder : Path or None
-        Of the results, where they were kept.
+        Folder of the results, if they were kept.
     """
 
     estimators: tuple[str, ...]

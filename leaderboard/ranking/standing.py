@@ -37,7 +37,7 @@ class StandingRow:
     better : float or None
         Share of the seeds on which the estimator in question has the smaller error.
     p_value : float or None
-        Of the paired test.
+        p-value of the paired test.
     """
 
     estimator: str
@@ -63,7 +63,8 @@ class Standing:
     scenario, estimator : str
         Versioned id of the scenario, and label of the estimator.
     place : int or None
-        By the median error among those that are no references; None where the scenario does not suit it.
+        Place by median error among the rows that are no references; None where the scenario does not suit the
+        estimator.
     of : int
         How many there are.
     rows : tuple of StandingRow

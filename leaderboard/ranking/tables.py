@@ -189,7 +189,7 @@ class Fitted:
     always : int
         How many are never left out.
     numeric, dim, strong, caption
-        As of `table`.
+        As in `table`.
     explained : mapping of str to str
         Sentences that are added to the caption where their column is shown.
     """

@@ -23,7 +23,7 @@ class Citation:
     Attributes
     ----------
     key : str
-        Of the BibTeX entry.
+        Key of the BibTeX entry.
     year, version : str
         Year and version of the software.
     note : str

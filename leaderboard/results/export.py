@@ -66,9 +66,9 @@ class Document:
     ranking : mapping
         Of the same results, plain (``Ranking.to_dict``).
     scenarios : sequence of mapping
-        What is known of each.
+        Facts about each scenario.
     command : str
-        That makes the results again.
+        Command that repeats the results.
     generated : str
         Date and time.
     """

@@ -19,7 +19,7 @@ def whole(path: Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        As of writing; an older file stays as it was.
+        If writing fails; an older file stays unchanged.
     """
     partial = path.with_name(f".{path.name}.part")
     try:
@@ -35,7 +35,7 @@ def write_whole(path: Path, content: str | bytes) -> Path:
     Raises
     ------
     OSError
-        As of writing; an older file stays as it was.
+        If writing fails; an older file stays unchanged.
     """
     with whole(path) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)

@@ -48,13 +48,13 @@ def write(kind: Kind, name: str, thing: Any, path: Path) -> list[Path]:
     Parameters
     ----------
     kind : {"results", "recording"}
-        What is written.
+        Kind of the data to write.
     name : str
         One of `formats`.
     thing : Document or Recording
         The object to be written.
     path : Path
-        Of the file; for a recording as ``csv`` of a folder, which is made where it is missing.
+        Path of the file; for a recording as ``csv``, path of a folder, which is made if it does not exist.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def write(kind: Kind, name: str, thing: Any, path: Path) -> list[Path]:
     ValueError
         If there is no such format; one sentence.
     OSError
-        As of writing.
+        If writing fails.
     """
     if name not in formats(kind):
         raise ValueError(f"there is no format {name!r} of {kind}{closest(name, formats(kind))}")

@@ -55,7 +55,7 @@ def pack(
     Returns
     -------
     list of Result
-        That were written, in order of scenario, estimator and seed.
+        Results that were written, in order of scenario, estimator and seed.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class Provenance:
     benchmark : str
         Name and version of the benchmark; empty for results that were made before it had one.
     commit : str
-        Of the checkout of simnav; empty where simnav is installed without one.
+        Commit of the checkout of simnav; empty if simnav is installed without a checkout.
     dirty : bool or None
         Whether the code of that checkout differed from the commit; None without a checkout.
     simnav, python, numpy, numba, gtsam : str
@@ -56,7 +56,7 @@ class Provenance:
     cpu : str
         Model of the processor.
     cores : int
-        That the process may use; 0 where it is not known.
+        Number of cores that the process may use; 0 where it is not known.
     confinement : str
         How estimators were kept apart from the recording.
     seal : str

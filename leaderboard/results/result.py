@@ -98,9 +98,9 @@ class Result:
     simnav : str
         Version and digest of the simulator.
     time_limit : float
-        That the estimator ran under [s]; 0 where it is not known.
+        Time limit of the run [s]; 0 where it is not known.
     memory_limit : int
-        That it ran under [bytes]; 0 where it is not known.
+        Memory limit of the run [bytes]; 0 where it is not known.
     scoring : str
         With which code it was scored: JSON, digests by module. Empty where it is not known.
     scenario_digest, estimator_digest : str
@@ -242,7 +242,7 @@ def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | Non
     tables : iterator of pyarrow.Table
         Each becomes a row group.
     level : int, optional
-        Of the compression.
+        Level of the compression.
     split : bool
         Store the bytes of scores by their place, which makes them smaller.
     """
@@ -340,7 +340,7 @@ class SeriesColumn:
     Parameters
     ----------
     column : ChunkedArray
-        Of a file of results.
+        Column of a file of results.
     """
 
     def __init__(self, column: pa.ChunkedArray):

@@ -84,11 +84,11 @@ class Ending(NamedTuple):
     status : str
         Status of the run.
     time_limit : float
-        That it ran under [s]; 0 where it is not known.
+        Time limit of the run [s]; 0 where it is not known.
     memory_limit : int
         [bytes]; 0 where it is not known.
     scoring : str
-        With which code it was scored, as in `Result`.
+        Digest of the code of the scores, as in `Result`.
     """
 
     status: str
@@ -197,9 +197,9 @@ def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, fl
     folder : path
         Folder of the results.
     scores : mapping of str to mapping
-        By key: all scores of the result.
+        All scores of each result, by key.
     scoring : str
-        With which code they were computed.
+        Digest of the code that computed them.
 
     Raises
     ------

@@ -20,11 +20,11 @@ class StoredScores(Mapping[str, float]):
     Parameters
     ----------
     place : dict of str to int
-        Where each score stands, from the start; results with the same scores share it.
+        Offset of each score from `start`; results with the same scores share this mapping.
     values : array of float
         Scores of many results.
     start : int
-        Of this one.
+        Index in `values` of the first score of this result.
     """
 
     __slots__ = ("_place", "_start", "_values")
@@ -62,9 +62,9 @@ def score_matrix(scores: Sequence[Mapping[str, float]], names: Sequence[str]) ->
     Parameters
     ----------
     scores : sequence of n mappings
-        Of each result.
+        The scores of each result.
     names : sequence of m str
-        Of the scores.
+        Names of the scores.
 
     Returns
     -------

@@ -64,13 +64,13 @@ def write(
     Parameters
     ----------
     folder : path
-        Of the results.
+        Folder of the results.
     key : str
-        Of its result.
+        Key of the result of this trial.
     trial : Trial
         The trial to be kept.
     recording : Recording
-        That it was run on.
+        Recording on which the estimator ran.
     covariance_interval : float
         Least time between two covariances that are kept [s]; 0 keeps every one.
 
@@ -120,7 +120,7 @@ def read(folder: str | os.PathLike[str], key: str, recording: Recording) -> tupl
     key : str
         Key of the result.
     recording : Recording
-        That it was run on, made again.
+        Recording on which the estimator ran, simulated again.
 
     Returns
     -------

@@ -47,14 +47,14 @@ _TRACK_POINTS = 300
 
 @dataclass(frozen=True)
 class Background:
-    """Of one scenario; empty where it is not in the catalogue.
+    """Facts of one scenario that its page shows; empty where the scenario is not in the catalogue.
 
     Attributes
     ----------
     happening : dict
         Faults and manoeuvres of the first run that is shown, as columns.
     instruments : list of dict
-        Datasheets.
+        Datasheets of the instruments.
     units : dict of str to list
         By instrument: unit of the length of its innovation, and factor from SI, where its components share them.
     bound : dict
@@ -84,7 +84,7 @@ def background_of(identity: str, seeds: Sequence[int]) -> Background:
     identity : str
         Versioned id of the scenario.
     seeds : sequence of int
-        Of the runs whose recordings are wanted.
+        Seeds of the runs whose recordings are needed.
     """
     path = _file(identity, seeds)
     if path is not None:

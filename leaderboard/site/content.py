@@ -118,7 +118,7 @@ class SiteFacts:
     Attributes
     ----------
     version, generated : str
-        Of simnav that wrote the site; date and time.
+        Version of simnav that wrote the site; date and time.
     total : int
         Results; 0 for a page that stands alone.
     scenarios, estimators : sequence
@@ -128,13 +128,13 @@ class SiteFacts:
     editions : sequence of ExtraPage
         Pages of the editions of the board.
     command : str
-        That makes the results again.
+        Command that repeats the results.
     benchmark : str
         Name and version; empty where it is not known.
     provenance : sequence of Provenance
-        Of the results, each once.
+        Provenance of the results, each once.
     citation : Citation or None
-        Of the results.
+        Citation of the results.
     """
 
     version: str

@@ -59,7 +59,7 @@ class Curves:
     values : dict of str to (k,) array
         Magnitudes of the errors, SI units; ``level``: protection level [m].
     quantiles : (101,) array or None
-        Of the horizontal error [m].
+        Quantiles of the horizontal error [m].
     diagnostics : dict of str to (b,) array
         Weights of the instruments over ``diagnostics_time``.
     """
@@ -77,7 +77,7 @@ class Gathered:
     Attributes
     ----------
     curves : dict of Result to Curves
-        For the charts over all runs.
+        Curves for the charts over all runs.
     single : dict of Result to dict of str to array
         Series at as many points as a chart of one run shows; `one_run` makes its data of them.
     """
@@ -158,13 +158,13 @@ def band(curves: Sequence[Curves], name: str, factor: float, time: Array) -> dic
     Parameters
     ----------
     curves : sequence of Curves
-        Of one estimator on one scenario.
+        Curves of one estimator on one scenario.
     name : str
-        Of an error, or of a weight.
+        Name of an error, or of a weight.
     factor : float
-        From SI.
+        Factor from SI units to the unit of the chart.
     time : (n,) array
-        Where it is wanted [s].
+        Times of the result [s].
 
     Returns
     -------
@@ -200,7 +200,7 @@ def integrity(curves: Sequence[Curves], limit: float) -> dict[str, list[Any]] | 
     Parameters
     ----------
     curves : sequence of Curves
-        Of one estimator on one scenario.
+        Curves of one estimator on one scenario.
     limit : float
         Alert limit [m].
     """

@@ -26,9 +26,9 @@ def entries(
     Parameters
     ----------
     runs : mapping of str to mapping
-        By scenario and estimator.
+        Runs by scenario and estimator.
     ranking : Ranking
-        Of the same results.
+        Ranking of the same results.
     """
     references = {label for by in runs.values() for label, found in by.items() if found.results[0].reference}
     ranked = [row.estimator for track in ranking.tracks for row in track.rows]

@@ -60,7 +60,7 @@ class EstimatorFacts:
     family, summary, text, source : str
         Kind of method; first sentence; the rest of the description; paper.
     file : str
-        With the line, relative to the project.
+        File with the line, relative to the project.
     code : str
         Its declaration.
     parameters : tuple of (name, default, annotation)

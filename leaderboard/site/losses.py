@@ -41,9 +41,9 @@ def losses(label: str, other: str, ranking: Ranking, scenarios: Mapping[str, Sce
     label, other : str
         Labels of the row and of the plain one.
     ranking : Ranking
-        Of all results.
+        Ranking of all results.
     scenarios : mapping of str to ScenarioEntry
-        By id.
+        Entries of the scenarios, by id.
 
     Returns
     -------

@@ -159,9 +159,9 @@ def overview(
     ranking : Ranking
         The ranking to be shown.
     estimators, scenarios : mapping
-        By label and by versioned id.
+        Estimators by label, and scenarios by versioned id.
     runs : mapping
-        By scenario and label.
+        Runs by scenario and label.
     """
     return [_track(t, estimators, scenarios, runs) for t in ranking.tracks]
 

@@ -37,16 +37,16 @@ _TICKS = 40  # runs of a row that a chart marks
 
 @dataclass(frozen=True)
 class ScenarioData:
-    """What is written for a scenario.
+    """Data of the page of one scenario.
 
     Attributes
     ----------
     page : dict
-        Embedded in the page.
+        Data that is embedded in the page.
     files : dict
-        Name -> content of ``data/NAME.js``.
+        Content of each file ``data/NAME.js``, by name.
     charts : tuple of Chart
-        With their data, for print.
+        Charts with their data, for print.
     first : tuple of str
         Rows that charts show at first.
     """
@@ -63,7 +63,7 @@ def shown_first(ranking: ScenarioRanking, drawn: Sequence[str]) -> list[str]:
     Parameters
     ----------
     ranking : ScenarioRanking
-        Of the scenario.
+        Ranking of the scenario.
     drawn : sequence of str
         The rows of which curves are kept, in order of rank.
     """
@@ -103,13 +103,13 @@ def scenario_data(
     Parameters
     ----------
     entry, ranking, runs, estimators
-        Of the scenario, and of its rows by label.
+        Facts and ranking of the scenario; runs and facts of its rows, by label.
     seeds : sequence of int
-        Of the runs that are shown one by one.
+        Seeds of the runs that are shown one by one.
     around : Background
-        Of the scenario.
+        Background of the scenario.
     gathered : Gathered
-        Of the series: curves of the runs that bands are made of, and the single runs.
+        Gathered series: curves of the runs for the bands, and the single runs.
     sweeps : sequence of SweepFile
         Over dials of the scenario.
     """

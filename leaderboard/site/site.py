@@ -76,13 +76,13 @@ def build(
     Parameters
     ----------
     results : sequence of Result
-        With their series.
+        Results with their series.
     ranking : Ranking
-        Of the same results.
+        Ranking of the same results.
     output : Path
         Folder of the site; an older site there is replaced.
     command : str, optional
-        That makes the results again; by default it is put together from them.
+        Command that repeats the results. Default: it is derived from them.
     progress : callable, optional
         Called with (done, total, note=...).
     workers : int
@@ -101,7 +101,7 @@ def build(
     Returns
     -------
     Path
-        Of ``index.html``.
+        Path of ``index.html``.
 
     Raises
     ------

@@ -29,7 +29,7 @@ class SweepFile:
     Attributes
     ----------
     path : Path
-        Of the file.
+        Path of the file.
     content : dict
         As from `Sweep.to_dict`.
     """

@@ -46,7 +46,7 @@ class Carried:
     Attributes
     ----------
     folder : str
-        Of the results.
+        Folder of the results.
     rows, results : int
         Pairs of a scenario and an estimator that were carried over, and their results.
     repeated : int

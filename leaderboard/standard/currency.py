@@ -85,7 +85,7 @@ def outdated(folder: str | os.PathLike[str], without: Collection[tuple[str, str]
     Parameters
     ----------
     folder : path
-        Of the results.
+        Folder of the results.
     without : collection of (str, str)
         Scenarios and estimators whose results do not matter.
 

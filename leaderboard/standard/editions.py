@@ -26,9 +26,9 @@ class EditionPage:
     Attributes
     ----------
     number : int
-        From 1.
+        Number of the edition, from 1.
     lines : sequence of Line
-        Of the edition.
+        Lines of the edition.
     latest : bool
         Whether no edition is newer.
     """

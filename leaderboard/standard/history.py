@@ -32,7 +32,7 @@ class Line:
     Attributes
     ----------
     edition : int
-        From 1.
+        Number of the edition, from 1.
     date : str
         Day of the latest run, as ``2026-11-22``.
     benchmark, commit : str

@@ -36,7 +36,7 @@ class Published:
     Attributes
     ----------
     folder : Path
-        Of the packed results.
+        Folder of the packed results.
     edition : int
         Number of the edition; 0 for a preliminary result, which is none.
     results : sequence of Result
@@ -44,9 +44,9 @@ class Published:
     ranking : Ranking
         The board that follows from them.
     size : int
-        Of the files in the folder [bytes].
+        Size of the files in the folder [bytes].
     readme : Path or None
-        That was brought up to date.
+        README that was updated.
     remarks : tuple of str
         What readers should know: results that were left out, or that others cannot repeat.
     """

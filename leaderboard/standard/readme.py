@@ -34,7 +34,7 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     ranking : Ranking
         The board.
     results : sequence of Result
-        That it is made from.
+        Results from which the ranking is made.
     of : int, optional
         How many results there should be: with fewer, the tables are called preliminary.
     """

@@ -43,7 +43,7 @@ class File(_Part):
     Attributes
     ----------
     sha256 : str
-        Hexadecimal.
+        SHA-256 digest of the file, hexadecimal.
     size : int
         Length of the file [bytes].
     """
@@ -62,7 +62,7 @@ class Row(_Part):
     point : str
         Entry point of the package that registers it; empty for a file.
     parameters : mapping
-        That were set.
+        Parameters that were set.
     """
 
     label: str = Field(min_length=1, max_length=200)
@@ -117,13 +117,13 @@ class Bundle:
     Attributes
     ----------
     path : Path
-        Of the ZIP file.
+        Path of the ZIP file.
     digest : str
         SHA-256 of the ZIP file.
     contents : Contents
-        What it says of itself.
+        Contents that the bundle declares.
     folder : Path
-        Where it is unpacked.
+        Folder where it is unpacked.
     """
 
     path: Path
@@ -184,7 +184,7 @@ def write_bundle(
     Parameters
     ----------
     path : Path
-        Of the new file.
+        Path of the new file.
     title, benchmark, profile, runs, main, estimators, requires
         As in `Contents`.
     source : mapping of str to Path

@@ -26,9 +26,9 @@ def clean_python(folder: Path, versions: Mapping[str, str]) -> Path:
     Parameters
     ----------
     folder : Path
-        Of the environment; it should not be there.
+        Folder of the environment; it should not exist yet.
     versions : mapping of str to str
-        Of numpy, numba and gtsam that the results were made with; empty ones are not pinned.
+        Versions of numpy, numba and gtsam that the results were made with; empty versions are not pinned.
 
     Raises
     ------

@@ -54,20 +54,20 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Asked:
-    """What is to be repeated.
+    """A request to repeat runs.
 
     Attributes
     ----------
     folder : str
-        For results; a new one.
+        New folder for the results.
     estimators : list of EstimatorRequest
         The estimators that are run.
     runs : list of Wanted
-        Their runs.
+        Runs of these estimators.
     key : str
-        Of sealed seeds, in hexadecimal.
+        Key of the sealed seeds, in hexadecimal.
     confinement : str
-        As of `simnav.leaderboard.interface.campaign`.
+        As in `simnav.leaderboard.interface.campaign`.
     """
 
     folder: str
@@ -77,13 +77,13 @@ class Asked:
     confinement: str = "auto"
 
     def text(self) -> str:
-        """As one line."""
+        """Write the request as one line of JSON."""
         rows = [{**vars(e), "cls": None} for e in self.estimators]
         return json.dumps({**vars(self), "estimators": rows, "runs": [asdict(w) for w in self.runs]})
 
     @classmethod
     def read(cls, text: str) -> Asked:
-        """From what `text` gave."""
+        """Read a request that `text` wrote."""
         facts: dict[str, Any] = json.loads(text)
         rows = [EstimatorRequest(**{**row, "search": tuple(row["search"])}) for row in facts.pop("estimators")]
         return cls(estimators=rows, runs=[Wanted(**w) for w in facts.pop("runs")], **facts)
@@ -96,13 +96,13 @@ class Again:
     Attributes
     ----------
     scenario, label, seed, sealed
-        Which one.
+        Scenario, estimator, seed and seal of the repeated run.
     status, reason : str
         As in `simnav.leaderboard.results.result.Result`; ``not-run`` where it could not be tried.
     key, recording : str
-        Likewise.
+        As in `simnav.leaderboard.results.result.Result`.
     scores : mapping of str to float
-        All their bits travel, and NaN.
+        All bits of each score, and NaN, are kept in JSON.
     """
 
     scenario: str

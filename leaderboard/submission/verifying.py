@@ -82,11 +82,11 @@ class SubmissionReport:
     estimators : tuple of str
         Labels.
     profile : str
-        That was run.
+        Profile that was run.
     results : int
-        In the bundle.
+        Number of results in the bundle.
     findings : tuple of str
-        What is not as it should be, apart from runs that were repeated.
+        Problems of the bundle, apart from those of repeated runs.
     environment : str
         In which the runs were repeated.
     repeated, identical, close : int
@@ -99,7 +99,7 @@ class SubmissionReport:
         Scores of the results that are not known where the runs were repeated, because a plug-in registers them. They
         were not looked at.
     sealed : tuple of SealedRuns
-        By estimator and scenario; empty without a key.
+        Sealed runs by estimator and scenario; empty without a key.
     """
 
     path: str

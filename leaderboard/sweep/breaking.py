@@ -88,9 +88,9 @@ def breaking_point(
     dial : sequence of float
         Values, ascending.
     errors : (runs, n) array
-        Of each seed at each value; infinite where a run failed.
+        Error of each seed at each value; infinite where a run failed.
     limit : float, optional
-        Of the error; without one, twice the median error at the clean value.
+        Limit of the error. Default: twice the median error at the clean value.
     clean : int
         Number of the clean value; the search goes up from it.
     at : float, optional

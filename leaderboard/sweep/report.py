@@ -37,7 +37,7 @@ class SweepPoint:
     estimator : str
         Label of the estimator.
     values : tuple of float
-        Of the dials, in their units.
+        Values of the dials, in their units.
     error : Interval
         Median over the runs, of which a failed one counts as infinite.
     runs, failed : int
@@ -60,9 +60,9 @@ class Sweep:
     scenario : str
         Versioned id of the scenario whose dials were turned.
     dials : tuple of Dial
-        What was turned, one or two.
+        Dials that were varied, one or two.
     values : tuple of tuple of float
-        Of each dial, ascending.
+        Values of each dial, ascending.
     estimators : tuple of str
         Labels of the estimators.
     score : str
@@ -74,7 +74,7 @@ class Sweep:
     settings : tuple of Setting
         Values of the dials, with the scenario that each setting gives.
     summary : Summary
-        Of the campaign.
+        Summary of the campaign.
     """
 
     scenario: str

@@ -33,7 +33,7 @@ class Setting:
     values : tuple of float
         One a dial, in the units of the dials.
     scenario : Scenario
-        With a name of its own.
+        Scenario with these values, under its own name.
     """
 
     values: tuple[float, ...]

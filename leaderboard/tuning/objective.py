@@ -52,7 +52,7 @@ class Figures:
     Attributes
     ----------
     objective : float
-        What the search minimises.
+        Value that the search minimises.
     ratio : mapping of str to float
         Geometric mean of the error ratios, by family.
     lost : float

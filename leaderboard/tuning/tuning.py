@@ -75,7 +75,7 @@ class Tuning:
     evaluations : tuple of Evaluation
         In the order of the search.
     commit, day : str
-        Of the code; of the search.
+        Commit of the code, and day of the search.
     """
 
     estimator: str
@@ -177,17 +177,17 @@ def search(
     Parameters
     ----------
     objective : callable
-        Of the parameters by name.
+        Function of the parameters, by name, to minimise.
     space : sequence of Range
         Parameters, with their bounds.
     present : mapping of str to number
-        Where the search begins; it is evaluated first.
+        Start of the search; it is evaluated first.
     evaluations : int
         Most calls of ``objective``; the same parameters are not evaluated twice.
     method : str
         Method of SciPy.
     seed : int
-        Of the search's own random numbers.
+        Seed of the random numbers of the search.
     progress : callable, optional
         Called with how many of how many evaluations are done, and ``note=`` the best so far.
 

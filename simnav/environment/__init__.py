@@ -1,8 +1,8 @@
 """The Gymnasium environment: the agent is the navigator.
 
-`NavigationEnv` (``navigation.py``) is an adapter over the same sources of data that every campaign uses,
-`NavigationVectorEnv` (``vector.py``) several of them side by side, and `EstimatorAgent` (``agent.py``) the bridge the
-other way, from an estimator to an agent. ``wrappers.py`` holds relative actions and observations of order one,
+`NavigationEnv` (``navigation.py``) is an adapter over the same sources of data that every campaign uses.
+`NavigationVectorEnv` (``vector.py``) runs several of them together, and `EstimatorAgent` (``agent.py``) makes an agent
+of an estimator. ``wrappers.py`` holds relative actions and observations of order one,
 ``seeds.py`` the seeds of training, and ``rendering.py`` draws the chart of a run. Tasks around a running filter are in
 `simnav.estimators.learning`.
 """

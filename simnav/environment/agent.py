@@ -1,4 +1,4 @@
-"""An estimator as an agent: the bridge from observations to measurements and from estimates to actions."""
+"""An estimator as an agent: observations are converted to measurements, and estimates to actions."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ __all__ = ["EstimatorAgent", "unpack"]
 
 
 def unpack(observation: Mapping[str, Any], instruments: Instruments) -> Measurements:
-    """The packet that an estimator is fed, from an observation.
+    """Convert an observation to the packet of measurements that an estimator receives.
 
     Parameters
     ----------
     observation : dict
         Observation of a `NavigationEnv`.
     instruments : Instruments
-        From the info of `NavigationEnv.reset`.
+        The datasheets, from the info of `NavigationEnv.reset`.
 
     Returns
     -------
     Measurements
-        The same numbers, in the same order, as `Recording.steps` gives.
+        The same numbers, in the same order, as in the packets of `Recording.steps`.
     """
     start, time = observation["interval"].tolist()
     imu = None
@@ -45,19 +45,20 @@ def unpack(observation: Mapping[str, Any], instruments: Instruments) -> Measurem
 
 
 class EstimatorAgent:
-    """An estimator as the agent of a `NavigationEnv`: it gives the numbers that it gives outside.
+    """An estimator as the agent of a `NavigationEnv`. It gives the same numbers as in a trial.
 
     Parameters
     ----------
     estimator : Estimator
-        Not one that is told the truth (``reference``): the environment does not tell it.
+        The estimator. A reference that needs the truth (``reference``) is refused.
     observation_space : gymnasium.spaces.Dict, optional
-        That of the `NavigationEnv`: then flat observations (Gymnasium's ``FlattenObservation``) are taken, too.
+        Observation space of the `NavigationEnv`. It is needed for flat observations (Gymnasium's
+        ``FlattenObservation``).
 
     Attributes
     ----------
     estimate : Estimate or None
-        The last one, with its covariance and diagnostics, which the action does not carry.
+        The last estimate, with its covariance and diagnostics, which are not part of the action.
 
     Raises
     ------
@@ -75,7 +76,7 @@ class EstimatorAgent:
         self.estimate: Estimate | None = None
 
     def reset(self, info: Mapping[str, Any]) -> None:
-        """Begin a run, with the info of the environment's reset."""
+        """Start a run, with the info of the environment's reset."""
         start: InitialState = info["start"]
         self._instruments: Instruments = info["instruments"]
         self._start = np.stack([start.position, start.velocity, start.attitude])
@@ -83,16 +84,17 @@ class EstimatorAgent:
         self.estimator.reset(start, self._instruments)
 
     def act(self, observation: Mapping[str, Any] | Array) -> Array:
-        """The action: the estimate, with the initial state in place of what is not estimated.
+        """The action: the estimate, with the initial state for components that are not estimated.
 
         Parameters
         ----------
         observation : dict or array
-            What the environment gave for the step.
+            Observation of the step.
 
         Returns
         -------
         (3, 3) array
+            Position, velocity and attitude, see `NavigationEnv`.
 
         Raises
         ------

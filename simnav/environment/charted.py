@@ -1,4 +1,4 @@
-"""What all environments share that draw the chart of a run."""
+"""The common part of all environments that draw the chart of a run."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ChartedEnv(gymnasium.Env[ObservationType, ActionType]):
         self._chart: Chart | None = None
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The chart so far: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window is up to date."""
+        """The present chart: an (h, w, 3) array in mode ``rgb_array``; in mode ``human`` the window shows it."""
         if self._chart is None:
             if self.render_mode is None:
                 gymnasium.logger.warn("render() shows nothing: make the environment with render_mode='rgb_array'")
@@ -48,17 +48,17 @@ class ChartedEnv(gymnasium.Env[ObservationType, ActionType]):
         return self._chart.frame() if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Close the window and forget the run."""
+        """Close the window and release the run."""
         if self._chart is not None:
             self._chart.close()
         self._chart = None
         self._forget()
 
     def _forget(self) -> None:
-        """Give up the run; a hook."""
+        """Release the run; subclasses may override it."""
 
     def _begin_chart(self, title: str, duration: float) -> None:
-        """An empty chart for a run of so many seconds, where there is to be one."""
+        """Make an empty chart for a run of ``duration`` seconds, if the environment has a render mode."""
         if self.render_mode is None:
             return
         if self._chart is None:
@@ -67,6 +67,6 @@ class ChartedEnv(gymnasium.Env[ObservationType, ActionType]):
         self._show()
 
     def _show(self) -> None:
-        """Bring the window up to date, where there is one."""
+        """Update the window, if there is one."""
         if self._chart is not None and self.render_mode == "human":
             self._chart.show()

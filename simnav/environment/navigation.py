@@ -1,8 +1,8 @@
 """The Gymnasium environment: the agent is the navigator.
 
-An observation is what the instruments delivered in one step, the action is the navigation estimate at its end, the
+An observation holds the measurements of one step, the action is the navigation estimate at the end of the step, and the
 reward is minus the error of that estimate. `NavigationEnv` is an adapter over the same sources of data that every
-campaign uses; `EstimatorAgent` is the bridge the other way, from an estimator to an agent.
+campaign uses; `EstimatorAgent` makes an agent of an estimator.
 
 One episode of n steps, from reset to truncation::
 
@@ -45,7 +45,7 @@ Observation = dict[str, Any]
 #: [m/s], angle of the attitude error [rad].
 REWARDS: tuple[str, ...] = ("horizontal", "vertical", "position", "velocity", "attitude")
 
-#: Bound of every observed quantity. Gymnasium asks for finite bounds; no instrument reaches this one.
+#: Bound of every observed quantity. Gymnasium requires finite bounds; no instrument reaches this value.
 _LIMIT = 1e9
 _ACTION_LIMIT = np.array([[np.pi / 2, np.pi, 1e5], [100.0, 100.0, 100.0], [np.pi, np.pi, 2 * np.pi]])
 
@@ -57,8 +57,8 @@ _FIRST_STRETCH, _LONGEST_STRETCH = 8, 256
 class NavigationEnv(ChartedEnv[Observation, Array]):
     """Navigate one scenario.
 
-    Observation (`gymnasium.spaces.Dict`, float64; all entries are zero where ``valid`` is 0, never NaN; K is the most
-    samples that one step can bring):
+    Observation (`gymnasium.spaces.Dict`, float64). Entries are zero if ``valid`` is 0, and never NaN. K is the largest
+    number of samples in one step:
 
     ========================= ============ ==========================================================
     entry                     shape
@@ -78,26 +78,26 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
     row 1 velocity north, east, down [m/s]; row 2 roll, pitch, yaw [rad]. Any finite estimate is taken; the bounds of
     the space are for sampling.
 
-    Reward: minus the error, by default the horizontal position error in metres; what the reference of a log lacks
-    counts nothing. ``terminated`` is never true; ``truncated`` is true with the last step of the run.
+    Reward: minus the error, by default the horizontal position error in metres. Quantities that the reference of a log
+    does not hold are left out. ``terminated`` is never true; ``truncated`` is true with the last step of the run.
 
     Info: `reset` gives ``seed`` (of the run: `simnav run --seed` repeats it), ``start`` (`InitialState`, with its
     errors and their covariance), ``instruments`` (`Instruments`, the datasheets) and ``note`` (of a log). With
-    ``reveal_truth`` every info holds ``truth``, the (3, 3) array that would be the perfect answer to the observation
-    beside it (NaN in what the reference of a log lacks).
+    ``reveal_truth`` every info holds ``truth``, the (3, 3) array of the true states at the end of the step of the
+    observation (NaN for quantities that the reference of a log does not hold).
 
     Parameters
     ----------
     scenario : Scenario, str or path
         A scenario, its name in the catalogue, or a TOML file.
     reward : str or mapping of str to float
-        One of `REWARDS`, or weights of several of them.
+        Error measure of the reward, one of `REWARDS`, or weights of several of them.
     reveal_truth : bool
-        Put the truth into ``info``.
+        True: ``info`` holds the truth.
     closed_loop : bool
-        The vessel steers by the estimate, position and heading: a wrong one puts it off its track. For its waypoints it
-        steers from where it believes to be, and in all other manoeuvres it keeps to the planned track. Simulated
-        scenarios only.
+        True: the vessel steers by the position and heading of the estimate, so a wrong estimate takes it off its track.
+        It steers for waypoints from the estimated position, and in all other manoeuvres it returns to the planned
+        track. It works with simulated scenarios only.
     render_mode : {"human", "rgb_array"}, optional
         Show the chart in a window, or return it as an array; default: no chart.
 
@@ -149,14 +149,14 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin a run.
+        """Start a run.
 
         Parameters
         ----------
         seed : int, optional
-            Seed of the run; without one, a fresh one is drawn from `np_random`.
+            Seed of the run; by default a seed is drawn from `np_random`.
         options : dict, optional
-            None is known; ignored.
+            There are no options; it is ignored.
 
         Returns
         -------
@@ -187,12 +187,12 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         return self._observation(), self._reveal(info)
 
     def step(self, action: Array) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Answer the last observation with an estimate; get its reward and the next observation.
+        """Give the estimate for the last observation; return its reward and the next observation.
 
         Parameters
         ----------
         action : (3, 3) array
-            Position, velocity, attitude: see the class.
+            Estimated position, velocity and attitude, see the class.
 
         Raises
         ------
@@ -227,7 +227,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
     # ------------------------------------------------------------------------------------------- the run
 
     def _load(self) -> bool:
-        """Advance the source by a stretch of steps; False where the run is over."""
+        """Advance the source by several steps; return False if the run is over."""
         source = self._source
         if self._runs is not None:
             return self._advance(self._runs)
@@ -244,7 +244,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
                 return True
 
     def _advance(self, runs: SteppedRuns) -> bool:
-        """Advance a run in closed loop by a step; False where it is over."""
+        """Advance a run in closed loop by one step; return False if it is over."""
         if self._steps >= int(self._source.duration / self._source.step + 1e-6):
             return False
         self._steps += 1
@@ -272,7 +272,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         return observation
 
     def _nothing(self, name: str) -> dict[str, NDArray[Any]]:
-        """The part of an observation in which an instrument delivers nothing."""
+        """The part of an observation for an instrument without measurements."""
         space = self.observation_space[name]  # type: ignore[index]
         return {key: np.zeros(s.shape, s.dtype) for key, s in space.items()}
 
@@ -282,7 +282,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         return info
 
     def _error(self, estimate: list[float], north: float, east: float, row: list[float]) -> float:
-        """The weighted error; what the reference of a log lacks counts nothing."""
+        """The weighted error, without quantities that the reference of a log does not hold."""
         if self._weights is None:
             error = math.hypot(north, east)
             return error if error == error else 0.0
@@ -331,7 +331,7 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
 
 
 def most_samples(scenario: Scenario) -> dict[str, int]:
-    """Per instrument (and ``imu``) the most samples that one step can bring."""
+    """The largest number of samples in one step, for each instrument and for ``imu``."""
     instruments, step = scenario.instruments_sheet(), scenario.step
     rates = {name: sheet.rate for name, sheet in instruments.items()}
     if clash := {"imu", "interval"} & set(rates):
@@ -365,7 +365,7 @@ def checked_action(action: Any) -> list[float]:
     Raises
     ------
     ValueError
-        If it has another shape than (3, 3) or is not finite.
+        If the action does not have the shape (3, 3) or is not finite.
     """
     try:
         array = np.asarray(action, dtype=np.float64)

@@ -1,7 +1,7 @@
-"""The chart of a run as it goes: truth, fixes and estimate in the plane; below, the error over time and a close-up.
+"""The chart of a running episode: truth, fixes and estimate in the plane; below, the error over time and a close-up.
 
-For people, so the truth is in it. Memory is bounded: when a trace is full, every second point goes. Matplotlib is
-imported with this module's first `Chart` and not before.
+The chart is for people, so it shows the truth. Memory is bounded: when a trace is full, every second point is removed.
+Matplotlib is imported by the first `Chart`.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ _TRUTH, _ESTIMATE, _FIX, _FAULT = "#33414e", "#d1495b", "#6aa9d8", "#edae49"
 
 
 class Trace:
-    """A series of points in bounded memory: when it is full, every second point goes.
+    """A series of points in bounded memory: when it is full, every second point is removed.
 
     Parameters
     ----------
     width : int
-        Numbers per point.
+        Number of values of a point.
     capacity : int
-        Most points that are kept; even.
+        Largest number of points, an even number.
     largest : int, optional
-        A column of which the largest value between two kept points is kept, so that no peak is lost.
+        Index of a column in which the largest value between two kept points is kept, so that no peak is lost.
     """
 
     def __init__(self, width: int, capacity: int = 2048, largest: int | None = None):
@@ -54,7 +54,7 @@ class Trace:
 
     @property
     def points(self) -> Array:
-        """(n, width) array: what is kept."""
+        """(n, width) array of the kept points."""
         return self._data[: self._n]
 
     def add(self, *point: float) -> None:
@@ -77,7 +77,7 @@ class Trace:
         self._skipped = self._stride - 1
 
     def clear(self) -> None:
-        """Forget all points."""
+        """Remove all points."""
         self._n, self._stride, self._skipped = 0, 1, 0
 
 
@@ -119,7 +119,7 @@ class Chart:
         self.clear()
 
     def clear(self) -> None:
-        """Begin a new run."""
+        """Start a new run."""
         for trace in (self._truth, self._estimate, self._fixes, self._faults, self._error):
             trace.clear()
         for recent in self._recent:
@@ -136,22 +136,22 @@ class Chart:
         position : (k, 2) array
             Latitude and longitude [rad].
         faulty : (k,) bool array
-            Which of them a fault has touched.
+            True for each fix that a fault affected.
         """
         if len(position) and not self._silent:
             self._pending.append((position, faulty))
 
     def add(self, time: float, truth: Array, estimate: Array, *, covariance: Array | None = None) -> None:
-        """Add the end of a step; nothing where a log has no reference.
+        """Add the states at the end of a step. Nothing is added if a log has no reference there.
 
         Parameters
         ----------
         time : float
             End of the step [s].
         truth, estimate : (3,) array
-            Geodetic [rad, rad, m].
+            True and estimated geodetic position [rad, rad, m].
         covariance : (2, 2) array, optional
-            Of the estimate, north and east [m^2]: drawn as the ellipse that should hold the truth in 95 of 100 cases.
+            Covariance of the estimate, north and east [m^2]. It is drawn as the ellipse with a probability of 95 %.
         """
         if self._silent:
             return
@@ -188,7 +188,7 @@ class Chart:
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def show(self) -> None:
-        """Bring the window up to date; nothing where there is no display."""
+        """Update the window. Without a display it does nothing."""
         if self._silent:
             return
         self._update()
@@ -253,7 +253,7 @@ class Chart:
             artist.set_animated(self._window is None)
 
     def _update(self) -> bool:
-        """Hand the traces to the artists; True where the axes changed."""
+        """Set the data of the artists from the traces; return True if the limits of the axes changed."""
         truth, estimate, error = self._truth.points, self._estimate.points, self._error.points
         changed = self._limits(truth, estimate)
         changed |= self._error_limits(float(error[:, 1].max()) if len(error) else 0.0)
@@ -280,7 +280,7 @@ class Chart:
         return changed
 
     def _limits(self, truth: Array, estimate: Array) -> bool:
-        """Frame the truth; the estimate and the fixes too, as long as the truth stays readable."""
+        """Set the limits of the axes to the truth, and to estimate and fixes as long as the truth is readable."""
         low, high = (truth.min(axis=0), truth.max(axis=0)) if len(truth) else (np.zeros(2), np.zeros(2))
         bound_low, bound_high = low, high
         span = max(float((high - low).max()), 50.0)
@@ -291,7 +291,7 @@ class Chart:
         if self._view is not None and (low >= self._view[0]).all() and (high <= self._view[1]).all():
             return False
         box = self._chart.bbox
-        half = np.maximum((high - low) / 2 * 1.3, span / 4)  # room to grow, so that the picture stands still
+        half = np.maximum((high - low) / 2 * 1.3, span / 4)  # a margin, so that the limits change rarely
         half = max(half[0] / box.width, half[1] / box.height) * np.array([box.width, box.height])  # equal scales
         middle = (low + high) / 2
         self._view = middle - half, middle + half
@@ -320,7 +320,7 @@ class Chart:
 
 
 def _track(axes: Any) -> list[Any]:
-    """Empty artists: truth, estimate, fixes, faulty fixes, vessel, where it believes to be."""
+    """Empty artists: truth, estimate, fixes, faulty fixes, true position, estimated position."""
     dot = {"linestyle": "none", "marker": "o", "markeredgewidth": 0}
     styles: Iterable[dict[str, Any]] = (
         {"color": _TRUTH, "linewidth": 1.6, "label": "truth"},
@@ -353,7 +353,7 @@ def _clock(time: float) -> str:
 
 
 def _open_window() -> Any:
-    """A figure in a window, or None where there is no display (said once, in one sentence)."""
+    """A figure in a window, or None without a display; a warning says so once."""
     try:
         import matplotlib.pyplot as plt
 

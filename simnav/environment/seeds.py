@@ -1,7 +1,7 @@
-"""Seeds of training and of scoring: two ranges that never meet.
+"""Seeds of training and of scoring: two ranges without a common seed.
 
-A learning agent sees training voyages only. Their seeds begin at `FIRST_TRAINING_SEED`; whatever is scored (campaigns,
-leaderboards, tables) has a seed below it. So nothing that was learned from can be scored by mistake.
+A learning agent is trained on training voyages only. Their seeds begin at `FIRST_TRAINING_SEED`. Scored runs
+(campaigns, leaderboards, tables) have smaller seeds. So no training voyage can be scored by mistake.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def training_seed(number: int) -> int:
     Parameters
     ----------
     number : int
-        0, 1, 2, ...
+        Number of the voyage: 0, 1, 2, ...
 
     Raises
     ------
@@ -33,17 +33,17 @@ def training_seed(number: int) -> int:
 
 
 def is_training(seed: int) -> bool:
-    """Whether a seed is one of a training voyage."""
+    """Whether a seed is that of a training voyage."""
     return seed >= FIRST_TRAINING_SEED
 
 
 def require_disjoint(training: Iterable[int], scoring: Iterable[int]) -> None:
-    """Refuse to score on what was learned from.
+    """Check that training and scoring have no seed in common.
 
     Raises
     ------
     ValueError
-        If a seed is in both, a training seed is none, or a scoring seed is one of training.
+        If a seed is in both, a training seed is below `FIRST_TRAINING_SEED`, or a scoring seed is not below it.
     """
     trained, scored = set(training), set(scoring)
     if both := sorted(trained & scored):

@@ -1,4 +1,4 @@
-"""What an episode hands out: steps of a run as padded arrays, from a block or made step by step."""
+"""The observations of an episode: steps of a run as padded arrays, from a block or simulated step by step."""
 
 from __future__ import annotations
 
@@ -25,23 +25,22 @@ _ON = np.ones(1, np.bool_)
 
 @dataclass(eq=False)
 class Stretch:
-    """S steps of a run as padded arrays, ready to be handed out row by row.
+    """S steps of a run as padded arrays; each row is one observation.
 
     Attributes
     ----------
     intervals : (S, 2) array
-        Begin and end of each step [s].
+        Beginning and end of each step [s].
     columns : dict of str to dict of str to (S, K, ...) array
-        The entries of each instrument.
+        The entries of the observations, by instrument and name.
     truth : (S, 3, 3) array
-        Rows position, velocity, attitude.
+        True position, velocity and attitude at the end of each step (rows of each matrix).
     rows : list of list of float
-        Of each step that was made: latitude, longitude, height, metres per radian of latitude and of longitude,
-        heading.
+        For each step: true latitude, longitude and height, metres per radian of latitude and of longitude, and heading.
     aids : dict of str to AidStream
-        The streams that the steps were cut from.
+        The streams of all measurements of the steps.
     cuts : dict of str to (S + 1,) int array
-        Bounds of each step's measurements in them.
+        Index limits of each step's measurements in the streams.
     """
 
     intervals: Array
@@ -52,7 +51,7 @@ class Stretch:
     cuts: dict[str, NDArray[np.intp]]
 
     def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
-        """The positions that were delivered in a step, and which of them a fault has touched."""
+        """The position fixes of a step, and a mask of those that a fault affected."""
         for name, stream in self.aids.items():
             if _draws(stream.kind):
                 cut = slice(*self.cuts[name][i : i + 2])
@@ -72,19 +71,20 @@ def _place(
     delivered: tuple[int, Integers, Array, Array], place: Integers, most: Integers, row: int, time: Array,
     valid: NDArray[np.int8], values: Array,
 ) -> int:  # fmt: skip
-    """Put the measurements of one step into a row of padded arrays; -1, or the instrument that has too many.
+    """Put the measurements of one step into a row of padded arrays.
+
+    Return -1, or the number of the first instrument with too many measurements.
 
     Parameters
     ----------
     delivered : tuple
-        Count, who, when and value of `simnav.simulation.steps.SteppedRuns`, of one run.
+        ``count``, ``who``, ``when`` and ``value`` of `simnav.simulation.steps.SteppedRuns`, of one run.
     place, most : (i,) int arrays
-        Of each of its instruments: its number in the padded arrays, and room for so many a step.
+        For each of i instruments: its number in the padded arrays, and its largest number of measurements in a step.
     row : int
         Number of the step.
     time, valid, values : (S, A, K), (S, A, K), (S, A, K, 3) arrays
-        Of S steps, A instruments and at most K measurements: times [s], which are there, and values;
-        overwritten.
+        Times [s], validity (0 or 1) and values of at most K measurements of A instruments in S steps; overwritten.
     """
     count, who, when, value = delivered
     for j in range(count):
@@ -102,7 +102,7 @@ def _place(
 
 
 class LiveStretch(Stretch):
-    """A stretch that is filled as the run goes on, for a vessel that is steered."""
+    """A stretch whose steps are simulated one by one, for a vessel in closed loop."""
 
     #: Most steps.
     LENGTH = 64
@@ -130,12 +130,12 @@ class LiveStretch(Stretch):
         self._most = np.array([most[name] for name in own], np.int64)
 
     def advance(self) -> None:
-        """Make the next step.
+        """Simulate the next step.
 
         Raises
         ------
         ValueError
-            If an instrument delivers more than its datasheet says.
+            If an instrument delivers more samples than the rate of its datasheet allows.
         """
         runs, i = self._runs, len(self.rows)
         runs.advance(_ON)
@@ -156,7 +156,7 @@ class LiveStretch(Stretch):
             )
 
     def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
-        """See `Stretch.fixes`; of the last step that was made."""
+        """See `Stretch.fixes`. It works for the last simulated step only."""
         runs = self._runs
         for j, who in enumerate(runs.who[0, : runs.count[0]].tolist()):
             if _draws(runs.kinds[0][who]):
@@ -221,7 +221,7 @@ def _rows(position: Array, attitude: Array, out: Array) -> None:
 
 
 def rows_of(position: Array, attitude: Array) -> list[list[float]]:
-    """Per state: latitude, longitude, height, metres per radian of latitude and of longitude, and heading."""
+    """For each state: latitude, longitude, height, metres per radian of latitude and of longitude, and heading."""
     out = np.empty((len(position), 6))
     _rows(position, attitude, out)
     rows: list[list[float]] = out.tolist()

@@ -1,9 +1,9 @@
-"""The vector form of the environment: several independent runs of one scenario side by side.
+"""The vector form of the environment: several independent runs of one scenario together.
 
-It behaves like Gymnasium's own vector environments: an integer seed is ``seed + i`` for sub-environment i, and a run
-that is over begins anew with the next step. Neighbouring base seeds then share most of their runs: who compares runs of
-different base seeds asks for ``independent_seeds``. Who follows n episodes to their ends takes
-`AutoresetMode.DISABLED`: episodes that are assigned beforehand do not favour those that end first.
+It behaves like Gymnasium's own vector environments: an integer seed is ``seed + i`` for sub-environment i, and a
+finished run restarts with the next step. Neighbouring base seeds then share most of their runs. To compare runs of
+different base seeds, use ``independent_seeds``. To run n episodes to their ends, use `AutoresetMode.DISABLED`: if
+episodes are assigned beforehand, short ones are not over-represented.
 """
 
 from __future__ import annotations
@@ -40,14 +40,15 @@ def spawn_seeds(seed: int, n: int) -> list[int]:
     Returns
     -------
     list of int
-        Below 2**63; those of different base seeds do not overlap but by chance, and the first m of n are those of m.
+        Seeds below 2**63. Seeds of different base seeds are equal only by chance. The first m of n seeds are those of
+        ``spawn_seeds(seed, m)``.
     """
     children = np.random.SeedSequence(seed).spawn(n)
     return [int(child.generate_state(1, np.uint64)[0] >> np.uint64(1)) for child in children]
 
 
 def autoreset_of(mode: AutoresetMode | str) -> AutoresetMode:
-    """A mode by itself, its name or its value; ValueError where it is none."""
+    """The autoreset mode from a mode, its name or its value; ValueError for anything else."""
     for each in AutoresetMode:
         if mode in (each, each.name, each.value):
             return each
@@ -60,16 +61,17 @@ def seeds_of(seed: int | Sequence[int | None] | None, n: int, independent: bool)
     Parameters
     ----------
     seed : int or sequence of int, optional
-        One integer is ``seed + i`` for run i, or spawns; a sequence assigns them; None in it, or none at all: None.
+        An integer gives ``seed + i`` for run i, or independent seeds; a sequence has one seed for each run. None, also
+        as an element: the run draws a seed of its own.
     n : int
         Number of runs.
     independent : bool
-        Whether an integer spawns (`spawn_seeds`).
+        True: an integer gives independent seeds (`spawn_seeds`).
 
     Raises
     ------
     ValueError
-        If there are too few or too many.
+        If a sequence does not have n elements.
     """
     if isinstance(seed, (int, np.integer)):
         return list(spawn_seeds(int(seed), n)) if independent else [int(seed) + i for i in range(n)]
@@ -80,7 +82,7 @@ def seeds_of(seed: int | Sequence[int | None] | None, n: int, independent: bool)
 
 
 def reset_mask(options: dict[str, Any] | None, n: int) -> NDArray[np.bool_]:
-    """The runs to begin anew, from the options of a reset: all by default.
+    """The mask of the runs to restart, from the options of a reset; by default all.
 
     Raises
     ------
@@ -107,14 +109,14 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
     num_envs : int
         Number n of runs.
     autoreset_mode : AutoresetMode or str
-        ``NEXT_STEP`` (as of Gymnasium: the step after the last one begins a new run, and its action is not read),
-        ``SAME_STEP`` (the last step returns the new run's observation, and its own in ``final_obs``), or ``DISABLED``
-        (a run that is over stands still, with an empty observation, reward 0 and truncated, until
-        ``reset(options={"reset_mask": mask})`` begins it anew).
+        ``NEXT_STEP`` (as in Gymnasium: the step after the last one starts a new run, and its action is not read),
+        ``SAME_STEP`` (the last step returns the observation of the new run, and the last one in ``final_obs``), or
+        ``DISABLED`` (a finished run has empty observations, reward 0 and truncated, until
+        ``reset(options={"reset_mask": mask})`` restarts it).
     independent_seeds : bool
-        What an integer seed becomes: False: ``seed + i`` for run i, as in Gymnasium; True: `spawn_seeds`.
+        Meaning of an integer seed. False: run i has ``seed + i``, as in Gymnasium; True: the seeds of `spawn_seeds`.
     **options
-        As for `NavigationEnv`.
+        Further arguments of `NavigationEnv`.
     """
 
     def __init__(
@@ -147,27 +149,27 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin the runs.
+        """Start the runs.
 
         Parameters
         ----------
         seed : int or sequence of int, optional
-            One integer is ``seed + i`` for run i, or spawns independent seeds (see the class); a sequence assigns them;
-            None in it or none at all: each run draws one of its own.
+            An integer gives ``seed + i`` for run i, or independent seeds (see the class); a sequence has one seed for
+            each run. None, also as an element: the run draws a seed of its own.
         options : dict, optional
-            ``reset_mask``: (n,) bool array, the runs to begin anew; the others go on.
+            ``reset_mask``: (n,) bool array of the runs to restart; the other runs continue.
 
         Returns
         -------
         observation : dict
-            As that of `NavigationEnv`, with a first axis of n.
+            Observation of `NavigationEnv` with a first axis of n.
         info : dict
-            As that of `NavigationEnv`, an array of n for each key; zero, or None, for runs that go on.
+            Info of `NavigationEnv` with an array of n elements for each key; zero or None for runs that continue.
 
         Raises
         ------
         ValueError
-            If seeds or mask do not fit.
+            If the number of seeds or the shape of the mask is wrong.
         """
         seeds = seeds_of(seed, self.num_envs, self._independent)
         mask = reset_mask(options, self.num_envs)
@@ -182,17 +184,17 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         return self._batch(), infos
 
     def step(self, actions: Array) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Answer the last observations.
+        """Give the estimates for the last observations; return the rewards and the next observations.
 
         Parameters
         ----------
         actions : (n, 3, 3) array
-            That of a run which is over is not read.
+            Estimate of each run. The action of a finished run is not read.
 
         Raises
         ------
         ValueError
-            If the actions have another shape, or one that is read is not finite; no run is stepped then.
+            If the shape is wrong, or an action that is read is not finite. Then no run is advanced.
         gymnasium.error.ResetNeeded
             If all runs are over.
         """
@@ -246,5 +248,5 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
 
 
 def _stacked(arrays: list[NDArray[Any]]) -> NDArray[Any]:
-    """As `numpy.stack`, in a fifth of the time, which for small arrays is all of the step's."""
+    """Stack arrays like `numpy.stack`, in a fifth of its time, which dominates the step for small arrays."""
     return np.concatenate(arrays).reshape(len(arrays), *arrays[0].shape)

@@ -1,6 +1,6 @@
 """Wrappers of `NavigationEnv` for learning agents: actions relative to the last estimate, observations of order one.
 
-For windows over the last observations take Gymnasium's own ``FrameStackObservation``.
+For windows over the last observations use Gymnasium's ``FrameStackObservation``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from simnav.types import KINDS, Array, InitialState, Instruments
 
 __all__ = ["NormaliseObservation", "RelativeAction"]
 
-#: What a number of 1 stands for in a relative action: position [m], velocity [m/s], attitude [rad].
+#: Units of a relative action: position [m], velocity [m/s], attitude [rad].
 STEPS = np.array([[100.0] * 3, [10.0] * 3, [1.0] * 3])
 #: Units of a normalised observation: distance [m], speed [m/s], angular rate [rad/s], specific force [m/s^2].
 DISTANCE, SPEED, RATE, FORCE = 1000.0, 10.0, 0.1, 9.81
@@ -28,15 +28,15 @@ LIMIT = 100.0
 
 
 class RelativeAction(gymnasium.Wrapper[Any, NDArray[Any], Observation, Array]):
-    """Actions as steps from the last estimate, the start at first: (9,) float32 numbers in [-1, 1], clipped.
+    """Actions as differences from the last estimate, at first from the initial state.
 
-    North, east, down in units of 100 m; velocity north, east, down in units of 10 m/s; roll, pitch, yaw in units of
-    1 rad. 0 says that nothing has changed.
+    An action is a (9,) float32 array of numbers in [-1, 1]; others are clipped: north, east, down in units of 100 m;
+    velocity north, east, down in units of 10 m/s; roll, pitch, yaw in units of 1 rad. Zero: nothing has changed.
 
     Parameters
     ----------
     env : gymnasium.Env
-        A `NavigationEnv`, or one around it with its actions.
+        A `NavigationEnv`, or a wrapper of it with the same actions.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]):
@@ -44,14 +44,14 @@ class RelativeAction(gymnasium.Wrapper[Any, NDArray[Any], Observation, Array]):
         self._action_space = spaces.Box(-1.0, 1.0, (9,), dtype=np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin a run; the last estimate is the start."""
+        """Start a run. The initial state is the first estimate."""
         observation, info = super().reset(seed=seed, options=options)
         start: InitialState = info["start"]
         self._estimate = np.stack([start.position, start.velocity, start.attitude])
         return observation, info
 
     def step(self, action: NDArray[Any]) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Answer with the last estimate, moved on.
+        """Give the last estimate plus the action as the new estimate.
 
         Raises
         ------
@@ -69,18 +69,18 @@ class RelativeAction(gymnasium.Wrapper[Any, NDArray[Any], Observation, Array]):
 
 
 class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Observation]):
-    """Observations as a `Dict` of one level, float32, of order one, with the start in it.
+    """Observations as a flat `Dict` of float32 arrays of order one, which also hold the initial state.
 
-    ``interval`` is (seconds since the start over 3600, length of the step); of each instrument there are
-    ``<name>.age`` (end of the step less time of validity [s]), ``<name>.valid`` and ``<name>.value``, of the IMU
-    ``imu.angular_rate`` and ``imu.specific_force``. Positions are north, east, down from the start over 1000 m, speeds
-    over 10 m/s, angular rates over 0.1 rad/s, specific forces over 9.81 m/s^2; depths over 1000 m; angles in rad.
-    ``start`` is velocity over 10 m/s, attitude [rad], and the nine sigmas in metres, m/s and rad.
+    ``interval`` is (time since the start divided by 3600 s, length of the step [s]). Each instrument has the entries
+    ``<name>.age`` (end of the step minus time of validity [s]), ``<name>.valid`` and ``<name>.value``; the IMU has
+    ``imu.angular_rate`` and ``imu.specific_force``. Positions are north, east, down from the start, divided by 1000 m;
+    depths are divided by 1000 m, speeds by 10 m/s, angular rates by 0.1 rad/s, specific forces by 9.81 m/s^2; angles
+    are in rad. ``start`` is the velocity divided by 10 m/s, the attitude [rad], and the nine sigmas in m, m/s and rad.
 
     Parameters
     ----------
     env : gymnasium.Env
-        A `NavigationEnv`, or one around it with its observations.
+        A `NavigationEnv`, or a wrapper of it with the same observations.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]):
@@ -98,7 +98,7 @@ class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Obse
         self._observation_space = spaces.Dict(entries)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin a run; keep its start."""
+        """Start a run, and store its initial state."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._start: InitialState = info["start"]
         self._instruments: Instruments = info["instruments"]

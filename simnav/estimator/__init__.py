@@ -1,10 +1,10 @@
-"""What an estimator is, and how it is registered, found and made.
+"""The contract of estimators, and their registration, search and construction.
 
-An estimator is a class with two methods, `Estimator.reset` and `Estimator.update`. It becomes known
-by the decorator `register`, through the entry-point group ``simnav.estimators`` of an installed
+An estimator is a class with two methods, `Estimator.reset` and `Estimator.update`. It is registered
+by the decorator `register`, found through the entry-point group ``simnav.estimators`` of an installed
 package, or by the path of its file (``my_filter.py`` or ``my_filter.py:MyFilter``).
 
-Entry points are loaded when a name is first asked for; one that fails is named in a warning.
+Entry points are loaded when a name is searched for the first time. If one of them fails, a warning names it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an estimator is: a class with two methods, `Estimator.reset` and `Estimator.update`."""
+"""The contract of estimators: a class with two methods, `Estimator.reset` and `Estimator.update`."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ class Estimator(ABC):
     """Base class of all estimators.
 
     The constructor takes the parameters, all with defaults, as keyword arguments; ``--set name=value``
-    on the command line sets them. One instance serves many runs, each begun by `reset`.
+    on the command line sets them. One instance can process many runs; `reset` starts each of them.
 
     Attributes
     ----------
     name : str
-        Set by `register`.
+        Name of the estimator; `register` sets it.
     reference : bool
-        True for rows that are told the truth (an oracle); they are marked and not ranked, and
+        True for rows that receive the truth (oracles). They are marked and not ranked, and
         `reveal` is called before `reset`.
     slow : bool
-        True for rows that take several milliseconds an epoch or more; a quick campaign leaves them out unless it is
-        asked for them.
+        True for rows that take several milliseconds an epoch or more. A quick campaign runs them only if they are
+        named.
     real_time_as : str
-        Name of the estimator whose real-time estimates this one gives, to the bit, and only smooths beside; empty for
-        all others. Boards then rank it by what it smooths.
+        Name of another estimator whose real-time estimates are the same bit for bit, if this one only adds smoothing;
+        otherwise empty. Boards then rank this estimator by its smoothed trajectory only.
     """
 
     name: ClassVar[str] = ""
@@ -44,55 +44,55 @@ class Estimator(ABC):
 
     @property
     def needs(self) -> Needs:
-        """The instruments without which it cannot work; a class may simply say ``needs = ("imu", "gnss_position")``.
+        """The instruments without which the estimator cannot work, e.g. ``needs = ("imu", "gnss_position")``.
 
         Each entry is a kind of instrument, ``"imu"``, ``"aid"`` (any instrument beside the IMU), or a tuple of these of
-        which one is enough. The harness gives it no scenario that lacks one of them. To refuse a scenario that has them
-        all is a failure. By default nothing is needed.
+        which one is enough. The estimator is not run on a scenario that lacks one of them. If it refuses a scenario
+        that has them all, the run is a failure. By default nothing is needed.
         """
         return ()
 
     @property
     def learned_from(self) -> Sequence[tuple[int, int]]:
-        """The runs that its parameters were learned from: pairs of a first and a last number.
+        """The runs from which the parameters were learned, as pairs of a first and a last number.
 
-        The numbers are those that the random streams of the runs start from, `simnav.scenario.Scenario.root` of their
+        The numbers are those from which the random streams of the runs start, `simnav.scenario.Scenario.root` of their
         seeds. A campaign refuses to score an estimator on a run in one of these ranges. By default there is none.
         """
         return ()
 
     @abstractmethod
     def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run.
+        """Start a run.
 
         Parameters
         ----------
         start : InitialState
-            A state with errors drawn from its covariance.
+            Initial state, with errors drawn from its covariance.
         instruments : Instruments
-            The datasheets, never the realised errors.
+            The datasheets. They do not contain the true errors.
 
         Raises
         ------
         UnsuitableScenario
-            If an instrument is lacking that `needs` names, where the estimator is used without the harness.
+            If an instrument that `needs` names is missing. simnav itself does not call `reset` in this case.
         """
 
     @abstractmethod
     def update(self, measurements: Measurements) -> Estimate:
-        """Take what the instruments delivered in one step; return the estimate at its end."""
+        """Process the measurements of one step; return the estimate at the end of the step."""
 
     def smooth(self) -> NavigationStates | None:
-        """After the last update: the whole trajectory, smoothed, at the ends of all steps; or None."""
+        """Return the smoothed trajectory at the ends of all steps, after the last update; None without smoothing."""
         return None
 
     def reveal(self, recording: Recording) -> None:  # noqa: B027 (a hook: most estimators are told nothing)
-        """Only for ``reference`` estimators: the recording with truth and labels, before `reset`."""
+        """Receive the recording with truth and labels, before `reset`. Only ``reference`` estimators get it."""
 
 
 class UnsuitableScenario(Exception):  # noqa: N818 (not an error of the estimator's)
-    """Raised by `Estimator.reset`: an instrument that `Estimator.needs` names is not there."""
+    """Raised by `Estimator.reset` if an instrument that `Estimator.needs` names is missing."""
 
 
 class EstimatorError(PluginError):
-    """An estimator that cannot be registered, found or made; the message is one sentence."""
+    """An estimator cannot be registered, found or constructed. The message is one sentence."""

@@ -1,4 +1,4 @@
-"""Estimators in files: ``my_filter.py``, or ``my_filter.py:MyFilter`` where there are several."""
+"""Estimators in files: ``my_filter.py``, or ``my_filter.py:MyFilter`` if the file has several."""
 
 from __future__ import annotations
 
@@ -53,6 +53,6 @@ def class_in_file(path: Path, wanted: str | None) -> type[Estimator]:
 
 
 def _load(path: Path) -> types.ModuleType:
-    """Import a file by its path; modules beside it can be imported, but hide nothing."""
+    """Import a file by its path. It can import modules of its folder, which do not replace installed modules."""
     discover()
     return import_file(path, error=EstimatorError, before=forget)

@@ -69,7 +69,7 @@ _TRUE, _FALSE, _NONE = ("true", "yes", "on", "1"), ("false", "no", "off", "0"), 
 
 
 def converted(value: Any, hint: Any, default: Any, what: str) -> Any:
-    """A parameter's value as its annotation, or else its default, asks for."""
+    """Convert a parameter's value to the type of its annotation, or else of its default."""
     if not isinstance(value, str):
         return value
     if hint is None or hint is Any:

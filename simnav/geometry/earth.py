@@ -92,7 +92,7 @@ def principal_radii(latitude: Array | float) -> tuple[Array, Array]:
     Parameters
     ----------
     latitude : array_like
-        Geodetic [rad].
+        Geodetic latitude [rad].
 
     Returns
     -------
@@ -115,7 +115,7 @@ def gravity(latitude: Array | float, height: Array | float = 0.0) -> Array:
     Returns
     -------
     array
-        [m/s^2] (Groves eqs. 2.134, 2.139; the small north component at height is left out).
+        Gravity [m/s^2] (Groves eqs. 2.134, 2.139; the small north component at height is neglected).
     """
     s2 = np.sin(latitude) ** 2
     surface = EQUATORIAL_GRAVITY * (1.0 + SOMIGLIANA * s2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
@@ -129,12 +129,12 @@ def earth_rate(latitude: Array | float) -> Array:
     Parameters
     ----------
     latitude : array_like
-        Geodetic [rad], shape (...).
+        Geodetic latitude [rad], shape (...).
 
     Returns
     -------
     (..., 3) array
-        [rad/s] (Groves eq. 2.123).
+        Earth rate, north, east, down [rad/s] (Groves eq. 2.123).
     """
     latitude = np.asarray(latitude)
     zero = np.zeros_like(latitude, dtype=np.float64)
@@ -149,11 +149,12 @@ def displace(position: Array, offset: Array) -> Array:
     position : (..., 3) array
         Latitude, longitude [rad], height [m].
     offset : (..., 3) array
-        North, east, down [m]; small against the Earth's radius.
+        North, east, down [m]; small compared with the Earth's radius.
 
     Returns
     -------
     (..., 3) array
+        The moved positions: latitude, longitude [rad], height [m].
     """
     position, offset = np.asarray(position), np.asarray(offset)
     meridian, prime_vertical = principal_radii(position[..., 0])

@@ -1,9 +1,10 @@
 """Rotations: direction cosine matrices, quaternions, rotation vectors and roll-pitch-yaw.
 
-A DCM here turns body vectors into north-east-down (``v_n = C v_b``). Roll-pitch-yaw is the Z-Y-X sequence, C = R_z(yaw)
-R_y(pitch) R_x(roll). Quaternions are scalar-first. Source: Groves 2013, chapter 2 and appendix E.
+A direction cosine matrix (DCM) C converts vectors from body axes to north-east-down (``v_n = C v_b``). Roll-pitch-yaw
+is the Z-Y-X sequence, C = R_z(yaw) R_y(pitch) R_x(roll). Quaternions are scalar-first. Source: Groves 2013, chapter 2
+and appendix E.
 
-The functions work on stacks of rotations and lean on `numpy`; the kernels work on scalars inside other kernels.
+The functions work on stacks of rotations with `numpy`; the kernels work on scalars inside other kernels.
 """
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ def skew(vector: Array) -> Array:
     Returns
     -------
     (..., 3, 3) array
+        The skew-symmetric matrices.
     """
     v = np.asarray(vector, dtype=np.float64)
     s = np.zeros((*v.shape, 3))
@@ -102,7 +104,7 @@ def rpy_from_dcm(dcm: Array) -> Array:
     Returns
     -------
     (..., 3) array
-        [rad]; pitch in [-pi/2, pi/2] (Groves eq. 2.23).
+        Roll, pitch, yaw [rad]; pitch in [-pi/2, pi/2] (Groves eq. 2.23).
     """
     c = np.asarray(dcm)
     pitch = np.arctan2(-c[..., 2, 0], np.hypot(c[..., 2, 1], c[..., 2, 2]))
@@ -122,6 +124,7 @@ def dcm_from_rotation_vector(vector: Array) -> Array:
     Returns
     -------
     (..., 3, 3) array
+        The rotation matrices.
     """
     v = np.asarray(vector, dtype=np.float64)
     angle2 = np.sum(v * v, axis=-1)[..., None, None]
@@ -144,7 +147,7 @@ def rotation_vector_from_dcm(dcm: Array) -> Array:
     Returns
     -------
     (..., 3) array
-        [rad], of length in [0, pi].
+        Rotation vectors [rad], with a length in [0, pi].
     """
     q = quaternion_from_dcm(dcm)
     q = np.where(q[..., :1] < 0.0, -q, q)
@@ -161,12 +164,12 @@ def left_jacobian(rotation: Array) -> Array:
     Parameters
     ----------
     rotation : (3,) array
-        phi [rad].
+        Rotation vector phi [rad].
 
     Returns
     -------
     (3, 3) array
-        J. Sola, Deray and Atchuthan, *A micro Lie theory*, 2018, eq. 145.
+        The matrix J. Source: J. Sola, J. Deray and D. Atchuthan, *A micro Lie theory*, 2018, eq. 145.
     """
     x, y, z = rotation.tolist()
     angle2 = x * x + y * y + z * z
@@ -194,6 +197,7 @@ def quaternion_from_dcm(dcm: Array) -> Array:
     Returns
     -------
     (..., 4) array
+        Unit quaternions, scalar first.
     """
     c = np.asarray(dcm, dtype=np.float64)
     d0, d1, d2 = c[..., 0, 0], c[..., 1, 1], c[..., 2, 2]
@@ -223,7 +227,7 @@ def cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> t
 
 @kernel()
 def rotation_coefficients(angle2: float) -> tuple[float, float]:
-    """sin(x)/x and (1 - cos(x))/x^2 for x^2 = ``angle2``, good to rounding."""
+    """The coefficients sin(x)/x and (1 - cos(x))/x^2 for x^2 = ``angle2``, exact to rounding."""
     if angle2 < 1e-3:
         # Reciprocals are folded when compiled: a division costs as much as five products.
         a = 1.0 - angle2 * (1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 * (1.0 / 5040.0)))

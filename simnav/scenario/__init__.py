@@ -1,10 +1,9 @@
 """Scenarios: the declarative description of a run, read from TOML and validated.
 
-A scenario says what happens (vessel, manoeuvres, sea, current), with what it is observed
-(instruments) and what goes wrong (faults). It is either simulated, or recorded: then a ``[log]``
-table says which files hold what. Everything random is drawn from a run's seed, nothing from here.
+A scenario describes the motion (vessel, manoeuvres, sea, current), the instruments and their faults. It is either
+simulated, or recorded: then a ``[log]`` table describes the files. All random numbers are drawn from the seed of a run.
 
-`load` finds one by name or path; `simnav.scenario.catalogue` knows where the packs are. The schema is
+`load` finds a scenario by name or path; `simnav.scenario.catalogue` finds the scenario packages. The schema is
 described in ``docs/reference/scenarios.md``.
 """
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TRAINING_ROOT", "Dial", "Header", "InitialError", "Scenario", "headers", "load", "names", "parse"]
 
-# A list of scenarios needs their heads alone: what describes and validates a run loads with its first use.
+# A list of scenarios needs the heads of the files only. The description of a run is loaded when it is first used.
 _HOMES = {
     "catalogue": ("Header", "headers"),
     "reading": ("load", "names", "parse"),

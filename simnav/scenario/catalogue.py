@@ -1,9 +1,8 @@
-"""Where scenarios are found: the packs behind the entry-point group ``simnav.scenarios``.
+"""The catalogue of scenarios: the packs in the entry-point group ``simnav.scenarios``.
 
-A pack is an importable package that holds scenario files (``*.toml``, and those of families in ``families/*.toml``);
-installing it is all it takes. Only the heads of the files are read here, because ``import simnav`` asks for them to
-register its Gymnasium ids. A broken pack or file is named in a warning and
-does not affect the others.
+A pack is an importable package with scenario files (``*.toml``, and families in ``families/*.toml``). Its scenarios are
+found when it is installed. Only the heads of the files are read here, because ``import simnav`` needs them for its
+Gymnasium ids. If a pack or a file has an error, a warning names it, and the others are not affected.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ class Header:
     name : str
         Name of the scenario, in kebab-case.
     version : int
-        Raised by every change that alters the numbers of a run.
+        Version; every change that alters the numbers of a run increases it.
     title : str
         One line for tables.
     duration : float
@@ -47,9 +46,9 @@ class Header:
     tags : tuple of str
         Words by which lists are filtered; ``long`` is left out of quick campaigns.
     track, group : str
-        Scenarios of one track are ranked together; a group is what some of them have in common.
+        Scenarios of one track are ranked together; scenarios of one group have a common property.
     training : bool
-        Parameters are chosen on it; campaigns leave it out unless it is named.
+        True if the scenario is for choosing parameters; campaigns leave it out unless it is named.
     path : Path
         Path of the TOML file.
     recorded : bool
@@ -169,7 +168,7 @@ def _header(path: Path) -> Header | None:
 
 
 def _head(text: str) -> dict[str, Any]:
-    """What stands in a file before its first table: reading all of forty files would take longer than the import."""
+    """The keys of a file before its first table. To parse forty files completely would take longer than the import."""
     lines = text.splitlines(keepends=True)
     end = next((i for i, line in enumerate(lines) if line.startswith("[")), len(lines))
     try:

@@ -1,4 +1,4 @@
-"""What has to fit together in a scenario: names, instruments, the world or the log, faults, and orders of magnitude."""
+"""Checks that the parts of a scenario fit together: names, instruments, world or log, faults, orders of magnitude."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 __all__ = ["LONGEST", "check"]
 
-#: A measurement's labels are 32 bits, one an interval of a fault.
+#: Largest number of intervals of faults: the labels of a measurement have 32 bits, one for each interval.
 _MOST_BITS = 32
 
-#: Longest run [s] and fastest instrument [Hz]: more than anyone needs, less than fills the memory by a slip.
+#: Longest run [s] and highest rate of an instrument [Hz]. The limits catch mistakes that would fill the memory.
 LONGEST, _FASTEST = 1e7, 1e5
-#: Highest speed of a vessel and of a current [m/s], and least magnitude of a number that is not 0.
+#: Highest speed of a vessel and of a current [m/s], and smallest magnitude of a number other than 0.
 _HIGHEST_SPEED, _SMALLEST = 1e3, 1e-200
 
 _INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
@@ -77,7 +77,7 @@ def _check_instruments(s: Scenario) -> None:
 
 
 def _check_no_subnormal(where: str, value: Any) -> None:
-    """Numbers next to zero that arithmetic cannot divide by."""
+    """Refuse numbers so close to zero that a division by them overflows."""
     if isinstance(value, dict):
         for key, inner in value.items():
             _check_no_subnormal(f"{where}.{key}", inner)
@@ -89,7 +89,7 @@ def _check_no_subnormal(where: str, value: Any) -> None:
 
 
 def _check_speeds(s: Scenario) -> None:
-    """No vessel is faster than `_HIGHEST_SPEED`; beyond it the truth would not be finite."""
+    """Refuse speeds above `_HIGHEST_SPEED`, at which the truth might not be finite."""
     speeds = {f"manoeuvre {k} ({m.kind}).speed_m_s": getattr(m, "speed", 0.0) for k, m in enumerate(s.manoeuvres, 1)}
     speeds |= {"start.speed_m_s": getattr(s.start, "speed", 0.0), "current.speed_m_s": getattr(s.current, "speed", 0.0)}
     for key, speed in speeds.items():
@@ -98,7 +98,7 @@ def _check_speeds(s: Scenario) -> None:
 
 
 def _check_world(s: Scenario) -> None:
-    """A simulated run: start and manoeuvres fit the vessel and the water."""
+    """Check a simulated run: start and manoeuvres fit the vessel and the water."""
     if s.start is None:
         raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
     if s.imu is not None and abs(s.step * s.imu.rate - round(s.step * s.imu.rate)) > 1e-6:
@@ -122,7 +122,7 @@ def _check_world(s: Scenario) -> None:
 
 
 def _check_log(s: Scenario, log: RecordedSpec) -> None:
-    """A recorded run: no world beside it, and a source for every instrument."""
+    """Check a recorded run: it has no world, and a source for every instrument."""
     for key in ("start", "vessel", "manoeuvres", "sea", "current", "world_seed"):
         if getattr(s, key):
             table = "manoeuvre" if key == "manoeuvres" else key

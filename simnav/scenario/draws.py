@@ -1,8 +1,8 @@
-"""Random draws in a scenario: a value of its TOML may be a distribution, from which each run draws.
+"""Random draws in a scenario: a value in its TOML may be a distribution, from which a value is drawn for each run.
 
-A `Template` is the table of a scenario file with what is to be drawn in it. `Template.drawn` turns it and a seed into a
-plain table. It works on TOML, before units and validation, so that anything may be drawn: a number, a component of a
-vector, the name of an instrument, a whole table. The forms are described in ``docs/reference/draws.md``::
+A `Template` is the table of a scenario file with distributions. `Template.drawn` makes a table without distributions
+from it and a seed. It works on TOML, before units and validation, so that anything may be drawn: a number, a component
+of a vector, the name of an instrument, a whole table. The forms are described in ``docs/reference/draws.md``::
 
     sigma_m = { log_uniform = [2, 12] }
     instruments = { choice = [["gnss"], ["dvl"]], weights = [3, 1] }
@@ -10,7 +10,8 @@ vector, the name of an instrument, a whole table. The forms are described in ``d
     speed_m_s = { draw = "vessel", cases = { ship = 6, auv = { uniform = [1, 2] } } }
     present = { choice = [true, false] }
 
-Every distribution has a random stream of its own, named after its key path, so that one more changes no other.
+Every distribution has a random stream of its own, named after its key path, so that a further distribution does not
+change the others.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Distribution:
     values : tuple
         Two numbers, or the options.
     weights : tuple of float
-        Of the options; empty where all are alike.
+        Weights of the options; empty if all are equally probable.
     """
 
     kind: str
@@ -59,7 +60,7 @@ class Distribution:
 
     @classmethod
     def read(cls, table: Mapping[str, Any], where: str) -> Distribution:
-        """Read a table like ``{ uniform = [0, 1] }``; SpecError (without the file's name) if it is none."""
+        """Read a table like ``{ uniform = [0, 1] }``; SpecError (without the file's name) if it is not valid."""
         kinds = [k for k in table if k in _KINDS]
         kind = kinds[0]
         allowed = {kind, "weights", "present"} if kind == "choice" else {kind}
@@ -85,7 +86,7 @@ class Distribution:
         return cls(kind, (a, b))
 
     def sample(self, rng: np.random.Generator) -> Any:
-        """A draw."""
+        """Draw a value."""
         if self.kind == "choice":
             total = float(sum(self.weights))
             p = [w / total for w in self.weights] if self.weights else None
@@ -157,7 +158,7 @@ _DROPPED = object()
 
 
 def has_draws(table: Mapping[str, Any]) -> bool:
-    """Whether anything in the table of a scenario file is to be drawn."""
+    """Whether the table of a scenario file has a distribution."""
 
     def found(value: Any) -> bool:
         if isinstance(value, dict):
@@ -175,21 +176,21 @@ class Template:
     Parameters
     ----------
     table : mapping
-        As `tomllib` returns it.
+        Table as `tomllib` returns it.
     source : str
-        File, for error messages.
+        Name of the file, for error messages.
 
     Attributes
     ----------
     table : mapping
-        As given.
+        The table with its distributions.
     distributions : mapping of str to Distribution
-        By key path, those inside options and cases included.
+        The distributions by key path, including those inside options and cases.
 
     Raises
     ------
     SpecError
-        On a distribution that is none, or a reference to a draw that is not there.
+        If a distribution is not valid, or a reference names a draw that does not exist.
     """
 
     def __init__(self, table: Mapping[str, Any], source: str):
@@ -229,7 +230,7 @@ class Template:
                 self._collect(inner, f"{where}[{i}]")
 
     def drawn(self, seed: int) -> tuple[dict[str, Any], Draws]:
-        """What a run draws.
+        """Draw the values of a run.
 
         Parameters
         ----------
@@ -239,9 +240,9 @@ class Template:
         Returns
         -------
         table : dict
-            The scenario file without anything left to draw.
+            The table of the scenario file with values in place of distributions.
         draws : dict of str to object
-            By key path, in the unit of the key; of an option that is a table, its number from 0.
+            The drawn values by key path, in the unit of the key. If an option is a table, its number from 0.
         """
         return self._resolve(lambda path, d: d.sample(stream(seed, "draw", path)))
 
@@ -301,7 +302,7 @@ def _check_reference(value: Mapping[str, Any], where: str, named: Mapping[str, A
 
 
 class _Resolution:
-    """One way through a template: every distribution picked once."""
+    """The values of all distributions of a template in one draw; each is drawn once."""
 
     def __init__(
         self,
@@ -387,17 +388,17 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any], source: str
     Parameters
     ----------
     table : mapping
-        As `tomllib` returns it; distributions may be in it.
+        Table as `tomllib` returns it; it may have distributions.
     values : mapping
-        Key path, like ``fault[0].sigma_m`` or ``draw.length``, to the new value in the unit of the key. The last
-        part may be new; what leads there may not.
+        The new values in the units of their keys, by key path, like ``fault[0].sigma_m`` or ``draw.length``. The last
+        part of a path may be a new key; the parts before it must exist.
     source : str
-        File, for error messages.
+        Name of the file, for error messages.
 
     Raises
     ------
     SpecError
-        If a path leads nowhere.
+        If a part of a path does not exist.
 
     Examples
     --------

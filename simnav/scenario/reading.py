@@ -28,14 +28,14 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> S
     text : str
         The whole text of the file.
     source : str
-        What messages call it.
+        Name of the text in messages.
     folder : Path, optional
-        From where plug-in files are named; by default the working directory.
+        Folder to which the paths of plug-in files are relative; by default the working directory.
 
     Raises
     ------
     SpecError
-        One sentence that names source, key and value, and what would be right.
+        If the scenario is not valid: one sentence that names source, key and value, and what would be right.
     """
     try:
         table: dict[str, Any] = tomllib.loads(text)
@@ -86,8 +86,8 @@ def load(name_or_path: str | Path) -> Scenario:
     Parameters
     ----------
     name_or_path : str or Path
-        ``"coastal-voyage"`` (the newest version), ``"coastal-voyage-v1"``, or the path of a TOML file
-        (a text counts as a path where it ends in ``.toml`` or has a slash in it).
+        ``"coastal-voyage"`` (the newest version), ``"coastal-voyage-v1"``, or the path of a TOML file. A text is a path
+        if it ends in ``.toml`` or contains a slash.
 
     Raises
     ------

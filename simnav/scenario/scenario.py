@@ -1,4 +1,4 @@
-"""The description of a run: what happens, with what it is observed, what goes wrong, and what is drawn for each run."""
+"""The description of a run: motion, instruments, faults, and the values that are drawn for each run."""
 
 from __future__ import annotations
 
@@ -37,10 +37,9 @@ Sigmas = tuple[float, float, float]
 
 
 class InitialError(Spec):
-    """One-sigma errors, north-east-down, of the state that an estimator is told at the start.
+    """Standard deviations, north-east-down, of the errors of the initial state that an estimator receives.
 
-    The errors of a run are drawn from it, independently, and the covariance is handed over with
-    the state.
+    The errors of a run are drawn from them independently. The estimator also receives the covariance.
     """
 
     position: Sigmas = quantity("m", (2.0, 2.0, 2.0), description="position error north, east, down")
@@ -62,16 +61,16 @@ class InitialError(Spec):
         return value
 
     def covariance(self) -> Array:
-        """(9, 9) array over `simnav.types.COMPONENTS`: what an estimator is told."""
+        """(9, 9) covariance over `simnav.types.COMPONENTS` that an estimator receives."""
         return np.diag(np.square([*self.position, *self.velocity, *self.attitude]))
 
     def actual_covariance(self) -> Array | None:
-        """(9, 9) array that the errors are really drawn from; None where it is the one that is told."""
+        """(9, 9) covariance from which the errors are drawn; None if it is that of `covariance`."""
         f = self.factors()
         return np.outer(f, f) * self.covariance() if self.times_told else None
 
     def factors(self) -> Array:
-        """(9,) array: how many times as large as told the errors really are."""
+        """(9,) factors of the true standard deviations over those of `covariance`."""
         return np.repeat([self.times_told.get(name, 1.0) for name in ("position", "velocity", "attitude")], 3)
 
 
@@ -98,7 +97,7 @@ class Dial(Spec):
 
 
 class Scenario(Spec):
-    """A run, described; simulated unless it has a ``[log]``.
+    """The description of a run. It is simulated unless it has a ``[log]``.
 
     The fields carry their own descriptions (``Scenario.model_fields``) and hold SI units and radians;
     ``docs/reference/scenarios.md`` lists their TOML keys. Build one with `load` or `parse`, or from Python.
@@ -147,12 +146,12 @@ class Scenario(Spec):
 
     @classmethod
     def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
-        """As `Spec.from_toml`; where something is to be drawn, the scenario in the middle of its ranges.
+        """See `Spec.from_toml`. With distributions, the result is the scenario in the middle of their ranges.
 
         Raises
         ------
         SpecError
-            Also where a scenario is not valid for some of its draws; the message names them.
+            Also if the scenario is not valid for some of its draws; the message names them.
         """
         if not isinstance(table, Mapping) or not has_draws(table):
             return super().from_toml(table, source=source, path=path)
@@ -170,7 +169,7 @@ class Scenario(Spec):
         return scenario
 
     def to_toml(self) -> dict[str, Any]:
-        """As `Spec.to_toml`; what is to be drawn is written as it was given."""
+        """See `Spec.to_toml`. Distributions are written as they were given."""
         table = super().to_toml()
         if self._template is None:
             return table
@@ -183,20 +182,20 @@ class Scenario(Spec):
 
     @property
     def distributions(self) -> Mapping[str, Distribution]:
-        """What is to be drawn, by key path; empty where every run is the same scenario."""
+        """The distributions by key path; empty if every run has the same scenario."""
         return {} if self._template is None else self._template.distributions
 
     @property
     def draws(self) -> Mapping[str, Any]:
-        """What was drawn for this run, by key path, in the units of the keys; empty before `drawn`."""
+        """The values drawn for this run, by key path, in the units of the keys; empty before `drawn`."""
         return self._draws
 
     def root(self, seed: int) -> int:
-        """The number that the random streams of a run start from: its seed, or one beyond all seeds for training."""
+        """The number from which the random streams of a run start: its seed, plus an offset for training scenarios."""
         return seed + TRAINING_ROOT if self.training else seed
 
     def drawn(self, seed: int) -> Self:
-        """The scenario of one run, with nothing left to draw.
+        """The scenario of one run, with all values drawn.
 
         Parameters
         ----------
@@ -206,7 +205,8 @@ class Scenario(Spec):
         Returns
         -------
         Scenario
-            Itself where there is nothing to draw. A field that was replaced in Python (``model_copy``) stays as it is.
+            The scenario itself if it has no distributions. A field that was replaced in Python (``model_copy``) is
+            kept.
         """
         if self._template is None:
             return self
@@ -279,7 +279,7 @@ class Scenario(Spec):
         return {n: s for n, s in self.instruments.items() if not isinstance(s, ImuSpec)}
 
     def instruments_sheet(self) -> Instruments:
-        """The datasheets, as an estimator gets them."""
+        """The datasheets that an estimator receives."""
         imu = self.imu
         return Instruments(
             [spec.datasheet(name) for name, spec in self.aids.items()],
@@ -288,16 +288,16 @@ class Scenario(Spec):
         )
 
     def actual(self) -> Self:
-        """The scenario with instruments as they really are, where their datasheets are wrong (``times_datasheet``)."""
+        """The scenario with the true figures of its instruments, after the factors of ``times_datasheet``."""
         actual = {name: spec.actual() for name, spec in self.instruments.items()}
         if all(actual[name] is spec for name, spec in self.instruments.items()):
             return self
         return self.model_copy(update={"instruments": actual})
 
     def actual_sheet(self) -> Instruments | None:
-        """The datasheets that would be true; None where those of `instruments_sheet` are.
+        """The datasheets with the true figures; None if those of `instruments_sheet` are true.
 
-        Among their details are the figures that no datasheet states (`AidSpec.unstated`), where they are not zero.
+        Their details include the figures that are in no datasheet (`AidSpec.unstated`), if they are not zero.
         """
         actual = self.actual()
         unstated = {name: {u: getattr(s, u) for u in s.unstated if getattr(s, u)} for name, s in actual.aids.items()}
@@ -310,8 +310,8 @@ class Scenario(Spec):
     def content_hash(self) -> str:
         """Hexadecimal digest of everything that decides the numbers of a run, defaults included.
 
-        Title, description, source, tags, track, group and dials are words and do not count; neither do the files of a
-        log. What is to be drawn counts as it is written.
+        Title, description, source, tags, track, group and dials are not included, nor are the files of a log.
+        Distributions are included as they are written.
         """
         words = {"title", "description", "source", "tags", "track", "group", "plugins", "dials"}
         content = self.model_dump(mode="python", exclude=words)
@@ -325,7 +325,7 @@ class Scenario(Spec):
         return digest.hexdigest()
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
-        """For another process, which has to load the plug-in files before it can make their instruments."""
+        """Pickle for another process, which must load the plug-in files before it can build their instruments."""
         names = [type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)]
         files = [sys.modules[name].__file__ for name in names if is_file_module(name) and name in sys.modules]
         reduced = super().__reduce_ex__(protocol)

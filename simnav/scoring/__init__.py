@@ -1,20 +1,19 @@
-"""Scores: what a trial is worth.
+"""Scores: numbers that describe the quality of a trial.
 
 - `errors`: estimate minus truth, by component and epoch.
-- `score`: the named scores of a run; `SCORES` says what each one is.
+- `score`: the named scores of a run; `SCORES` holds title, unit and direction of each.
 - `series`: thinned errors and tracks, for plots.
-- `stanford`: errors beside protection levels.
+- `stanford`: errors and protection levels, for Stanford diagrams.
+- `register_score`: registers a function as a score, of simnav or of a third party.
 
-- `register_score`: makes a function a score; ours and those of others.
-
-The rooms: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``integrity``,
+Modules: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``integrity``,
 ``detection``, ``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``navigation_error``,
 ``scores``, ``plot_series``.
 """
 
 from __future__ import annotations
 
-from simnav.scoring import standard  # first: it decides the order of the scores
+from simnav.scoring import standard  # imported first, because it decides the order of the scores
 from simnav.scoring.consistency import badge, nees, nees_band
 from simnav.scoring.integrity import Stanford, protection_levels, stanford
 from simnav.scoring.navigation_error import errors, smoothed_errors

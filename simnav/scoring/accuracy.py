@@ -4,7 +4,7 @@ Radii are empirical quantiles of the horizontal error over the epochs of a run, 
 median, R95 its 95th percentile (the form of requirement in IMO resolutions A.915(22) and A.1046(27), for example 10 m
 at 95 % in harbour approaches).
 
-An epoch without a position counts with the last position that was given (`simnav.scoring.ScoringInput.held_error`).
+An epoch without a position counts with the last position before it (`simnav.scoring.ScoringInput.held_error`).
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _r95(given: ScoringInput) -> float:
 def _register_component(
     name: str, title: str, unit: str, columns: tuple[int, ...], measure: Callable[[Array], float]
 ) -> None:
-    """A measure of one component of the error, or of the length of two."""
+    """Register a score: a measure of one component of the error, or of the length of two components."""
 
     @register_score(name, title=title, unit=unit, better="lower")
     def component(given: ScoringInput) -> float:

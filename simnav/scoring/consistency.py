@@ -1,19 +1,20 @@
-"""Consistency: does the covariance that an estimator states agree with the errors that it makes?
+"""Consistency: the agreement between the covariance of an estimator and its errors.
 
 The normalised estimation error squared (NEES) of d components, e^T P^-1 e, is chi-square with d degrees of freedom for
 a consistent Gaussian estimator (Bar-Shalom, Li and Kirubarajan, *Estimation with Applications to Tracking and
 Navigation*, Wiley 2001, section 5.4). Scores here are divided by d: 1 is ideal, above it the estimator is optimistic
 (its covariance too small), below it pessimistic.
 
-Errors are correlated over the epochs of a run, so that the epochs are no independent samples; runs are. Bands are
-therefore those of the mean over M runs, chi-square with M d degrees of freedom: exact at one epoch, and wider than
-needed for a mean over time.
+Errors are correlated over the epochs of a run, so epochs are not independent samples, but runs are. The bands are
+therefore those of the mean over M runs, chi-square with M d degrees of freedom. They are exact at one epoch, and wider
+than necessary for a mean over time.
 
-The horizontal NEES and the coverage are also scored by parts: before the first measurement that a fault touched, and
-from then on. An estimator may be consistent while nothing is wrong, and not know when something is.
+The horizontal NEES and the coverage are also computed for two parts of a run: before the first measurement that a fault
+affected, and from then on. An estimator may be consistent without faults and inconsistent with them.
 
-An estimator can test itself, too: one whose measurements contradict it sets the diagnostic ``inconsistent`` to 1. A run
-in which it does so for most of the time, or at its end, ends as ``inconsistent``, not as ``ok``.
+An estimator can also test itself. If its measurements contradict its estimate, it sets the diagnostic ``inconsistent``
+to 1. A run in which this diagnostic is 1 for most of the time, or at the end, has the status ``inconsistent``, not
+``ok``.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ GROUPS: dict[str, tuple[int, ...]] = {
     "attitude": (6, 7, 8),
 }
 
-#: Mean NEES [-] that stands for a covariance without an inverse, so that scores stay finite.
+#: Largest mean NEES [-]. It replaces the infinite NEES of a singular covariance, so that scores are finite.
 LARGEST = 1e12
 
 #: A mean NEES within this factor of 1 is consistent whatever the number of runs (sigmas right within 22 %).
@@ -65,18 +66,18 @@ def nees(error: Array, covariance: Array, components: tuple[int, ...]) -> tuple[
     Parameters
     ----------
     error : (T, 9) array
-        NaN components are left out of the epoch's NEES.
+        Errors e at T epochs. NaN components are left out of the NEES of the epoch.
     covariance : (T, 9, 9) array
-        Of the error, as the estimator reports it.
+        Covariances P of the error, as the estimator reports them.
     components : tuple of int
-        For example one of `GROUPS`.
+        Indices of the components of the group, for example one of `GROUPS`.
 
     Returns
     -------
     nees : (T,) array
         e^T P^-1 e; infinite where P is singular, NaN where no component is known.
     degrees : (T,) int array
-        Number of components in it.
+        Number of components in the NEES of each epoch.
     """
     index = np.asarray(components)
     e = error[:, index]
@@ -84,7 +85,7 @@ def nees(error: Array, covariance: Array, components: tuple[int, ...]) -> tuple[
     known = np.isfinite(e) & np.isfinite(np.diagonal(p, axis1=1, axis2=2))
     e = np.where(known, e, 0.0)
     p = np.where(known[:, :, None] & known[:, None, :], p, np.eye(len(index)))
-    # In units of its own sigmas, so that a small variance is not taken for a singular matrix.
+    # The covariance is scaled by its own sigmas, so that small variances do not look like a singular matrix.
     sigma = np.sqrt(np.diagonal(p, axis1=1, axis2=2))
     flat = (sigma <= 0.0).any(axis=1)
     sigma = np.where(sigma > 0.0, sigma, 1.0)
@@ -105,16 +106,16 @@ def nees_band(degrees: int, runs: int, level: float = 0.95) -> tuple[float, floa
     Parameters
     ----------
     degrees : int
-        Of one NEES.
+        Degrees of freedom of one NEES.
     runs : int
         Number of independent runs.
     level : float
-        Probability that a consistent estimator falls inside.
+        Probability that the mean NEES of a consistent estimator is inside the band.
 
     Returns
     -------
     low, high : float
-        Around 1.
+        Limits of the band; 1 is between them.
 
     Examples
     --------
@@ -137,7 +138,7 @@ def coverage(nees_horizontal: Array, level: float) -> float:
     Parameters
     ----------
     nees_horizontal : (T,) array
-        With two degrees of freedom; NaN is left out.
+        NEES of the horizontal position (two degrees of freedom); NaN is left out.
     level : float
         Probability content of the ellipse: its NEES is below -2 ln(1 - level).
     """
@@ -146,7 +147,7 @@ def coverage(nees_horizontal: Array, level: float) -> float:
 
 
 def _nees_of(given: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
-    """`nees` of each group; empty without a covariance."""
+    """The result of `nees` for each group; empty without a covariance."""
     covariance = given.trial.covariance
     if covariance is None:
         return {}
@@ -154,9 +155,9 @@ def _nees_of(given: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
 
 
 def first_fault(recording: Recording) -> float:
-    """Time of the first measurement or IMU sample that a fault touched [s]; infinite without any.
+    """Time of the first measurement or IMU sample that a fault affected [s]; infinite without any.
 
-    Missing measurements are no faults here: a consistent estimator knows that it hears nothing.
+    Missing measurements do not count, because an estimator can see that they are missing.
     """
     data = recording.data
     times = [s.time[s.faults != 0] for s in data.aids.values()]
@@ -166,11 +167,11 @@ def first_fault(recording: Recording) -> float:
 
 
 def _before_faults(given: ScoringInput) -> NDArray[np.bool_]:
-    """Which epochs lie before the first fault."""
+    """A mask of the epochs before the first fault."""
     return given.trial.time < first_fault(given.recording) - 1e-9
 
 
-#: Parts of a run that are judged: all of it, before the first fault, and from then on.
+#: Parts of a run with scores of their own: the whole run, before the first fault, and from then on.
 _PARTS = {"": "", "_clean": ", before the first fault", "_faulty": ", from the first fault on"}
 
 
@@ -182,7 +183,7 @@ def _part(given: ScoringInput, part: str) -> NDArray[np.bool_]:
 
 
 def _register_nees(group: str, title: str, part: str = "") -> None:
-    """The mean over the epochs, divided by the degrees of freedom: 1 is ideal, at most `LARGEST`."""
+    """Register a score: the mean NEES over the epochs, divided by the degrees of freedom, at most `LARGEST`."""
 
     @register_score(
         f"nees_{group}{part}", title=f"Mean NEES by degree of freedom, {title}{_PARTS[part]}", unit="-", better="one",
@@ -220,7 +221,7 @@ for _of in ("_clean", "_faulty"):
 
 
 def _reports(given: ScoringInput) -> NDArray[np.bool_]:
-    """Whether it reports that it is inconsistent, at the epochs at which it says anything of it."""
+    """The diagnostic ``inconsistent`` as a mask, at the epochs that have it."""
     reported = given.trial.diagnostics.get("inconsistent", np.empty(0))
     return reported[np.isfinite(reported)] > 0.5 if reported.ndim == 1 else np.zeros(0, dtype=bool)
 
@@ -247,18 +248,18 @@ def _inconsistent_end(given: ScoringInput) -> float:
 
 
 def ending(status: str, scores: Mapping[str, float]) -> str:
-    """How a run ended: its status, or ``inconsistent``.
+    """The final status of a run: the status of its trial, or ``inconsistent``.
 
-    A run that is ``ok`` ended as inconsistent where the estimator reported that its measurements contradict it, for
-    most of the time, or for most of the last tenth: one that a late fault leaves wrong has ended so, too. It is no
-    failure: a ranking takes its error as it is, so that nobody loses by being honest.
+    A run with the status ``ok`` becomes ``inconsistent`` if the estimator reported the diagnostic ``inconsistent`` for
+    most of the run, or for most of its last tenth, for example after a late fault. This is not a failure: a ranking
+    uses the error of the run as it is, so that an estimator does not lose by the report.
 
     Parameters
     ----------
     status : str
-        Of the trial.
+        Status of the trial.
     scores : mapping of str to float
-        Of the run.
+        Scores of the run, by name.
 
     Examples
     --------
@@ -279,7 +280,7 @@ def badge(nees_by_run: Array, degrees: int = 2) -> Badge:
     nees_by_run : (M,) array
         Mean NEES of each run divided by its degrees of freedom (the scores ``nees_<group>``); NaN is left out.
     degrees : int
-        Of the group: 2 for the horizontal position.
+        Degrees of freedom of the group: 2 for the horizontal position.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Cost: wall time of an update.
 
-The first update is left out where there are others: it may load compiled code.
+The first update is left out if there are others, because it may load compiled code.
 """
 
 from __future__ import annotations

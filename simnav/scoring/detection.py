@@ -10,7 +10,7 @@ from simnav.trial import Trial
 
 __all__ = ["DETECTABLE", "detection"]
 
-#: A fault counts as one to be detected where it added more than this many datasheet sigmas to a component.
+#: An estimator should detect a fault if it added more than this many datasheet sigmas to a component.
 DETECTABLE = 3.0
 
 _TOLERANCE = 1e-6  # s, between the time of a flag and that of its measurement
@@ -22,17 +22,17 @@ def detection(trial: Trial, recording: Recording) -> dict[str, float]:
     Parameters
     ----------
     trial : Trial
-        Only measurements up to its last epoch count.
+        The estimates and flags. Only measurements up to its last epoch count.
     recording : Recording
-        The one that it was run on.
+        The recording of the trial.
 
     Returns
     -------
     dict
-        ``detection_rate``: of the measurements to which a fault added more than `DETECTABLE` sigmas, the share that was
-        flagged. ``false_alarm_rate``: of those that no fault touched, the share that was flagged. Measurements that a
-        fault touched less belong to neither. NaN where there are no such measurements, and for an estimator that flags
-        nothing at all, since it may not detect faults by design.
+        ``detection_rate``: the flagged share of the measurements to which a fault added more than `DETECTABLE` sigmas.
+        ``false_alarm_rate``: the flagged share of the measurements without a fault. Measurements with a smaller fault
+        count in neither. A rate is NaN if there are no such measurements, and for an estimator that flags nothing at
+        all, because it may not detect faults by design.
     """
     scores = {"detection_rate": float("nan"), "false_alarm_rate": float("nan")}
     if not trial.flagged or not len(trial):

@@ -1,9 +1,9 @@
-"""Integrity: does an estimator bound its position error, and how often is that bound small enough to sail by?
+"""Integrity: whether an estimator bounds its position error, and how often the bound is below the alert limit.
 
-An estimator has a **protection level** at an epoch: its diagnostic ``protection_level`` [m] where it gives one, else
-what its covariance says (`protection_levels`). An **alert limit** is what the waters allow. Where the protection level
-is above the limit, the navigator is warned, and the position counts as not available. Every epoch is one of five kinds
-(the regions of a Stanford diagram):
+The **protection level** of an estimator at an epoch is its diagnostic ``protection_level`` [m], or, without this
+diagnostic, a multiple of its standard deviation (`protection_levels`). The **alert limit** is the largest acceptable
+error in the waters. If the protection level is above the limit, the navigator is warned, and the position counts as not
+available. Every epoch is one of five kinds (the regions of a Stanford diagram):
 
 =========================  ==================================================
 normal                     error <= protection level <= alert limit
@@ -69,14 +69,14 @@ def protection_levels(trial: Trial, risk: float = RISK) -> Array:
     Parameters
     ----------
     trial : Trial
-        What the estimator gave.
+        The estimates, covariances and diagnostics.
     risk : float
-        For those from a covariance.
+        Probability that the error exceeds a level that follows from a covariance.
 
     Returns
     -------
     (T,) array
-        NaN at epochs with neither.
+        Protection levels; NaN at epochs with neither diagnostic nor covariance.
     """
     given = trial.diagnostics.get("protection_level")
     if given is not None:
@@ -97,7 +97,7 @@ def protection_levels(trial: Trial, risk: float = RISK) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Stanford:
-    """Errors beside protection levels: what a Stanford diagram shows.
+    """The data of a Stanford diagram: the error and the protection level of each epoch.
 
     Attributes
     ----------
@@ -130,19 +130,19 @@ class Stanford:
         return dict(zip(KINDS_OF_EPOCHS, (counts / counts.sum()).tolist(), strict=True))
 
     def histogram(self, edges: Array) -> NDArray[np.int64]:
-        """Number of epochs by error (rows) and protection level (columns); what is beyond counts in the last.
+        """Number of epochs by error (rows) and protection level (columns).
 
         Parameters
         ----------
         edges : (n + 1,) array
-            From 0 on [m].
+            Edges of the bins, the first one 0 [m]. Larger values count in the last bin.
         """
         last = 0.5 * (edges[-2] + edges[-1])
         pair = np.clip(self.error, 0.0, last), np.clip(self.level, 0.0, last)
         return np.histogram2d(*pair, bins=[edges, edges])[0].astype(np.int64)
 
     def to_dict(self, edges: Iterable[float] | None = None) -> dict[str, Any]:
-        """For JSON: the limit, the shares and a histogram; by default of 40 steps up to twice the limit."""
+        """A dictionary for JSON: limit, shares and a histogram, by default with 40 bins up to twice the limit."""
         steps = np.linspace(0.0, 2.0 * self.limit, 41) if edges is None else np.asarray(list(edges), dtype=np.float64)
         return {
             "limit": self.limit,
@@ -182,7 +182,7 @@ def _epochs(trial: Trial, recording: Recording, error: Array) -> tuple[Array, Ar
 
 
 def _of(given: ScoringInput) -> tuple[Array, Array] | None:
-    """Errors and protection levels of a run; None where it has no protection level at all."""
+    """Errors and protection levels of a run; None if it has no protection level at all."""
     if not np.isfinite(protection_levels(given.trial)).any():
         return None
     return _epochs(given.trial, given.recording, given.horizontal)

@@ -20,15 +20,15 @@ def errors(trial: Trial, recording: Recording) -> Array:
     Parameters
     ----------
     trial : Trial
-        What the estimator gave.
+        The estimates.
     recording : Recording
-        The one that the trial was run on.
+        The recording of the trial, with the truth.
 
     Returns
     -------
     (T, 9) array
-        In the order of `simnav.types.COMPONENTS` [m, m/s, rad]; NaN where a component was not estimated or the
-        truth (a real log's reference) does not hold it.
+        Errors in the order of `simnav.types.COMPONENTS` [m, m/s, rad]; NaN if a component was not estimated, or if the
+        reference of a real log does not hold it.
 
     Raises
     ------
@@ -43,10 +43,11 @@ def errors(trial: Trial, recording: Recording) -> Array:
 
 
 def held_errors(trial: Trial, recording: Recording) -> Array:
-    """Errors like `errors`, but at an epoch without a position that of the last position that was given.
+    """Errors like `errors`; but at an epoch without a position, the error of the last position before it.
 
-    So there is nothing to gain by giving no position where it is hard. Before the first position, that of the start
-    counts. Horizontal position and height are held separately, and only where the estimator ever gives them.
+    So an estimator gains nothing if it gives no position in difficult situations. Before the first position, the
+    initial position is used. Horizontal position and height are held separately, and only if the estimator gives them
+    at any epoch.
     """
     states = NavigationStates(trial.time, trial.position, trial.velocity, trial.attitude)
     states, estimated = _held(states, trial.estimated, recording.start.position)
@@ -56,7 +57,7 @@ def held_errors(trial: Trial, recording: Recording) -> Array:
 def _held(
     states: NavigationStates, estimated: NDArray[np.bool_], start: Array
 ) -> tuple[NavigationStates, NDArray[np.bool_]]:
-    """States without gaps in the position, and which components they then hold."""
+    """States without gaps in the position, and the mask of the components that are estimated."""
     position, estimated = states.position.copy(), estimated.copy()
     for part in (slice(0, 2), slice(2, 3)):
         given: NDArray[np.bool_] = np.asarray((estimated[:, part] & np.isfinite(position[:, part])).all(axis=1))
@@ -69,11 +70,11 @@ def _held(
 
 
 def smoothed_errors(trial: Trial, recording: Recording) -> Array | None:
-    """Errors of the smoothed trajectory, like `held_errors`, or None where the estimator does not smooth."""
+    """Errors of the smoothed trajectory, like `held_errors`; None if the estimator does not smooth."""
     if trial.smoothed is None:
         return None
     given: NDArray[np.bool_] = np.any(trial.estimated, axis=0)
-    if not given.any():  # all that it does is smooth
+    if not given.any():  # the estimator only smooths
         given = np.ones(9, dtype=bool)
     states, estimated = _held(trial.smoothed, np.broadcast_to(given, trial.estimated.shape), recording.start.position)
     return state_errors(states, recording.data.truth[: len(trial)], estimated)
@@ -85,14 +86,15 @@ def state_errors(states: NavigationStates, truth: NavigationStates, estimated: N
     Parameters
     ----------
     states, truth : NavigationStates
-        At the same n times.
+        Estimated and true states at the same n times.
     estimated : (n, 9) bool array
         The components that ``states`` holds.
 
     Returns
     -------
     (n, 9) array
-        North, east, down with the WGS-84 radii at the truth [m]; velocity [m/s]; attitude as in `attitude_error`.
+        Position error north, east, down, with the WGS-84 radii at the truth [m]; velocity error [m/s]; attitude error
+        as in `attitude_error` [rad].
     """
     origin = truth.position.copy()
     origin[:, 2] = np.where(np.isfinite(origin[:, 2]), origin[:, 2], 0.0)  # a reference without height
@@ -117,8 +119,8 @@ def attitude_error(attitude: Array, truth: Array, estimated: NDArray[np.bool_] |
     Returns
     -------
     (n, 3) array
-        [rad]. Where only the heading is estimated or known, roll and pitch are taken as equal, which leaves the
-        difference of the headings; where only roll and pitch are, the headings are taken as equal.
+        Rotation vectors [rad]. If only the heading is estimated or known, roll and pitch are assumed to be equal, so
+        the result is the difference of the headings. If only roll and pitch are, the headings are assumed to be equal.
     """
     attitude, truth = np.asarray(attitude, dtype=np.float64), np.asarray(truth, dtype=np.float64)
     if estimated is None:

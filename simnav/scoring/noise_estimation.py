@@ -1,9 +1,10 @@
-"""Noise estimation: the measurement noise that an estimator believes in, against the noise that there was.
+"""Noise estimation: the measurement noise that an estimator assumes, compared with the true noise.
 
 An adaptive estimator reports the sigma that it uses, epoch by epoch, as the diagnostics ``sigma_north.<instrument>``
-and ``sigma_east.<instrument>`` [m]; a recording knows the white noise that every measurement really had
-(`simnav.recording.AidStream.sigma`). The score is eq. 21 of G. Mao et al., "Robust GNSS/INS Integrated Navigation
-Algorithm Based on Adaptive Factor Graph Optimization", 2025, applied to the standard deviation as in its Table 2.
+and ``sigma_east.<instrument>`` [m]. A recording holds the true standard deviation of the white noise of every
+measurement (`simnav.recording.AidStream.sigma`). The score is eq. 21 of G. Mao et al., "Robust GNSS/INS Integrated
+Navigation Algorithm Based on Adaptive Factor Graph Optimization", 2025, applied to the standard deviation as in its
+Table 2.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ _TOLERANCE = 1e-6  # s; the end of a step and the time of a measurement are equa
 
 
 def noise_estimation(trial: Trial, recording: Recording) -> dict[str, float]:
-    """How well an estimator knows the noise of the position fixes.
+    """Errors of the noise that an estimator assumes for position fixes.
 
     Parameters
     ----------
     trial : Trial
-        What the estimator gave.
+        The estimates with their diagnostics.
     recording : Recording
-        The one that it was run on.
+        The recording of the trial.
 
     Returns
     -------
@@ -52,7 +53,7 @@ def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Arr
     Parameters
     ----------
     trial : Trial
-        What the estimator gave.
+        The estimates with their diagnostics.
     stream : AidStream
         Measurements of the instrument, with their true sigmas.
     axis : str
@@ -61,11 +62,11 @@ def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Arr
     Returns
     -------
     time : (k,) array
-        Of the measurements up to the trial's last epoch [s].
+        Times of the measurements up to the trial's last epoch [s].
     error : (k,) array
         The diagnostic ``sigma_<axis>.<instrument>`` at the end of the step that holds the measurement, minus the true
-        sigma; NaN where either is not known. Both are empty where the instrument has no such component or the
-        estimator no such diagnostic.
+        sigma; NaN if one of them is not known. Both arrays are empty if the instrument has no such component or the
+        estimator has no such diagnostic.
     """
     estimate = trial.diagnostics.get(f"sigma_{axis}.{stream.name}")
     names = KINDS[stream.kind].errors

@@ -1,4 +1,4 @@
-"""Outages: how far an estimate has drifted when an instrument comes back, and how long it takes to recover."""
+"""Outages: the error of an estimate at the end of an outage, and the time until it recovers."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ _TOLERANCE = 0.5e-6  # s; times are multiples of the sample interval up to round
 
 @dataclass(frozen=True)
 class Outage:
-    """One outage, as one estimator came through it.
+    """One outage of a run, with the errors of one estimator.
 
     Attributes
     ----------
     instruments : tuple of str
-        Names of the instruments that were lost.
+        Names of the instruments without measurements.
     start, end : float
-        Times of the first measurement that was lost and of the first that came again [s]; ``end`` is infinite where
-        none came.
+        Times of the first missing measurement, and of the first measurement after the outage [s]; ``end`` is infinite
+        if there is none.
     end_error : float
         Horizontal error at the last epoch before ``end`` [m].
     threshold : float
-        That the horizontal error has to come under [m].
+        Horizontal error below which the estimate has recovered [m].
     recovery_time : float
-        From ``end`` to the first epoch under the threshold [s]; 0 where the error stayed under it. Where it does not
-        recover before the next outage of these instruments or the end of the run, the time until then. NaN where
-        no measurement came again.
+        Time from ``end`` to the first epoch below the threshold [s]; 0 if the error never exceeded it. If the estimate
+        does not recover before the next outage of these instruments or the end of the run, the time until then. NaN if
+        there is no measurement after the outage.
     recovered : bool
-        Whether the horizontal error came under the threshold again.
+        Whether the horizontal error fell below the threshold.
     """
 
     instruments: tuple[str, ...]
@@ -53,22 +53,23 @@ class Outage:
 
 
 def outages(error: Array, recording: Recording, *, threshold: float = RECOVERY_THRESHOLD) -> list[Outage]:
-    """How an estimator came through each outage of a run.
+    """The outages of a run with the errors of an estimator.
 
     Parameters
     ----------
     error : (T, 9) array
-        From `simnav.scoring.errors`.
+        Errors from `simnav.scoring.errors`.
     recording : Recording
-        An outage is a stretch of measurements that a fault of kind ``outage`` took away; those of several instruments
-        of one fault that overlap are one.
+        The recording of the trial. An outage is an interval in which a fault of kind ``outage`` removed all
+        measurements of an instrument. Overlapping intervals of several instruments of one fault are one outage.
     threshold : float
-        [m]; an estimator that was worse when the outage began has to come back to what it was then.
+        Horizontal error below which an estimate has recovered [m]. If the error at the beginning of the outage was
+        larger, that error is the threshold.
 
     Returns
     -------
     list of Outage
-        In order of time, as far as ``error`` reaches.
+        In order of time, up to the last epoch of ``error``.
     """
     time, h = recording.data.truth.time[: len(error)], horizontal(error)
     spans = sorted((start, end, f.instruments) for f in recording.faults for start, end in _gaps(f, recording))
@@ -88,7 +89,7 @@ def outages(error: Array, recording: Recording, *, threshold: float = RECOVERY_T
 
 
 def _gaps(fault: FaultLabel, recording: Recording) -> list[tuple[float, float]]:
-    """The stretches without measurements that an outage made: from the first that was lost to the first that came."""
+    """The intervals of an outage: from the first missing measurement to the first measurement after it."""
     if effect_of(fault.kind) != "missing":
         return []
     found: list[tuple[float, float]] = []
@@ -112,13 +113,13 @@ def _gaps(fault: FaultLabel, recording: Recording) -> list[tuple[float, float]]:
 
 
 def outage_scores(error: Array, recording: Recording, *, threshold: float = RECOVERY_THRESHOLD) -> dict[str, float]:
-    """Means over the outages of a run; NaN without outages or without a position. Recovery is of those that ended.
+    """Means over the outages of a run. Recovery is averaged over the outages that ended.
 
     Returns
     -------
     dict
         ``outage_end_error``, ``outage_end_error_max``, ``recovery_time`` and ``recovered``: keys of
-        `simnav.scoring.SCORES`.
+        `simnav.scoring.SCORES`. The values are NaN without outages or without a position.
     """
     scores = dict.fromkeys(("outage_end_error", "outage_end_error_max", "recovery_time", "recovered"), float("nan"))
     known = [o for o in outages(error, recording, threshold=threshold) if np.isfinite(o.end_error)]

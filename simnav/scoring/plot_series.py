@@ -1,4 +1,4 @@
-"""Thinned errors, tracks and diagnostics of a trial: what plots are made of."""
+"""Thinned errors, tracks and diagnostics of a trial, for plots."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ DIAGNOSTICS: tuple[str, ...] = ("innovation", "nis", "residual", "weight")
 
 
 def series(trial: Trial, recording: Recording, *, points: int = 500, bins: int = 100) -> dict[str, Array]:
-    """Errors over time, tracks and diagnostics of a trial, thinned; the last epoch is always in.
+    """Errors over time, tracks and diagnostics of a trial, thinned. The last epoch is always included.
 
     Parameters
     ----------
     trial : Trial
-        What the estimator gave.
+        The estimates with their diagnostics.
     recording : Recording
-        The one that it was run on.
+        The recording of the trial.
     points : int
         Largest number of epochs k.
     bins : int
-        Largest number b of equal parts of the run over which diagnostics are averaged: an instrument may deliver at
-        few epochs only, and those must not be missed.
+        Largest number b of equal parts of the run. Diagnostics are averaged over each part, because an instrument may
+        have measurements at few epochs only.
 
     Returns
     -------
@@ -46,9 +46,9 @@ def series(trial: Trial, recording: Recording, *, points: int = 500, bins: int =
         - ``estimate_north``, ``estimate_east``, ``estimate_down``, ``truth_north``, ``truth_east``, ``truth_down``:
           tracks relative to the true start [m]
         - ``quantiles`` (101,): 0th to 100th percentile of the horizontal error over all epochs [m]
-        - ``protection_level`` [m]: only where the estimator gives one of its own
+        - ``protection_level`` [m]: only if the estimator has this diagnostic
         - ``innovation.NAME`` (unit of the instrument), ``nis.NAME``, ``residual.NAME`` (sigma), ``weight.NAME``: all
-          (b,), of those instruments for which the estimator has them; ``diagnostics_time`` (b,): middle of the bins [s]
+          (b,), for the instruments for which the estimator has them; ``diagnostics_time`` (b,): middle of the bins [s]
     """
     error = errors(trial, recording)
     n = len(trial)
@@ -80,7 +80,7 @@ def series(trial: Trial, recording: Recording, *, points: int = 500, bins: int =
 
 
 def _diagnostics(trial: Trial, bins: int) -> dict[str, Array]:
-    """Means of the diagnostics of single instruments over equal numbers of epochs; NaN where there is none."""
+    """Means of the diagnostics of single instruments over equal numbers of epochs; NaN without a value."""
     kept = {
         name: np.asarray(values, dtype=np.float64)
         for name, values in trial.diagnostics.items()

@@ -1,6 +1,6 @@
-"""What a score is, and how scores become known: the decorator `register_score` and the entry points ``simnav.scores``.
+"""The registry of scores: the decorator `register_score` and the entry points ``simnav.scores``.
 
-A score is a function of a `ScoringInput`, beside its title, unit and direction::
+A score is a function of a `ScoringInput` with a title, a unit and a direction::
 
     from simnav import register_score
 
@@ -8,8 +8,8 @@ A score is a function of a `ScoringInput`, beside its title, unit and direction:
     def horizontal_p99(given):
         return np.nanquantile(given.horizontal, 0.99)
 
-The scores of simnav are made in the same way, in the modules of this package (`simnav.scoring.standard`). A file of
-a third party is loaded by ``simnav --plugin my_scores.py`` or `simnav.load_plugin`; a package names its module in the
+The scores of simnav are defined in the same way, in the modules of this package (`simnav.scoring.standard`). A file of
+a third party is loaded by ``simnav --plugin my_scores.py`` or `simnav.load_plugin`. A package names its module in the
 entry-point group ``simnav.scores``.
 """
 
@@ -33,19 +33,19 @@ T = TypeVar("T")
 
 
 class ScoringInput:
-    """What a score is computed from: a trial, its recording, and the errors that follow from both.
+    """The input of a score: a trial, its recording, and the errors.
 
     Parameters
     ----------
     trial : Trial
-        What the estimator gave.
+        Estimates, covariances, diagnostics, flags and times of the estimator.
     recording : Recording
-        The one that the trial was run on, with the truth (``recording.data.truth``) and the labels of its faults.
+        The recording of the trial, with the truth (``recording.data.truth``) and the labels of its faults.
 
     Attributes
     ----------
     error : (T, 9) array
-        As from `simnav.scoring.errors`; NaN at epochs without an estimate.
+        Errors of `simnav.scoring.errors`; NaN at epochs without an estimate.
 
     Raises
     ------
@@ -60,7 +60,7 @@ class ScoringInput:
 
     @cached_property
     def held_error(self) -> Array:
-        """As ``error``, (T, 9), but at an epoch without a position that of the last position that was given."""
+        """The (T, 9) ``error``; but at an epoch without a position, that of the last position before it."""
         return held_errors(self.trial, self.recording)
 
     @cached_property
@@ -70,11 +70,11 @@ class ScoringInput:
 
     @cached_property
     def smoothed_error(self) -> Array | None:
-        """Errors of the smoothed trajectory, (T, 9) like ``error``; None where the estimator does not smooth."""
+        """Errors of the smoothed trajectory, (T, 9) like ``error``; None if the estimator does not smooth."""
         return smoothed_errors(self.trial, self.recording)
 
     def shared(self, function: Callable[[ScoringInput], T]) -> T:
-        """What a function gives for this input; computed once, however many scores ask for it."""
+        """The result of a function of this input. It is computed once and shared by all scores."""
         if function not in self._shared:
             self._shared[function] = function(self)
         found: T = self._shared[function]
@@ -82,21 +82,21 @@ class ScoringInput:
 
 
 class Score:
-    """A score: a function with what tables say of it.
+    """A score: a function with its name, title, unit and direction.
 
     Attributes
     ----------
     name : str
-        In snake_case.
+        Name in snake_case; the key in results.
     title : str
         One line for tables.
     unit : str
-        SI, ``%`` or ``-``.
+        Unit of the values: SI, ``%`` or ``-``.
     better : str or None
-        ``lower``, ``higher``, or ``one`` and ``nominal`` where a value is best (1; 50 % or 95 %). None where a value is
-        neither good nor bad.
+        Which values are better: ``lower``, ``higher``, ``one`` (the nearer to 1) or ``nominal`` (the nearer to a
+        nominal value, 50 % or 95 %). None: a value is neither good nor bad.
     uses_covariance : bool
-        Whether it needs the covariance of every epoch; a trial that was kept with fewer does not change it.
+        Whether the score needs the covariance of every epoch. A kept trial with fewer covariances does not change it.
     """
 
     __qualname__: str
@@ -114,7 +114,7 @@ class Score:
         return self.function(given)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For another process."""
+        """Pickle the score for another process."""
         return Score, (self.function, self.name, self.title, self.unit, self.better, self.uses_covariance)
 
 
@@ -124,28 +124,28 @@ _REGISTRY: Registry[Score] = Registry("score", "simnav.scores", "simnav.scoring.
 def register_score(
     name: str, *, title: str, unit: str, better: Better | None = None, uses_covariance: bool = False
 ) -> Callable[[Callable[[ScoringInput], float]], Score]:
-    """Decorator: make a function known as a score.
+    """Register a function as a score (decorator).
 
     Parameters
     ----------
     name : str
-        In snake_case: the key in results.
+        Name in snake_case; the key in results.
     title : str
-        One line, without the unit.
+        One line for tables, without the unit.
     unit : str
-        SI, ``%`` or ``-``.
+        Unit of the values: SI, ``%`` or ``-``.
     better, uses_covariance
-        As for `Score`.
+        Direction, and need of all covariances; see `Score`.
 
     Returns
     -------
     callable
-        Takes a function of a `ScoringInput`, which gives a number, NaN where the score does not apply.
+        Decorator for a function of a `ScoringInput` that returns a number, or NaN if the score does not apply.
 
     Raises
     ------
     PluginError
-        If the name is not in snake_case or is taken, or the direction is unknown.
+        If the name is not in snake_case or another score has it, or if the direction is unknown.
     """
     for what, text in (("title", title), ("unit", unit)):
         if not isinstance(text, str) or not text.strip():
@@ -164,12 +164,12 @@ def register_score(
 
 
 def add(score: Score) -> None:
-    """Make a score known that was made in another process."""
+    """Register a score that was defined in another process."""
     _REGISTRY.add(score.name, score)
 
 
 class _Table(Mapping[str, Score]):
-    """All scores that are known, by name."""
+    """All registered scores, by name."""
 
     def __getitem__(self, name: str) -> Score:
         score = _REGISTRY.get(name)
@@ -184,5 +184,5 @@ class _Table(Mapping[str, Score]):
         return len(_REGISTRY.items())
 
 
-#: Every score, in the order in which tables show them: those of simnav, then others.
+#: Every registered score, in the order of tables: first the scores of simnav, then others.
 SCORES: Mapping[str, Score] = _Table()

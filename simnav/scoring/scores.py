@@ -20,7 +20,7 @@ __all__ = ["ScoreWarning", "score"]
 
 
 class ScoreWarning(RuntimeWarning):
-    """A score that could not be computed, and is NaN."""
+    """A score could not be computed and is NaN."""
 
 
 def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None) -> dict[str, float]:
@@ -29,16 +29,17 @@ def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None
     Parameters
     ----------
     trial : Trial
-        A failed trial is scored over its estimates so far; a ranking must consider its status.
+        The estimates. A failed trial is scored over its estimates before the failure; a ranking must consider its
+        status.
     recording : Recording
-        The one that it was run on.
+        The recording of the trial.
     names : iterable of str, optional
-        Keys of `SCORES`; default: all.
+        Names of scores, keys of `SCORES`; by default all.
 
     Returns
     -------
     dict of str to float
-        By name, in the order of `SCORES` or as asked; NaN where a score does not apply, never infinite.
+        Values by name, in the order of `SCORES` or of ``names``; NaN if a score does not apply, never infinite.
 
     Raises
     ------
@@ -50,7 +51,7 @@ def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None
     Warns
     -----
     ScoreWarning
-        Of a score that raises or is infinite: it is NaN, and the others stand.
+        If the function of a score raises or returns an infinite value. The score is then NaN; others are not affected.
     """
     given = _SharedInput(trial, recording)
     chosen = dict(SCORES) if names is None else {name: SCORES[name] for name in names}

@@ -1,8 +1,9 @@
 """The instruments of a vessel, their errors and their faults.
 
-Every aiding instrument has a specification (an `AidSpec`), every fault too (a `FaultSpec`); the IMU is an `ImuSpec`.
-``spec.datasheet(...)`` is what an estimator is told, ``spec.build(...)`` the instrument of one run, and ``sense``
-measures the truth block by block. Kinds of others are registered as ours are: `register_instrument`, `register_fault`.
+Every aiding instrument has a specification (an `AidSpec`), and so has every fault (a `FaultSpec`); the IMU has an
+`ImuSpec`. ``spec.datasheet(...)`` is the datasheet that an estimator receives, ``spec.build(...)`` makes the instrument
+of one run, and ``sense`` measures the truth block by block. Kinds of third parties are registered in the same way as
+those of simnav: `register_instrument`, `register_fault`.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ __all__ = [
 
 
 def instrument_specs() -> list[type[AidSpec]]:
-    """The specifications of all kinds of aiding instruments that are known."""
+    """The specifications of all registered kinds of aiding instruments."""
     return list(INSTRUMENTS.items().values())
 
 
@@ -56,5 +57,5 @@ def _specs() -> list[type[AidSpec | ImuSpec]]:
     return [*instrument_specs(), ImuSpec]
 
 
-#: Any instrument that is known, the IMU included; ``kind`` tells which.
+#: Any registered instrument, including the IMU; its ``kind`` decides the class.
 AnyInstrument = Annotated[AidSpec | ImuSpec, OneOf(_specs)]

@@ -20,9 +20,9 @@ HEADING_COMPONENT = (Component("heading", "deg", cyclic=True),)
 class MagneticCompass(AidSpec):
     """Heading of a magnetic compass, corrected for variation.
 
-    What hard and soft iron leave is a deviation of one cycle, B sin(heading) + C cos(heading) (Bowditch, *The American
-    Practical Navigator*, 2019, chapter 8: the semicircular coefficients); B and C are drawn with ``deviation``, on top
-    of ``fixed_deviation`` = (B, C). The constant coefficient A is the bias.
+    The remaining deviation by hard iron is B sin(heading) + C cos(heading), with the semicircular coefficients B and C
+    (Bowditch, *The American Practical Navigator*, 2019, chapter 8). B and C are drawn with the standard deviation
+    ``deviation``, and ``fixed_deviation`` = (B, C) is added. The constant coefficient A is the bias.
     """
 
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "deviation")
@@ -54,9 +54,10 @@ class _MagneticCompass(CompiledInstrument):
 class Gyrocompass(AidSpec):
     """Heading of a gyrocompass.
 
-    With ``speed_error`` it is not corrected for the vessel's own motion: it settles where its axis lies along the
-    horizontal part of Earth and transport rate, and reads too much by atan2(v_N / (R_M + h), omega cos(latitude) +
-    v_E / (R_N + h)) (Bowditch 2019, chapter 8: the speed, or steaming, error).
+    With ``speed_error`` the reading is not corrected for the motion of the vessel: the axis of the compass settles
+    along the horizontal component of Earth rate plus transport rate, so the heading is too large by atan2(v_N / (R_M +
+    h), omega cos(latitude) + v_E / (R_N + h)), with the velocity north v_N and east v_E, the radii of curvature R_M and
+    R_N, the height h and the Earth rate omega (Bowditch 2019, chapter 8: the speed, or steaming, error).
     """
 
     kind: Literal["gyrocompass"] = "gyrocompass"

@@ -1,4 +1,4 @@
-"""Depth sensor: depth below the mean sea surface, which is the WGS-84 ellipsoid here."""
+"""Depth sensor: depth below the mean sea surface, which is the WGS-84 ellipsoid in simnav."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Doppler velocity log: velocity over the ground in body axes, while it has the bottom."""
+"""Doppler velocity log: velocity over the ground in body axes, while it has bottom lock."""
 
 from __future__ import annotations
 
@@ -45,12 +45,15 @@ __all__ = ["Dvl"]
 class Dvl(AidSpec):
     """Velocity of the transducer over the ground, along axes that are the body axes up to the misalignment::
 
-        value = (1 + k) R(eta)' (C' v + omega x l)
+        u = C' v + omega x l
+        value = (1 + k) R(eta)' u
 
-    k the scale-factor error; eta the rotation vector by which the instrument's axes are turned from the body axes, so
-    that to first order R(eta)' u = u - eta x u. The white noise of a ping has the variance sigma^2 + (speed_noise
-    |u|)^2; the datasheet gives sigma. The bottom is in reach while the transducer's altitude is between
-    ``minimum_altitude`` and ``maximum_altitude``; without a water depth it always is.
+    v is the velocity of the vessel north-east-down, C the direction cosine matrix from body axes to north-east-down,
+    omega the angular rate of the body relative to the Earth, l the lever arm and k the scale-factor error. The
+    instrument's axes are turned from the body axes by the rotation vector eta, with the rotation matrix R(eta); to
+    first order R(eta)' u = u - eta x u. The white noise of a ping has the variance sigma^2 + (speed_noise |u|)^2; the
+    datasheet gives sigma. The DVL has bottom lock while the altitude of the transducer is between ``minimum_altitude``
+    and ``maximum_altitude``; without a water depth it always has.
     """
 
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "speed_noise")

@@ -27,8 +27,8 @@ __all__ = ["GnssPosition", "GnssVelocity"]
 class GnssPosition(AidSpec):
     """Position of the antenna; errors by axis, north-east-down [m].
 
-    ``bias_instability`` with its ``correlation_time`` is what orbit, clock, ionosphere and mild multipath leave: the
-    slow part of the error of a single receiver.
+    ``bias_instability`` and ``correlation_time`` describe the slow part of the error of a single receiver: the residual
+    errors of orbit, clock and ionosphere, and mild multipath.
 
     Examples
     --------
@@ -64,7 +64,11 @@ class _Position(CompiledInstrument):
     example={"rate_hz": 2.0, "sigma_m_s": [0.1, 0.1, 0.1]},
 )
 class GnssVelocity(AidSpec):
-    """Velocity of the antenna over the ground, C (v + omega x l); errors by axis, north-east-down [m/s]."""
+    """Velocity of the antenna over the ground, v + C (omega x l); errors by axis, north-east-down [m/s].
+
+    v is the velocity of the vessel north-east-down, C the direction cosine matrix from body axes to north-east-down,
+    omega the angular rate of the body relative to the Earth and l the lever arm, both in body axes.
+    """
 
     kind: Literal["gnss_velocity"] = "gnss_velocity"
     sigma: SigmaTriple = quantity("m_s")

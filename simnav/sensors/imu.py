@@ -4,12 +4,14 @@ The model of a triad (Groves 2013, section 4.4), on means over the sample interv
 
     y = (I + S + M) x + b + g + r + w / sqrt(dt)
 
-S scale factors, M non-orthogonality (six small angles), b turn-on bias, g first-order Gauss-Markov bias (in-run
-instability), r rate random walk, w white noise (angle or velocity random walk). The output then saturates at the range,
-and its increment y dt is quantized with the residual carried over.
+y is the output, x the true angular rate or specific force, S the scale-factor errors, M the non-orthogonality (six
+small angles), b the turn-on bias, g the in-run bias (first-order Gauss-Markov), r the rate random walk, and w white
+noise (angle or velocity random walk). Then the output saturates at the range, and its increment y dt is quantized; the
+quantization residual is added to the next increment.
 
-Each process has its own random stream, and one that is zero draws nothing. g and r step on a grid of at most T/100 (or
-1 s) and are held between (`HeldGaussMarkov`), since they change far more slowly than an IMU samples.
+Each process has its own random stream; a process with sigma zero draws nothing. g and r change on a grid of at most
+T/100 (or 1 s), with the correlation time T, and are constant between the grid points (`HeldGaussMarkov`), because they
+change much more slowly than the sample rate.
 """
 
 from __future__ import annotations
@@ -30,17 +32,17 @@ from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
 __all__ = ["AccelerometerSpec", "GyroscopeSpec", "Imu", "ImuSpec", "TriadSpec", "triad_errors"]
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
-#: What is wrong with a triad: fields of these names, and of these with ``fixed_`` before.
+#: The error fields of a triad; each name also exists with the prefix ``fixed_``.
 _ERRORS = ("bias", "bias_instability", "random_walk", "rate_random_walk", "scale", "misalignment", "quantization")
-# Samples a chunk: the noise is used while it is in the cache.
+# Number of samples in a chunk: so the noise is used while it is in the processor's cache.
 _CHUNK = 4096
 
 
 class TriadSpec(Spec):
-    """What gyroscopes and accelerometers have in common; all figures are one sigma, equal on the three axes.
+    """The common fields of gyroscopes and accelerometers; all figures are one sigma, equal on the three axes.
 
-    ``fixed_bias`` and ``fixed_scale`` are realised values, by axis, that come on top of the drawn ones and that no
-    estimator is told.
+    ``fixed_bias`` and ``fixed_scale`` are constant errors, by axis, which are added to the drawn ones. Estimators do
+    not receive them.
     """
 
     bias: float
@@ -73,7 +75,7 @@ class TriadSpec(Spec):
         return self
 
     def datasheet(self) -> TriadDatasheet:
-        """What an estimator is told."""
+        """The datasheet that an estimator receives."""
         return TriadDatasheet(
             self.bias,
             self.bias_instability,
@@ -87,7 +89,7 @@ class TriadSpec(Spec):
         )
 
     def ideal(self) -> Self:
-        """The triad without its errors."""
+        """The same triad without errors."""
         changes: dict[str, object] = {"range": inf}
         for name in type(self).model_fields:
             if name.removeprefix("fixed_") in _ERRORS:
@@ -97,7 +99,7 @@ class TriadSpec(Spec):
 
 
 class GyroscopeSpec(TriadSpec):
-    """Three gyroscopes; rad/s in memory. An infinite correlation time makes bias_instability deg/h per sqrt(s)."""
+    """Three gyroscopes; rad/s in memory. With infinite correlation time, bias_instability is in deg/h per sqrt(s)."""
 
     bias: NonNegative = quantity("deg_h", 0.0)
     bias_instability: NonNegative = quantity("deg_h", 0.0)
@@ -109,7 +111,7 @@ class GyroscopeSpec(TriadSpec):
 
 
 class AccelerometerSpec(TriadSpec):
-    """Three accelerometers; m/s^2 in memory. An infinite correlation time makes bias_instability ug per sqrt(s)."""
+    """Three accelerometers; m/s^2 in memory. With infinite correlation time, bias_instability is in ug per sqrt(s)."""
 
     bias: NonNegative = quantity("ug", 0.0)
     bias_instability: NonNegative = quantity("ug", 0.0)
@@ -136,23 +138,23 @@ class ImuSpec(Spec):
     accelerometer: AccelerometerSpec = AccelerometerSpec()
 
     def datasheet(self) -> ImuDatasheet:
-        """What an estimator is told."""
+        """The datasheet that an estimator receives."""
         return ImuDatasheet(self.rate, self.gyroscope.datasheet(), self.accelerometer.datasheet())
 
     def actual(self) -> ImuSpec:
-        """The instrument as it really is, where its datasheet is wrong."""
+        """The instrument with its true figures: those of the datasheet times ``times_datasheet``."""
         triads = {"gyroscope": times_datasheet(self.gyroscope), "accelerometer": times_datasheet(self.accelerometer)}
         if triads["gyroscope"] is self.gyroscope and triads["accelerometer"] is self.accelerometer:
             return self
         return self.model_copy(update=triads)
 
     def ideal(self) -> ImuSpec:
-        """The instrument without its errors."""
+        """The same instrument without errors."""
         triads = {"gyroscope": self.gyroscope.ideal(), "accelerometer": self.accelerometer.ideal()}
         return self.model_copy(update=triads)
 
     def build(self, seed: int) -> Imu:
-        """The instrument of one run.
+        """Make the instrument of one run.
 
         Parameters
         ----------
@@ -162,11 +164,11 @@ class ImuSpec(Spec):
         return Imu(self, seed)
 
 
-#: A bias that is held between the samples of a table (k, 3): the table, the number of its first sample, and how many
-#: samples there are in a second.
+#: A bias that is constant between the rows of a (k, 3) table: the table, the number of its first row, and the number of
+#: rows in a second.
 Held: TypeAlias = tuple[Array, int, float]
-#: Of a triad: matrix of the scale factors and misalignments with the identity (3, 3), turn-on bias (3,), density of the
-#: white noise per sqrt(s), range, and least increment of the quantization, 0 for none.
+#: The numbers of a triad: matrix I + S + M (3, 3), turn-on bias (3,), density of the white noise, range, and
+#: quantization step of the increment (0: none).
 Triad: TypeAlias = tuple[Array, Array, float, float, float]
 
 _HELD = "Tuple((f8[:, ::1], i8, f8))"
@@ -180,22 +182,22 @@ def triad_errors(
     ideal: Array, variates: Array, out: Array, time: Array, interval: Array, triad: Triad, in_run: Held, walk: Held,
     residual: Array,
 ) -> None:  # fmt: skip
-    """Errors of one triad (see the module).
+    """Add the errors of one triad (see the module).
 
     Parameters
     ----------
     ideal, variates : (n, 3) arrays
-        What an ideal triad delivers [rad/s or m/s^2]; unit variates of the white noise.
+        Samples of an ideal triad [rad/s or m/s^2]; unit variates of the white noise.
     out : (n, 3) array
-        Overwritten; it may be ``ideal``.
+        Samples with errors, overwritten; it may be the same array as ``ideal``.
     time, interval : (n,) arrays
         Ends of the sample intervals, and their lengths [s].
     triad : tuple
-        See `Triad`.
+        Error parameters of the triad, see `Triad`.
     in_run, walk : tuple
-        In-run bias and random walk of the rate, see `Held`.
+        In-run bias g and rate random walk r, see `Held`.
     residual : (3,) array
-        What quantization has left over so far; updated.
+        Quantization residual of the increments so far; updated.
     """
     matrix, bias, density, limit, step = triad
     instability, first_i, per_second_i = in_run
@@ -219,7 +221,7 @@ def triad_errors(
 
 
 class _Still:
-    """A bias process that is not there."""
+    """A bias process that is always zero."""
 
     per_second = 0.0
     _table = np.zeros((1, 3))
@@ -257,7 +259,7 @@ class _Triad:
         self._variates = np.zeros((_CHUNK, 3))
 
     def ahead(self, variates: Array, until: float) -> tuple[Array, int, Array, int]:
-        """What `sense` takes: (n, 3) variates, filled in; both tables of biases, and their first grid points."""
+        """Fill the (n, 3) variates of `sense`; return both bias tables, each with the number of its first row."""
         if self.density > 0.0:
             self._rng.standard_normal(out=variates)
         return *self.instability.table(until), *self.walk.table(until)
@@ -280,7 +282,7 @@ class _Triad:
 
 
 class Imu:
-    """An IMU in one run: the errors are drawn, and go on from block to block.
+    """An IMU in one run. Its errors are drawn at the start and continue from block to block.
 
     Parameters
     ----------
@@ -301,15 +303,15 @@ class Imu:
         Parameters
         ----------
         ideal : ImuSamples
-            Means over each interval.
+            Ideal samples: means over each interval.
         overwrite : bool
-            Put the result into the arrays of ``ideal``, where they can be written: saves the time that fresh memory
-            takes, which on a long run is as long as the errors take.
+            True: store the result in the arrays of ``ideal``, if they are writable. On a long run the allocation of new
+            memory takes as long as the computation of the errors.
 
         Returns
         -------
         ImuSamples
-            On the same times.
+            Samples with errors at the same times.
         """
         if len(ideal) == 0:
             return ideal

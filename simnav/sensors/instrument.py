@@ -1,15 +1,17 @@
-"""What all aiding instruments share: their specification, realised errors and labels.
+"""The common part of all aiding instruments: specification, errors of a run, and labels.
 
 The model of a measurement is ::
 
     value = observe(truth) + b + g + w
 
-with ``observe`` the instrument's geometry and deterministic errors, b a turn-on bias that is constant in a run, g a
-first-order Gauss-Markov bias and w white noise; the errors of a position are in metres. Turn-on values are drawn at the
-start of a run from the datasheet's one-sigma figures; ``fixed_*`` are realised values that come on top and that no
-estimator is told. Every process has its own random stream and draws at every sample, delivered or not.
+``observe`` is the geometry of the instrument with its deterministic errors, b the turn-on bias, which is constant in a
+run, g the in-run bias, a first-order Gauss-Markov process, and w white noise. Errors of a position are in metres. The
+turn-on values are drawn at the start of a run from the datasheet's one-sigma figures. ``fixed_*`` are constant errors
+that are added; estimators do not receive them. Every process has its own random stream and draws at every sample,
+delivered or not.
 
-`register_instrument` makes a kind of instrument known, ours and others' alike (``docs/how-to/add-an-instrument.md``).
+`register_instrument` registers a kind of instrument, of simnav or of a third party
+(``docs/how-to/add-an-instrument.md``).
 """
 
 from __future__ import annotations
@@ -62,16 +64,16 @@ __all__ = [
 
 T = TypeVar("T", bound=Spec)
 
-#: What the names of an environment's observation, and of the parts of a log's reference, stand for.
+#: Names with another meaning, which no instrument may have: parts of an environment's observation and of a reference.
 _RESERVED = ("imu", "interval", "position", "velocity", "attitude")
-#: Figures that a specification may have for each component by itself.
+#: Figures for which a specification may have a separate field for each component.
 _BY_COMPONENT = ("sigma", "bias", "bias_instability", "fixed_bias")
 #: Default of a vector.
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class InstrumentError(SpecError):
-    """An instrument that cannot be built or read; the message names it, its file, and what would be right."""
+    """An instrument cannot be built or read. The message names it, its file, and what would be right."""
 
 
 def _label(name: str, kind: str, cls: type) -> str:
@@ -80,7 +82,7 @@ def _label(name: str, kind: str, cls: type) -> str:
 
 
 def _raised(label: str, cls: type, error: Exception) -> InstrumentError:
-    """The error that an exception in the code of an instrument becomes."""
+    """The error for an exception in the code of an instrument."""
     return InstrumentError(f"{label}: {exception_of(cls, error)}")
 
 
@@ -88,7 +90,7 @@ def _spread(n: int) -> BeforeValidator:
     return BeforeValidator(lambda x: (x,) * n if isinstance(x, (int, float)) and not isinstance(x, bool) else x)
 
 
-#: Two or three numbers by axis; TOML may give one for all axes. One-sigma figures are not negative.
+#: Two or three numbers, one for each axis; TOML may have one number for all axes. One-sigma figures are not negative.
 Pair = Annotated[tuple[float, float], _spread(2)]
 Triple = Annotated[Vector, _spread(3)]
 SigmaPair = Annotated[tuple[NonNegative, NonNegative], _spread(2)]
@@ -96,21 +98,22 @@ SigmaTriple = Annotated[tuple[NonNegative, NonNegative, NonNegative], _spread(3)
 
 
 def turn_to_ned(attitude: Array, vector: Array) -> Array:
-    """C v, body axes to north-east-down, for n attitudes.
+    """Turn vectors from body axes to north-east-down, C v, for n attitudes.
 
-    Three turns about one axis each: cheaper than a matrix for one vector, and each row by itself, where a matrix
-    product may round differently with the number of rows.
+    The rotation is computed as three rotations about one axis each. This is faster than a matrix for one vector, and
+    the result of a row does not depend on the number of rows, as it may with a matrix product.
 
     Parameters
     ----------
     attitude : (n, 3) array
         Roll, pitch, yaw [rad].
     vector : (n, 3) or (3,) array
-        Vectors on body axes (forward, starboard, down); one for all attitudes, or one each.
+        Vectors in body axes (forward, starboard, down): one for all attitudes, or one for each.
 
     Returns
     -------
     (n, 3) array
+        The vectors north-east-down.
     """
     (sr, sp, sy), (cr, cp, cy) = np.sin(attitude).T, np.cos(attitude).T
     x, y, z = vector.T
@@ -122,7 +125,7 @@ def turn_to_ned(attitude: Array, vector: Array) -> Array:
 
 
 def turn_to_body(attitude: Array, vector: Array) -> Array:
-    """C' v, north-east-down to body axes: the inverse of `turn_to_ned`."""
+    """Turn vectors from north-east-down to body axes, C' v: the inverse of `turn_to_ned`."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(attitude).T, np.cos(attitude).T
     x, y, z = vector.T
     x, y = cy * x + sy * y, cy * y - sy * x
@@ -133,13 +136,13 @@ def turn_to_body(attitude: Array, vector: Array) -> Array:
 
 
 def figures_of(cls: type[Spec], errors: Sequence[str]) -> list[str]:
-    """The fields of a specification that a datasheet can be wrong about."""
+    """The fields of a specification whose datasheet value may be wrong (``times_datasheet``)."""
     stems = tuple(errors)
     return [n for n in cls.model_fields if n in stems or any(n.startswith(f"{stem}_") for stem in stems)]
 
 
 def times_datasheet(spec: T) -> T:
-    """A specification with its figures multiplied by its ``times_datasheet``; itself where there is none."""
+    """A specification with its figures multiplied by its ``times_datasheet``; the same object without them."""
     factors: Mapping[str, float] = getattr(spec, "times_datasheet", {})
     if not factors:
         return spec
@@ -151,22 +154,22 @@ def times_datasheet(spec: T) -> T:
 
 
 class AidSpec(Spec):
-    """Base of the specifications of aiding instruments.
+    """Base class of the specifications of aiding instruments.
 
     Subclasses declare ``sigma`` and, as far as they apply, ``bias``, ``bias_instability``, ``scale``,
-    ``misalignment``, ``lever_arm`` and their ``fixed_`` forms, each with its unit. Where the components of a
-    measurement differ in their unit, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
+    ``misalignment``, ``lever_arm`` and their ``fixed_`` forms, each with its unit. If the components of a
+    measurement have different units, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
 
     Attributes
     ----------
     definition : Kind
-        What the instrument measures; set by `register_instrument`.
+        Properties of the kind; set by `register_instrument`.
     example : mapping
-        A table of a scenario file with an instrument of this kind; likewise.
+        A table of a scenario file with an instrument of this kind; set by `register_instrument`.
     errors : tuple of str
-        Fields that make a measurement wrong (with ``fixed_`` before them, too); zero for an ideal instrument.
+        Names of the error fields; each may also exist with the prefix ``fixed_``. All are zero for an ideal instrument.
     unstated : tuple of str
-        Those of them whose one-sigma figure is in no datasheet. Only the oracles know it, see
+        The error fields whose one-sigma figure is in no datasheet. Only the oracles know it, see
         `simnav.scenario.Scenario.actual_sheet`.
     """
 
@@ -190,7 +193,7 @@ class AidSpec(Spec):
         return self
 
     def figure(self, name: str) -> Any:
-        """A figure of this instrument, by component where each has its own; 0 where its kind has no such error."""
+        """A figure of this instrument, for each component if they have own fields; 0 if the kind has no such error."""
         if name in type(self).model_fields:
             return getattr(self, name)
         if name not in _BY_COMPONENT:
@@ -199,7 +202,7 @@ class AidSpec(Spec):
         return by_component if any(by_component) else 0.0
 
     def ideal(self) -> Self:
-        """The instrument without its errors."""
+        """The same instrument without errors."""
         names = {
             f"{name}{suffix}" for name in self.errors for suffix in ("", *(f"_{e}" for e in self.definition.errors))
         }
@@ -219,11 +222,11 @@ class AidSpec(Spec):
         return self
 
     def actual(self) -> Self:
-        """The instrument as it really is, where its datasheet is wrong."""
+        """The instrument with its true figures: those of the datasheet times ``times_datasheet``."""
         return times_datasheet(self)
 
     def datasheet(self, name: str) -> Datasheet:
-        """What an estimator is told.
+        """The datasheet that an estimator receives.
 
         Parameters
         ----------
@@ -246,16 +249,16 @@ class AidSpec(Spec):
         )
 
     def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
-        """The instrument of one run.
+        """Make the instrument of one run.
 
         Parameters
         ----------
         name : str
-            Name of the instrument in its scenario; it names the random streams.
+            Name of the instrument in its scenario; its random streams are named after it.
         seed : int
             Seed of the run.
         water_depth : float, optional
-            Below the mean sea surface [m], for instruments that need the bottom.
+            Depth of the bottom below the mean sea surface [m], for instruments that need it.
         """
         raise NotImplementedError(f"{type(self).__qualname__} has no build()")
 
@@ -264,12 +267,12 @@ S = TypeVar("S", bound=AidSpec)
 
 
 def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[type[S]], type[S]]:
-    """Class decorator: make a kind of instrument known, by the default of the field ``kind`` of its specification.
+    """Register a kind of instrument (class decorator). Its name is the default of the field ``kind``.
 
     Parameters
     ----------
     kind : Kind
-        What it measures.
+        Properties of the kind: components, role, measurement equation.
     example : mapping
         A table of a scenario file, without ``kind``, with a typical instrument of this kind. The contract test of
         estimators (`simnav.check`) puts it on a vessel that sails from 54.0 N, 7.9 E.
@@ -277,7 +280,8 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
     Raises
     ------
     PluginError
-        If the class is no `AidSpec`, does not fit its kind, its name is taken, or the example is not valid.
+        If the class is not a subclass of `AidSpec` or does not fit its kind, if another class has its name, or if the
+        example is not valid.
 
     Examples
     --------
@@ -332,7 +336,7 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
 
 
 def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
-    """``build`` of a specification, whose errors name the instrument."""
+    """Wrap ``build`` of a specification, so that its errors name the instrument."""
 
     @wraps(build)
     def named(self: AidSpec, name: str, seed: int, **rest: Any) -> Instrument:
@@ -351,29 +355,29 @@ def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
 
 
 class Instrument(ABC):
-    """An aiding instrument in one run: its errors are drawn, and go on from block to block.
+    """An aiding instrument in one run. Its errors are drawn at the start and continue from block to block.
 
     Parameters
     ----------
     spec : AidSpec
         Rate, mounting and error parameters, from the scenario.
     name : str
-        Name of the instrument in the scenario; it names the random streams.
+        Name of the instrument in the scenario; its random streams are named after it.
     seed : int
         Seed of the run.
 
     Attributes
     ----------
     definition : Kind
-        What its kind measures.
+        Properties of its kind.
     sigma, bias : (d,) array
-        White noise, and the bias of this run.
+        Standard deviation of the white noise, and turn-on bias of this run.
     scale : float
         Scale-factor error of this run [-].
     lever_arm : (3,) array
-        Position of the instrument on body axes (forward, starboard, down) [m].
+        Vector from the IMU to the instrument in body axes (forward, starboard, down) [m].
     levered : bool
-        Whether the lever arm is not zero.
+        True if the lever arm is not zero.
     """
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
@@ -392,25 +396,25 @@ class Instrument(ABC):
         self.levered = bool(self.lever_arm.any())
 
     def drawn(self, process: str, sigma: Array) -> Array:
-        """Values of this run, drawn with one-sigma figures from a random stream that is named after the process."""
+        """Draw the values of this run from a random stream that is named after the process; ``sigma`` is one sigma."""
         if not sigma.any():
             return np.zeros(len(sigma))
         return sigma * stream(self._seed, "instrument", self.name, process).standard_normal(len(sigma))
 
     @abstractmethod
     def observe(self, tap: TapStates) -> Array:
-        """The (n, d) values before bias and noise."""
+        """The (n, d) values without bias and noise."""
 
     def noise_sigma(self, observed: Array) -> Array:
         """The (n, d) standard deviation of the white noise of each measurement."""
         return self.sigma[None].repeat(len(observed), axis=0)
 
     def available(self, tap: TapStates) -> NDArray[np.bool_] | None:
-        """Which of the n samples are delivered; None for all."""
+        """An (n,) mask of the samples that are delivered; None: all."""
         return None
 
     def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-        """`observe`, `noise_sigma` and `available` in one."""
+        """The results of `observe`, `noise_sigma` and `available`."""
         value = _checked_rows(self, "observe()", self.observe(tap), tap)
         return value, self.noise_sigma(value), self.available(tap)
 
@@ -428,19 +432,19 @@ class Instrument(ABC):
         return velocity
 
     def ahead(self, time: Array) -> tuple[Array, Array]:
-        """What `sense` draws for the next n samples, whose times are enough for that.
+        """Draw the random numbers of `sense` for the next n samples. They depend on the times only.
 
         Parameters
         ----------
         time : (n,) array
-            Sample times [s].
+            Sample times [s], delivered or not.
 
         Returns
         -------
         error : (n, d) array
-            Biases.
+            Sum of turn-on bias and in-run bias of each sample.
         variates : (n, d) array
-            White noise of sigma 1; zero where there is none.
+            White noise of unit variance; zero if the instrument has no noise.
         """
         error = self.bias[None].repeat(len(time), axis=0)
         if self._instability is not None:
@@ -459,7 +463,7 @@ class Instrument(ABC):
         Returns
         -------
         AidStream
-            Without faults; ``dropped`` holds the times at which the instrument delivers nothing.
+            The measurements without faults. ``dropped`` holds the times without a measurement.
 
         Raises
         ------
@@ -482,7 +486,7 @@ class Instrument(ABC):
 
 
 def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-    """The reading; what is wrong with it is an error of the instrument, not of the estimator that would get it."""
+    """The checked reading. A mistake in it is an error of the instrument, not of the estimator that receives it."""
     label = partial(_label, instrument.name, instrument.kind, type(instrument))
     try:
         value, sigma, there = instrument.reading(tap)
@@ -515,7 +519,7 @@ def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Arr
 
 
 def _checked_rows(instrument: Instrument, method: str, array: Array, tap: TapStates) -> Array:
-    """What a method returned, if it has a row for each time and a column for each component."""
+    """The result of a method, after a check that it has a row for each time and a column for each component."""
     array = np.asarray(array, dtype=np.float64)
     components = instrument.definition.values
     shape = (len(tap.time), len(components))

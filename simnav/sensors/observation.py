@@ -1,7 +1,7 @@
-"""What the instruments that come with simnav read before bias and noise, as one kernel.
+"""The readings of the instruments of simnav without bias and noise, as one kernel.
 
-The block form (`Instrument.sense`) and the form that goes step by step (`simnav.simulation.steps`) call the same code,
-so that they agree bit for bit.
+The block form (`Instrument.sense`) and the stepwise form (`simnav.simulation.steps`) call the same code, so that they
+agree bit for bit.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ __all__ = [
     "observe_rows",
 ]
 
-#: What is observed.
+#: Codes of the observed quantities.
 POSITION, HORIZONTAL_POSITION, VELOCITY, BODY_VELOCITY, WATER_SPEED, COMPASS, GYROCOMPASS, DEPTH = range(8)
 
-#: What an instrument is, as numbers: scale-factor error; lever arm and whether there is one; nine numbers of its own (a
-#: DVL's matrix; a compass's coefficients of deviation and whether it deviates; whether a gyrocompass has its speed
-#: error); water depth (NaN: unknown) and the altitudes within which it has the bottom; sigma of the white noise, and
-#: its square, by component; square of the noise in proportion to the speed.
+#: The parameters of an instrument as an array of numbers: scale-factor error; lever arm, and 1 if it is not zero; nine
+#: numbers that depend on the kind (for a DVL its matrix; for a compass the coefficients of deviation, and 1 if they are
+#: not zero; for a gyrocompass 1 if it has a speed error); water depth (NaN: unknown), and smallest and largest altitude
+#: with bottom lock; sigma of the white noise, and its square, by component; square of the speed-dependent noise.
 SCALE, LEVER, LEVERED, OWN, DEPTH_OF_WATER, LOWEST, HIGHEST = 0, 1, 4, 5, 14, 15, 16
 SIGMA, SIGMA_SQUARED, SPEED_NOISE_SQUARED = 17, 20, 23
 NUMBERS = 24
@@ -47,7 +47,7 @@ NUMBERS = 24
 
 @kernel()
 def _to_ned(roll: float, pitch: float, yaw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """`simnav.sensors.instrument.turn_to_ned` for one vector."""
+    """Turn one vector from body axes to north-east-down, as `simnav.sensors.instrument.turn_to_ned`."""
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
     y, z = cr * y - sr * z, sr * y + cr * z
     x, z = cp * x + sp * z, cp * z - sp * x
@@ -56,7 +56,7 @@ def _to_ned(roll: float, pitch: float, yaw: float, x: float, y: float, z: float)
 
 @kernel()
 def _to_body(roll: float, pitch: float, yaw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """`simnav.sensors.instrument.turn_to_body` for one vector."""
+    """Turn one vector from north-east-down to body axes, as `simnav.sensors.instrument.turn_to_body`."""
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
     x, y = cy * x + sy * y, cy * y - sy * x
     x, z = cp * x - sp * z, sp * x + cp * z
@@ -65,23 +65,24 @@ def _to_body(roll: float, pitch: float, yaw: float, x: float, y: float, z: float
 
 @kernel()
 def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
-    """One reading without bias and noise.
+    """Compute one reading without bias and noise.
 
     Parameters
     ----------
     code : int
-        What is observed.
+        Code of the observed quantity (the constants of this module).
     q : (24,) array
-        The instrument (`NUMBERS`).
+        Parameters of the instrument, in the order of `NUMBERS`.
     tap : (15,) array
-        Position, velocity, roll, pitch and yaw, angular rate, velocity of the water.
+        True state: position (latitude, longitude [rad], height [m]), velocity north-east-down [m/s], roll, pitch and
+        yaw [rad], angular rate in body axes [rad/s], velocity of the water north-east-down [m/s].
     value : (d,) array
-        Overwritten.
+        The reading, overwritten.
 
     Returns
     -------
     bool
-        Whether the instrument delivers anything there.
+        True if the instrument delivers a measurement at this state.
     """
     levered = q[LEVERED] > 0.0
     n, e, d = 0.0, 0.0, 0.0
@@ -144,7 +145,7 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
 
 @kernel()
 def noise_scalar(q: Array, value: Array, j: int) -> float:
-    """Sigma of the white noise of a reading's j-th component, from the reading before bias and noise."""
+    """Standard deviation of the white noise of component j of a reading, from the reading without bias and noise."""
     if q[SPEED_NOISE_SQUARED] == 0.0:
         sigma: float = q[SIGMA + j]
         return sigma
@@ -154,7 +155,10 @@ def noise_scalar(q: Array, value: Array, j: int) -> float:
 
 @kernel("void(i8, f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[::1])")
 def observe_rows(code: int, q: Array, taps: Array, values: Array, sigmas: Array, there: Flags) -> None:
-    """`observe_one` and `noise_scalar` for n readings; the (n, d) values and sigmas and (n,) there are overwritten."""
+    """Compute n readings by `observe_one` and `noise_scalar`.
+
+    Overwritten are the (n, d) ``values``, the (n, d) ``sigmas``, and the (n,) mask ``there`` of delivered readings.
+    """
     for i in range(taps.shape[0]):
         there[i] = observe_one(code, q, taps[i], values[i])
         for j in range(values.shape[1]):
@@ -167,9 +171,9 @@ class CompiledInstrument(Instrument):
     Attributes
     ----------
     code : int
-        What it observes.
+        Code of the observed quantity.
     numbers : (24,) array
-        What it is (`NUMBERS`).
+        Parameters of the instrument, in the order of `NUMBERS`.
     """
 
     code: ClassVar[int]

@@ -1,8 +1,8 @@
-"""The error processes that instruments share: Gauss-Markov, random walk, quantization.
+"""The error processes of instruments: Gauss-Markov, random walk, quantization.
 
-Every process is a state machine: it is handed the times of successive blocks and gives the same numbers, bit for bit,
-wherever the blocks are cut. Times may be irregular. Each owns its generator (`simnav.streams.stream`) and draws a fixed
-number of variates per sample.
+Every process is a state machine. It receives the times of successive blocks and gives the same numbers, bit for bit,
+for any division into blocks. Times may be irregular. Each process has its own generator (`simnav.streams.stream`) and
+draws a fixed number of variates for each sample.
 
 Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., Artech
 House 2013, sections 4.4 and 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, MIT Press 1974, section 3.6.
@@ -22,7 +22,7 @@ __all__ = ["GaussMarkov", "HeldGaussMarkov", "quantize_scalar", "ready"]
 
 @kernel()
 def quantize_scalar(increment: float, step: float, residual: float) -> tuple[float, float]:
-    """Nearest multiple of ``step`` to increment + residual, and what is left for the next sample."""
+    """The multiple of ``step`` nearest to increment + residual, and the new residual for the next sample."""
     total = increment + residual
     output = step * floor(total / step + 0.5)
     return output, total - output
@@ -32,9 +32,10 @@ def quantize_scalar(increment: float, step: float, residual: float) -> tuple[flo
 def _gauss_markov(
     variates: Array, state: Array, sigma: Array, time: Array, previous: float, correlation_time: float
 ) -> bool:
-    """Turn unit variates (n, d) into the process, in place; false where time runs backwards.
+    """Convert (n, d) unit variates w into the process x, in place. Return False if the times are not ascending.
 
-    x_k = a x_{k-1} + b sigma w_k, a = exp(-dt/T), b = sqrt(1 - a^2); for infinite T: a = 1, b = sqrt(dt).
+    x_k = a x_{k-1} + b sigma w_k with a = exp(-dt/T), b = sqrt(1 - a^2) for the step dt and the correlation time T; for
+    an infinite T: a = 1, b = sqrt(dt).
     """
     step = -1.0
     a = 1.0
@@ -59,7 +60,7 @@ def _gauss_markov(
 
 
 def ready(array: Array) -> Array:
-    """The array itself, or a copy, such that kernels take it: float64, C-contiguous and writable."""
+    """The array in the form that kernels need: float64, C-contiguous and writable. It is copied only if necessary."""
     flags = array.flags
     if flags.c_contiguous and flags.writeable and array.dtype == np.float64:
         return array
@@ -80,11 +81,11 @@ class GaussMarkov:
     Parameters
     ----------
     sigma : (d,) array
-        Stationary sigma [x]; of a random walk, x per sqrt(s).
+        Stationary standard deviation of each component [x]; for a random walk, its density [x/sqrt(s)].
     correlation_time : float
-        T [s].
+        Correlation time T [s]; infinite for a random walk.
     rng : numpy.random.Generator
-        Random stream of this process alone.
+        Random stream that only this process uses.
     """
 
     def __init__(self, sigma: Array | float, correlation_time: float, rng: np.random.Generator):
@@ -104,16 +105,18 @@ class GaussMarkov:
         Parameters
         ----------
         time : (n,) array
-            [s], not before the last time of the block before; the first may be negative (no step is taken to it).
+            Ascending times, not before the last time of the previous block [s]. If the first time of a run is negative,
+            the process has its initial value there.
 
         Returns
         -------
         (n, d) array
+            Values of the process, in the unit of ``sigma``.
 
         Raises
         ------
         ValueError
-            If a time lies before the one before it.
+            If the times are not ascending.
         """
         n = len(time)
         x = self._rng.standard_normal((n, len(self.sigma)))
@@ -129,22 +132,22 @@ class GaussMarkov:
 
 
 class HeldGaussMarkov:
-    """Gauss-Markov process that steps on the grid 0, h, 2h, ... and holds its value between.
+    """Gauss-Markov process that changes on the grid 0, h, 2h, ... and is constant between the grid points.
 
-    For a bias that changes slowly against the sample rate. Each value has the stationary variance, the
-    autocovariance at multiples of h is exact, and the power density at low frequencies, which is what a navigator
-    integrates, is that of the continuous process but for a factor 1 + (h/T)^2 / 12: 1e-5 for h = T/100.
+    It is used for a bias that changes slowly compared with the sample rate. Each value has the stationary variance. The
+    autocovariance at multiples of h is exact. The power density at low frequencies, which decides the error of inertial
+    navigation, is that of the continuous process times 1 + (h/T)^2 / 12; for h = T/100 the factor is 1 + 1e-5.
 
     Parameters
     ----------
     sigma : (d,) array
-        Stationary sigma of each component, as in `GaussMarkov`.
+        Stationary standard deviation of each component, as in `GaussMarkov`.
     correlation_time : float
-        T [s], as in `GaussMarkov`.
+        Correlation time T [s], as in `GaussMarkov`.
     hold : float
-        h [s].
+        Spacing h of the grid [s].
     rng : numpy.random.Generator
-        Random stream of this process alone.
+        Random stream that only this process uses.
     """
 
     def __init__(self, sigma: Array | float, correlation_time: float, hold: float, rng: np.random.Generator):
@@ -155,7 +158,7 @@ class HeldGaussMarkov:
         self._last = self._process.state[None].copy()
 
     def table(self, until: float) -> tuple[Array, int]:
-        """The values of the grid points up to a time, from the last of the call before on.
+        """The values at the grid points up to a time, from the last grid point of the previous call on.
 
         Parameters
         ----------
@@ -165,10 +168,10 @@ class HeldGaussMarkov:
         Returns
         -------
         values : (m, d) array
-            In the unit of the process; d components.
+            Values of the d components, in the unit of the process.
         first : int
-            Number of the first grid point; the value at time t is that of number floor(t / h + 1e-6), the millionth
-            being for times that are multiples of h up to rounding.
+            Number of the first grid point. The value at time t is that of grid point floor(t / h + 1e-6); the term 1e-6
+            is for times that are multiples of h up to rounding.
         """
         first = self._next - 1
         end = int(until * self.per_second + 1e-6) + 1

@@ -18,7 +18,11 @@ __all__ = ["SpeedLog"]
     example={"sigma_m_s": 0.1},
 )
 class SpeedLog(AidSpec):
-    """Forward component of the sensor's velocity through the water, (1 + k) (C' (v - current) + omega x l)_forward."""
+    """Forward component of the sensor's velocity through the water, (1 + k) (C' (v - c) + omega x l)_forward.
+
+    v is the velocity of the vessel and c that of the water, north-east-down, C the direction cosine matrix from body
+    axes to north-east-down, omega the angular rate, l the lever arm and k the scale-factor error.
+    """
 
     kind: Literal["speed_log"] = "speed_log"
     sigma: NonNegative = quantity("m_s")

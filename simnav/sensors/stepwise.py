@@ -15,10 +15,11 @@ from simnav.sensors.observation import noise_scalar, observe_one
 
 __all__ = ["HELD", "UNTOUCHED", "sense", "sense_imu"]
 
-#: Of a layer that repeats values: the last one and whether there is one; interval and value that is repeated.
+#: State of a layer that repeats values: the last value, and 1 if there is one; number of the interval, and the repeated
+#: value.
 LAST, HAS_LAST, NUMBER, VALUE = 0, 3, 4, 5
 HELD = 8
-#: Interval of a measurement that is none of a layer's.
+#: Number of the interval of a measurement that a layer does not affect.
 UNTOUCHED = -2
 
 
@@ -33,14 +34,16 @@ def sense_imu(
     drawn: tuple[Array, Array, Array, Integers], disturbances: tuple[Flags, Array], clock: Array,
     imu: tuple[Array, Array, Array, Array],
 ) -> None:  # fmt: skip
-    """Errors and disturbances of the IMUs of many runs, over one step each.
+    """Add the errors and disturbances of the IMUs of b runs, for one step of each run.
+
+    The random numbers of several steps, a stretch of s samples, were drawn in advance.
 
     Parameters
     ----------
     active : (b,) bool array
-        Which runs.
+        True for each run that is advanced.
     at, samples : (b,) int arrays
-        Number of the step in the stretch that was drawn ahead, and samples a step.
+        Number of the step within the stretch, and number of samples in a step.
     triads : tuple of (b, 2, ...) arrays
         Gyroscopes and accelerometers: matrix and bias, as `simnav.sensors.imu.triad_errors` takes them; density of the
         white noise, range, quantization, and points a second of both tables; residual of the quantization.
@@ -48,12 +51,12 @@ def sense_imu(
         Variates of the samples of the stretch; tables of the in-run biases and of the random walks; length and first
         grid point of both tables.
     disturbances : (b, d, s) bool and (b, d, s, 6) arrays
-        Which samples of the stretch d disturbances touch, and what they add to them.
+        True for each sample of the stretch that each of d disturbances affects, and the errors that they add.
     clock : (b, 2) array
-        Number of the sample before the stretch, and samples a second.
+        Number of the sample before the stretch, and number of samples in a second.
     imu : tuple of (b, ...) arrays
-        Times and intervals, overwritten; angular rates and specific forces: the ideal samples become what the IMU
-        delivers.
+        Times and intervals, overwritten; angular rates and specific forces: ideal samples, to which the errors are
+        added.
     """
     matrix, bias, numbers, residual = triads
     variates, instability, walk, tables = drawn
@@ -95,30 +98,33 @@ def sense(
     layers: tuple[Integers, Integers, Array, Array],
     delivered: tuple[Integers, Integers, Array, Array, NDArray[np.uint32]], truth: Array,
 ) -> None:  # fmt: skip
-    """What the aiding instruments of many runs deliver in one step each, faults included.
+    """Compute the measurements of the aiding instruments of b runs, with faults, for one step of each run.
+
+    The random numbers of several steps, a stretch of s samples, were drawn in advance.
 
     Parameters
     ----------
     active : (b,) bool array
-        Which runs.
+        True for each run that is advanced.
     samples : (b,) int, (b,) int, (b, s), (b, m, 14) and (b, s) int arrays
-        Of each run, the first sample of the step and the one after its last, within the stretch that was drawn ahead;
-        times of the samples of the stretch [s]; true states at the samples of the step; number of the instrument of
-        each sample, -1: the end of a step.
+        For each run: index of the first sample of the step within the stretch, and index after the last one; times of
+        the samples of the stretch [s]; true states at the samples of the step; number of the instrument of each sample
+        (-1: the end of a step).
     drawn : (b, s, 3), (b, s, 3), (b, s, k) int and (b, s, k, 3) arrays
-        Biases and unit variates of each sample; of each layer of faults, the number of the interval that a sample lies
-        in, -1: none, -2: it is none of the layer's; what each layer has drawn for it.
+        Biases and unit variates of each sample; for each of k fault layers, the number of the interval of a sample (-1:
+        outside of all intervals, -2: the layer does not affect the instrument), and the error or noise that the layer
+        has drawn for the sample.
     instruments : (b, i, 4) int and (b, i, 24) arrays
-        Of each: what it observes, components, and those of `simnav.kinds.Kind.layout`; its numbers, as of
-        `simnav.sensors.observation.observe_one`.
+        For each of i instruments: code of the observed quantity, number of components, and the two numbers of
+        `simnav.kinds.Kind.layout`; its parameters, as in `simnav.sensors.observation.observe_one`.
     layers : (b,) int, (b, k, 3) int, (b, i, k, 4) and (b, i, k, 8) arrays
-        How many layers of faults; what each does (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and whether
-        each interval has its own; of layers that step the noise, the new sigma of an instrument, or the factor on its
-        sigma where that is not 0; state of layers that repeat values.
+        Number of fault layers; action of each (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and 1 if each
+        interval has a bit of its own; for noise steps the new sigma of an instrument, or the factor on its sigma if it
+        is not 0; state of layers that repeat values.
     delivered : tuple of (b, ...) arrays
-        Overwritten: count, who, when, value and faults of `simnav.simulation.steps.SteppedRuns`.
+        Overwritten: ``count``, ``who``, ``when``, ``value`` and ``faults`` of `simnav.simulation.steps.SteppedRuns`.
     truth : (b, 9) array
-        Likewise.
+        Overwritten: position, velocity and attitude at the end of the step.
     """
     first, last, tap_time, taps, owner = samples
     error, white, interval, fault = drawn
@@ -190,7 +196,7 @@ def sense(
 
 @kernel()
 def _hold(held: Array, number: int, reading: Array, d: int) -> bool:
-    """Repeat, within an interval, what was delivered before it (or else first within); whether it does."""
+    """Replace a reading within an interval by the last one before it (or the first within). Return whether it did."""
     if number >= 0 and held[NUMBER] != number + 1.0:
         held[NUMBER] = number + 1.0
         for j in range(d):

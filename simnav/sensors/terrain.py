@@ -1,4 +1,4 @@
-"""Terrain-aided navigation: horizontal position fixes from matching the bottom with a chart."""
+"""Terrain-aided navigation: horizontal position fixes from matching the measured bottom with a chart."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["TerrainFix"]
 class TerrainFix(AidSpec):
     """Latitude and longitude of the instrument; errors north and east [m].
 
-    ``bias_instability`` is the error that neighbouring fixes share, since they match the same stretch of chart.
+    ``bias_instability`` is the common error of neighbouring fixes, which match the same part of the chart.
     """
 
     kind: Literal["terrain_fix"] = "terrain_fix"

@@ -1,1 +1,1 @@
-"""Scenario and seed to a run: in blocks (`simulator`), or many runs step by step (`steps`)."""
+"""The simulation of a scenario with a seed: one run in blocks (`simulator`), or many runs step by step (`steps`)."""

@@ -1,7 +1,7 @@
-"""The simulator: a scenario and a seed to a recording, in one block or step by step.
+"""The simulator: it makes the recording of a scenario and a seed, in one block or step by step.
 
-A `Simulator` is a state machine. The world's truth, the instruments' errors and the faults all carry their state
-from block to block and draw a fixed number of variates per sample, so that one long block and many short ones give
+A `Simulator` is a state machine. The world, the errors of the instruments and the faults keep their state
+from block to block and draw a fixed number of variates for each sample, so that one long block and many short ones give
 the same numbers.
 """
 
@@ -43,6 +43,7 @@ def sample_times(rate: float, phase: float, start: float, end: float) -> Array:
     Returns
     -------
     (n,) array
+        Ascending times [s].
 
     Examples
     --------
@@ -80,32 +81,32 @@ class Simulator:
     Parameters
     ----------
     scenario : Scenario
-        A simulated one.
+        A simulated scenario, not a recorded one.
     seed : int
         Seed of the run, non-negative.
     truth : WorldBlock, optional
-        The truth of the whole run, where several runs share one (`simulate_many`).
+        The truth of the whole run, if several runs share one truth (`simulate_many`).
 
     Attributes
     ----------
     instruments : Instruments
-        The datasheets.
+        Datasheets of all instruments.
     initial_truth : NavigationStates
         One state: the truth at time 0.
     start : InitialState
-        What an estimator is told of the state at time 0.
+        Initial state with errors, which an estimator receives.
     faults : tuple of FaultLabel
         The faults of the run.
     scenario : Scenario
-        That of this run, with nothing left to draw.
+        The scenario of this run, with all values drawn.
     draws : mapping
-        What was drawn for it (`simnav.scenario.Scenario.draws`).
+        The drawn values (`simnav.scenario.Scenario.draws`).
     duration, step, time : float
-        Length of the run, length of one step, and time that was reached [s].
+        Length of the run, length of one step, and present time of the run [s].
     note : str
-        Empty; a log says here which recording it is.
+        Empty. For a log it is the name of the recording.
     imu, aids, layers : Imu or None, dict of str to Instrument, tuple of FaultLayer
-        The instruments and the faults.
+        The IMU, the aiding instruments by name, and the faults.
 
     Raises
     ------
@@ -139,27 +140,28 @@ class Simulator:
         self._label_imu = any("imu" in f.instruments for f in scenario.faults)
 
     def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
-        """Closed loop: from now on the vessel is steered by a position [m] and a heading [rad] that are off by this."""
+        """Closed loop: set the errors of the position [m] and heading [rad] by which the vessel is steered."""
         self.world.steer_by(north, east, heading)
 
     @property
     def world(self) -> World:
-        """The world of the run; ValueError where several runs share one truth, for then it cannot be steered."""
+        """The world of the run. ValueError if several runs share one truth, because then it cannot be steered."""
         if self._world is None:
             raise ValueError("runs that share one truth cannot be steered")
         return self._world
 
     def advance(self, until: float) -> Block:
-        """What happens from now to a time.
+        """Simulate the run up to a time.
 
         Parameters
         ----------
         until : float
-            The end of a step, not before now [s].
+            The end of a step, not before the present time of the run [s].
 
         Returns
         -------
         Block
+            Measurements, labels and truth of the interval.
         """
         start, until = self.time, min(until, self.duration)
         taps = self._taps(start, until)
@@ -215,24 +217,27 @@ def simulate(scenario: Scenario, seed: int) -> Recording:
     Parameters
     ----------
     scenario : Scenario
-        A simulated one.
+        A simulated scenario, not a recorded one.
     seed : int
         Seed of the run, non-negative.
 
     Returns
     -------
     Recording
+        The whole run, with truth and labels.
     """
     return _recording(Simulator(scenario, seed))
 
 
 def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recording]:
-    """Simulate runs one after the other; with ``world_seed``, and nothing to draw, they share one truth, made once.
+    """Simulate runs one after the other.
+
+    With ``world_seed`` and without distributions the runs share one truth, which is computed once.
 
     Yields
     ------
     Recording
-        The same as `simulate` gives for each seed.
+        For each seed the same recording as that of `simulate`.
     """
     truth = None
     for seed in seeds:
@@ -244,21 +249,21 @@ def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recordin
 
 
 def ideal(scenario: Scenario, seed: int) -> Recording:
-    """A run as perfect instruments would see it: what bounds and Jacobians at the truth are taken from.
+    """Simulate a run with ideal instruments. Bounds and Jacobians at the truth are computed from it.
 
     Parameters
     ----------
     scenario : Scenario
-        A simulated one.
+        A simulated scenario, not a recorded one.
     seed : int
         Seed of the run, non-negative.
 
     Returns
     -------
     Recording
-        Of `simulate(scenario, seed)` the truth, the datasheets, and which measurement was delivered, with its ``sigma``
-        and ``faults``; every value is without error, ``fault_error`` is zero, and the start is the truth, with the
-        covariance of the scenario.
+        Truth, datasheets and times of measurements are those of `simulate(scenario, seed)`, also ``sigma`` and
+        ``faults`` of each measurement. But every value is without error, ``fault_error`` is zero, and the initial state
+        is the truth, with the covariance of the scenario.
     """
     scenario = scenario.drawn(seed)
     first = Simulator(scenario, seed)

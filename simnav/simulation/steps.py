@@ -1,12 +1,11 @@
-"""Runs that go step by step, many of them at once: world, instruments and faults in compiled passes over shared arrays.
+"""Many runs at once, step by step: compiled passes over shared arrays advance worlds, instruments and faults.
 
-What instruments and faults draw depends on the times alone. It is drawn a stretch of steps ahead, with the classes of
-the block form (`Simulator.advance`), from the same streams, in the same order. What depends on where the vessel goes is
-left to two kernels, `simnav.world.motion.advance` and `sense`, which go through all runs. The
-numbers are those of the block form, bit for bit, and a step costs no more than its arithmetic.
+The random numbers of instruments and faults depend on the times only. They are drawn for several steps in advance (a
+stretch), by the classes of the block form (`Simulator.advance`), from the same streams, in the same order. Two kernels,
+`simnav.world.motion.advance` and `sense`, compute all that depends on the motion, for all runs. The numbers are those
+of the block form, bit for bit.
 
-An instrument or a fault of others, of which no more is known than how it makes a block, is asked for a block of one
-step.
+Instruments and faults of third parties have the block form only. They are called for blocks of one step.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from simnav.world import motion
 
 __all__ = ["SteppedRuns"]
 
-#: Steps that are drawn ahead: so many at first, then twice as many each time.
+#: Number of steps that are drawn in advance the first time. The number is doubled each time.
 FIRST_STRETCH, LONGEST_STRETCH = 4, 64
 
 
@@ -36,23 +35,25 @@ class SteppedRuns:
     Parameters
     ----------
     n : int
-        Number of runs.
+        Number of runs that can be advanced together.
 
     Attributes
     ----------
     simulators : list of Simulator
-        Of each run; its world may be steered.
+        The simulator of each run; its world may be steered.
     x : (n, 59) array
         States of the worlds (`simnav.world.motion`).
     step : (n,) int array
-        Steps so far.
+        Number of steps of each run so far.
     truth : (n, 9) array
         Position, velocity, roll, pitch and yaw at the end of the last step.
     count : (n,) int array
-        Measurements of the last step; of the k-th of run b: ``who[b, k]``, number of its instrument among
-        ``names[b]``; ``when[b, k]`` [s]; ``value[b, k]``; ``faults[b, k]``, its label.
+        Number of measurements in the last step. For measurement k of run b: ``who[b, k]`` is the number of its
+        instrument in ``names[b]``, ``when[b, k]`` its time [s], ``value[b, k]`` its value and ``faults[b, k]`` its
+        label.
     samples : (n,) int array
-        IMU samples of the last step: ``imu_time[b]``, ``imu_interval[b]``, ``rate[b]``, ``force[b]``.
+        Number of IMU samples in the last step. The samples of run b are ``imu_time[b]``, ``imu_interval[b]``,
+        ``rate[b]`` and ``force[b]``.
     """
 
     def __init__(self, n: int):
@@ -77,7 +78,7 @@ class SteppedRuns:
     # ------------------------------------------------------------------------------------------- runs
 
     def begin(self, b: int, simulator: Simulator) -> None:
-        """Put a run that has not been advanced into a place."""
+        """Start a run at index b. Its simulator must be at time 0."""
         self.simulators[b] = simulator
         self.step[b] = self._at[b] = self._end[b] = self.count[b] = self.samples[b] = 0
         self._stretch[b] = FIRST_STRETCH
@@ -99,19 +100,19 @@ class SteppedRuns:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        for b, simulator in enumerate(self.simulators):  # a copy has lost what it shares with the worlds
+        for b, simulator in enumerate(self.simulators):  # a copy no longer shares its arrays with the worlds
             if simulator is not None:
                 simulator.world.live_in(self.x[b], self.index[b])
 
     def _put(self, name: str, b: int, value: Any) -> None:
-        """Store an array of run b; where there is no room for it, all runs get more."""
+        """Store an array of run b. If it does not fit, the shared array is enlarged for all runs."""
         value = np.asarray(value)
         array = self._grown(name, value.shape, value.dtype)
         place: Any = (b, *(slice(0, m) for m in value.shape))
         array[place] = value
 
     def _grown(self, name: str, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
-        """An array with room for so many numbers of each run, and what was in it."""
+        """The shared array, enlarged to the shape for each run, with its previous content."""
         arrays = self.__dict__
         old: NDArray[Any] | None = arrays.get(name)
         if old is None:
@@ -193,14 +194,14 @@ class SteppedRuns:
         self.step[compiled] += 1
 
     def interval_of(self, b: int) -> tuple[float, float]:
-        """Begin and end of the last step of a run [s]."""
+        """Beginning and end of the last step of a run [s]."""
         simulator, k = self.simulators[b], int(self.step[b])
         assert simulator is not None
         rate = 1.0 / simulator.step  # as `simnav.simulation.simulator.sample_times`
         return simulator.step + (k - 2) / rate if k > 1 else 0.0, simulator.step + (k - 1) / rate
 
     def packet(self, b: int) -> Measurements:
-        """What the instruments of a run delivered in the last step; the arrays are its own."""
+        """The measurements of the last step of a run, in arrays of their own."""
         simulator, n = self.simulators[b], int(self.samples[b])
         assert simulator is not None
         imu = None
@@ -217,7 +218,7 @@ class SteppedRuns:
         return Measurements(*self.interval_of(b), imu, aids)
 
     def _draw(self, b: int) -> None:
-        """Draw what instruments and faults of a run draw for the next stretch of steps."""
+        """Draw the random numbers of the instruments and faults of a run for the next stretch of steps."""
         simulator = self.simulators[b]
         assert simulator is not None
         steps, done = int(self._stretch[b]), int(self.step[b])
@@ -289,14 +290,14 @@ class SteppedRuns:
         self.disturbed[b, len(found) :] = False
 
     def _room(self, most: int) -> None:
-        """Make room for so many measurements of a step."""
+        """Enlarge the arrays to hold ``most`` measurements in a step."""
         self._grown("who", (most,), np.int64)
         self._grown("when", (most,), np.float64)
         self._grown("value", (most, 3), np.float64)
         self._grown("faults", (most,), np.uint32)
 
     def _block(self, b: int) -> None:
-        """A step of a run of which only blocks are known."""
+        """Advance a run that has only the block form by one step."""
         simulator = self.simulators[b]
         assert simulator is not None
         k = int(self.step[b]) + 1

@@ -1,8 +1,8 @@
 """The contract test for estimators: the checks that `simnav check` and `simnav.testing` run.
 
-A minute of a simulated voyage with every kind of instrument is given to the estimator in several forms. Each demand of
-the contract is one `Check`, a function whose first sentence says what is demanded; `CHECKS` has all of them in the
-order of the report. The checks say nothing of accuracy.
+The estimator runs on a minute of a simulated voyage with every kind of instrument, in several forms. Each requirement
+of the contract is one `Check`, a function whose first sentence states the requirement; `CHECKS` has all of them in the
+order of the report. The checks do not test accuracy.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ _checks: list[Check] = []
 
 @dataclass(frozen=True)
 class Finding:
-    """What one check found.
+    """The result of one check.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Finding:
     ok : bool
         Whether the estimator keeps this part of the contract.
     sentence : str
-        What was seen: how the contract is kept, or where it is broken.
+        One sentence: how the estimator meets the requirement, or where it does not.
     """
 
     name: str
@@ -121,7 +121,7 @@ class Report:
 
 
 class Candidate:
-    """An estimator that is tested, and what its checks share.
+    """An estimator under test, with the recording and the first run that its checks share.
 
     Parameters
     ----------
@@ -159,16 +159,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Check:
-    """One demand of the contract.
+    """One requirement of the contract.
 
     Attributes
     ----------
     name : str
         Name in reports and in the ids of tests.
     sentence : str
-        What is demanded.
+        The requirement, as a sentence.
     function : callable
-        ``function(candidate, recording)`` returns whether the demand is met, and what was seen.
+        ``function(candidate, recording)`` returns whether the requirement is met, and a sentence about it.
     """
 
     name: str
@@ -181,7 +181,8 @@ class Check:
         Parameters
         ----------
         candidate : Candidate
-            The estimator. What it does to its input in this check does not reach other checks.
+            The estimator under test. It gets a copy of the recording, so that changes of its input do not affect other
+            checks.
         """
         try:
             return Finding(self.name, *self.function(candidate, copy.deepcopy(candidate.recording)))
@@ -189,11 +190,11 @@ class Check:
             return Finding(self.name, False, f"it raised {type(error).__name__}: {error}")
 
     def left_out(self, candidate: Candidate) -> str:
-        """Why the check would say nothing new about an estimator; empty if it would.
+        """The reason to skip the check for an estimator; empty if the check is useful.
 
-        Where the output is not valid, the other checks would only repeat this. The exception is ``units`` of an
-        estimator that diverges, because wrong units may be the reason. Where two instances differ, it says nothing
-        that a run after a reset, or with other data later on, differs, too.
+        If the output is not valid, the other checks would only repeat this. The exception is ``units`` of an
+        estimator that diverges, because wrong units may be the reason. If two instances differ, ``reset`` and
+        ``causality`` say nothing.
         """
         if self.name == "output":
             return ""
@@ -209,7 +210,7 @@ class Check:
 
 
 def _demand(name: str) -> Callable[[_Function], _Function]:
-    """Add a function to `CHECKS`; the first paragraph of its docstring says what is demanded."""
+    """Add a function to `CHECKS`; the first paragraph of its docstring is the requirement."""
 
     def add(function: _Function) -> _Function:
         sentence = " ".join((function.__doc__ or "").partition("\n\n")[0].split())
@@ -222,25 +223,26 @@ def _demand(name: str) -> Callable[[_Function], _Function]:
 def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report:
     """Test an estimator against the contract.
 
-    Looked at: valid output (time, shapes, finite values, a covariance that is symmetric and positive semi-definite),
-    units, determinism, recovery after reset, causality, input left alone, estimates that later steps leave alone,
-    instruments that fall silent, and instruments that are absent, each in turn and all.
+    The checks are: valid output (time, shapes, finite values, a symmetric positive semi-definite covariance), units,
+    determinism, the same behaviour after a reset, causality, unmodified input, estimates that later steps do not
+    modify, instruments that stop delivering measurements, and missing instruments (each alone, and all).
 
     Parameters
     ----------
     estimator : str or callable
-        Name or path, as for `simnav.estimator.make`; or what makes a new instance when called.
+        Name or path, as for `simnav.estimator.make`; or a function that returns a new instance.
     **parameters
-        Parameters of the estimator, if it is a name or path.
+        Parameters of the estimator, if it is given by name or path.
 
     Returns
     -------
     Report
+        The results of all checks.
 
     Raises
     ------
     EstimatorError
-        If there is no such estimator, or it cannot be made.
+        If there is no such estimator, or it cannot be constructed.
     """
     if isinstance(estimator, str):
         name_or_path = estimator
@@ -255,7 +257,7 @@ def check(estimator: str | Callable[[], Estimator], **parameters: Any) -> Report
 
 
 def contract_recording(seed: int) -> Recording:
-    """The recording of the contract test, with one instrument of every kind that is known.
+    """The recording of the contract test, with one instrument of every registered kind.
 
     A kind of a third party whose instrument fails is named in a warning and left out.
     """
@@ -312,7 +314,8 @@ def _output(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 def _units(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """Estimates are in SI units and radians; positions are latitude, longitude and height.
 
-    Wrong units are off by a factor of 57 or more, or by a whole Earth, so that coarse limits are enough.
+    Wrong units change a value by a factor of 57 or more, or a position by thousands of kilometres, so coarse limits are
+    enough.
     """
     first = next(iter(_steps(candidate.factory(), recording)))
     start = recording.start
@@ -344,7 +347,7 @@ def _determinism(candidate: Candidate, recording: Recording) -> tuple[bool, str]
 
 @_demand("reset")
 def _reset(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """After a run, `reset` leaves nothing behind: the next run is that of a new instance."""
+    """After a run, `reset` restores the initial behaviour: the next run gives the estimates of a new instance."""
     fresh = _run(candidate.factory(), recording)
     used = candidate.factory()
     _run(used, contract_recording(1))
@@ -357,9 +360,9 @@ def _reset(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
 @_demand("causality")
 def _causality(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """An estimate depends on nothing that comes after it.
+    """An estimate does not depend on later measurements.
 
-    All that comes after half of the run is changed; the estimates before it must stay.
+    All measurements of the second half of the run are changed; the estimates of the first half must stay the same.
     """
     changed = _altered(recording, _HALF)
     n = int(np.searchsorted(recording.data.truth.time, _HALF + 1e-6))
@@ -404,15 +407,15 @@ def _aliasing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
 @_demand("silence")
 def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
-    """The estimator goes on when instruments fall silent.
+    """The estimator continues when instruments stop delivering measurements.
 
-    Every aiding instrument falls silent at half of the run; then the IMU does, too.
+    Every aiding instrument stops in the middle of the run, and later also the IMU.
     """
     for what, imu in (("every aiding instrument", True), ("every instrument", False)):
         trial = run_trial(candidate.factory(), _silenced(recording, _HALF, imu))
         if trial.status != "ok":
-            return False, f"when {what} falls silent: {trial.status}: {trial.reason}"
-    return True, "it carries on when the instruments fall silent"
+            return False, f"after {what} stopped: {trial.status}: {trial.reason}"
+    return True, "it continues when the instruments deliver no more measurements"
 
 
 @_demand("missing instruments")
@@ -458,7 +461,7 @@ def _run(estimator: Estimator, recording: Recording) -> _Output:
 
 
 def _difference(first: _Output, second: _Output) -> str | None:
-    """Where two runs part, or None."""
+    """The first difference between two runs, as text; None if they are equal."""
     where = _parting(first.estimates, second.estimates)
     if where is not None:
         return where
@@ -473,7 +476,7 @@ def _difference(first: _Output, second: _Output) -> str | None:
 
 
 def _parting(first: Sequence[Estimate], second: Sequence[Estimate]) -> str | None:
-    """Where two series of estimates part, or None."""
+    """The first difference between two series of estimates, as text; None if they are equal."""
     for a, b in zip(first, second, strict=True):
         when = f"differs at {float(b.time):g} s"
         for name in ("time", "position", "velocity", "attitude", "covariance", "estimated"):
@@ -490,7 +493,7 @@ def _parting(first: Sequence[Estimate], second: Sequence[Estimate]) -> str | Non
 
 
 def _altered(recording: Recording, after: float) -> Recording:
-    """Other measurements after a time, and fewer."""
+    """The recording with other and fewer measurements after a time."""
     data = recording.data
     imu = data.imu
     if imu is not None:

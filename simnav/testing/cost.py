@@ -1,12 +1,12 @@
-"""What an epoch costs: processor time and memory of several estimators over one recording.
+"""The cost of an epoch: processor time and memory of several estimators over one recording.
 
-**Time.** The estimators take turns of a few epochs each, so that what else the machine does slows all of them. The
-recording is run several times, and an epoch counts with its least time. It is the time of ``update`` alone.
+**Time.** The estimators run a few epochs each in turn, so that other work of the machine slows all of them alike. The
+recording is run several times, and the smallest time of an epoch counts. It is the time of ``update`` alone.
 
-**Memory.** What counts is the estimator's own: from its construction to the end of ``smooth``, with the measurements
-and the libraries there already. It is measured in two runs: Python and NumPy tell all of their memory
-(`tracemalloc`), but do not see what a C++ library holds; the C library tells what it has given out (glibc only), the
-interpreter's own use included. The second figure counts where it is clearly larger.
+**Memory.** It is the memory of the estimator alone, from its construction to the end of ``smooth``; measurements and
+libraries are loaded before. It is measured in two runs. `tracemalloc` reports all memory of Python and NumPy, but not
+that of a C++ library. The C library (glibc only) reports all memory that it has allocated, including that of the
+interpreter. The second figure is used if it is clearly larger.
 """
 
 from __future__ import annotations
@@ -34,32 +34,32 @@ __all__ = ["Cost", "measure"]
 Factory: TypeAlias = Callable[[], Estimator]
 Progress: TypeAlias = "Callable[..., None] | None"
 
-#: Epochs of a turn. An estimator that follows another one at each epoch begins with the other's data in the caches,
-#: which costs a window more than a filter.
+#: Number of epochs in a turn. After a change of the estimator the caches hold the data of the other one, which slows a
+#: window more than a filter.
 TURN = 10
-#: What the interpreter itself asks of the C library during a run [B]; less than this says nothing of an estimator.
+#: Memory that the interpreter itself allocates from the C library during a run [B]; smaller figures mean nothing.
 ALLOCATOR = 128 << 10
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What an epoch of one estimator costs.
+    """Time and memory of an epoch of one estimator.
 
     Attributes
     ----------
     estimator : str
         Label: name and parameters.
     status : str
-        ``ok``, ``unsuitable`` (it needs other instruments) or ``error``; NaN stands for what was not measured.
+        ``ok``, ``unsuitable`` (it needs other instruments) or ``error``. Figures that were not measured are NaN.
     reason : str
         Why the status is not ``ok``.
     update_median, update_mean, update_p95 : float
         Median, mean and 95th percentile of the processor time of an epoch [s].
     peak_memory : float
-        Most memory that it held [B].
+        Largest memory that the estimator held [B].
     memory_growth : float
-        How much more it holds after each epoch of the second half of the run, on average [B]. About zero, unless it
-        keeps every epoch as smoothers and full graphs do.
+        Mean growth of its memory with each epoch of the second half of the run [B]. It is about zero, except for
+        smoothers and full graphs, which keep every epoch.
     """
 
     estimator: str
@@ -85,20 +85,21 @@ def measure(
     Parameters
     ----------
     estimators : mapping of str to callable
-        What makes each estimator, by label.
+        A function that makes each estimator, by label.
     recording : Recording
-        Left as it is: estimators get copies of the measurements.
+        The recording. Estimators get copies of its measurements.
     epochs : int
-        Steps of the recording that are run; fewer if the recording has fewer.
+        Number of steps of the recording that are run; fewer if the recording has fewer.
     rounds : int
-        Runs over them; an epoch counts with its least time.
+        Number of runs over the steps; the smallest time of an epoch counts.
     progress : callable, optional
-        Called with how many of how many parts are done, and ``note=`` what is next.
+        Called with the number of finished parts, the number of all parts, and the next part as ``note=``.
 
     Returns
     -------
     list of Cost
-        One for each estimator, in the order given. An estimator that fails has its reason, and the others go on.
+        One for each estimator, in the given order. If an estimator fails, its entry has the reason; the others
+        continue.
 
     Raises
     ------
@@ -149,7 +150,7 @@ def _time_a_round(
     estimators: Mapping[str, Factory], recording: Recording, steps: Sequence[Measurements], least: Mapping[str, Array],
     failed: dict[str, Cost],
 ) -> None:  # fmt: skip
-    """Run all estimators once in turns; lower ``least`` [s] where an epoch took less."""
+    """Run all estimators once in turns, and update the smallest times ``least`` [s] of the epochs."""
     running: dict[str, tuple[Estimator, list[Measurements]]] = {}
     for label, factory in estimators.items():
         try:
@@ -197,7 +198,7 @@ def _memory(factory: Factory, recording: Recording, steps: Sequence[Measurements
 def _held(
     factory: Factory, recording: Recording, steps: Sequence[Measurements], meter: _Traced | _GivenOut
 ) -> tuple[float, float]:
-    """Peak [B] and growth an epoch [B] of a run, by one meter."""
+    """Peak [B] and growth an epoch [B] of a run, measured by one meter."""
     packets = [copy.deepcopy(packet) for packet in steps]
     begin = copy.deepcopy(recording.start), copy.deepcopy(recording.instruments)
     half = len(packets) // 2
@@ -219,7 +220,7 @@ def _held(
 
 
 class _Traced:
-    """What Python and NumPy hold [B], from entry to exit."""
+    """Memory of Python and NumPy [B], from entry to exit."""
 
     def __enter__(self) -> None:
         self._others = tracemalloc.is_tracing()  # it was already on and stays on
@@ -233,10 +234,10 @@ class _Traced:
             tracemalloc.stop()
 
     def look(self) -> None:
-        """Nothing to do: Python keeps the peak itself."""
+        """Do nothing: `tracemalloc` records the peak itself."""
 
     def settled(self) -> int:
-        """What is held once the interpreter has dropped what it keeps for reuse (lists of free tuples and floats)."""
+        """The memory in use, after the interpreter has released its lists of free tuples and floats."""
         gc.collect()
         return tracemalloc.get_traced_memory()[0] - self._before
 
@@ -246,7 +247,7 @@ class _Traced:
 
 
 class _GivenOut:
-    """What the C library has given out since entry and not got back [B], at each look."""
+    """Memory allocated by the C library since entry and not freed [B], read at each call of `look`."""
 
     def __enter__(self) -> None:
         self._before = self._peak = _given_out()
@@ -256,11 +257,11 @@ class _GivenOut:
 
     @staticmethod
     def works() -> bool:
-        """Whether the C library tells (glibc does)."""
+        """Whether the C library reports its memory (glibc does)."""
         return hasattr(ctypes.CDLL(None), "mallinfo2") if os.name == "posix" else False
 
     def look(self) -> None:
-        """Keep the largest value."""
+        """Read the memory, and keep the largest value."""
         self._peak = max(self._peak, _given_out())
 
     def settled(self) -> int:
@@ -280,7 +281,7 @@ class _Mallinfo(ctypes.Structure):
 
 
 def _given_out() -> int:
-    """Bytes that the C library has given out and not got back: mapped one by one, and from its heap."""
+    """Memory allocated by the C library and not freed [B]: mapped blocks, and blocks of its heap."""
     function = ctypes.CDLL(None).mallinfo2
     function.restype = _Mallinfo
     info: _Mallinfo = function()

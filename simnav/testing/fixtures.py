@@ -4,9 +4,8 @@ A test suite asks for them in its ``conftest.py`` or in a test module::
 
     pytest_plugins = ["simnav.testing.fixtures"]
 
-They do not come through the entry point ``pytest11``. pytest imports the plugins of that group in every run of the
-environment, also of projects that have nothing to do with navigation; these runs would import simnav and Gymnasium,
-and have its fixtures among theirs.
+They are not registered by the entry point ``pytest11``. pytest imports the plugins of that group in every test run of
+the environment, also for other projects. These runs would then import simnav and Gymnasium, and see its fixtures.
 """
 
 from __future__ import annotations
@@ -29,19 +28,19 @@ __all__ = ["BenchmarkEpochs", "RecordingOf", "benchmark_epochs", "contract_recor
 
 
 class RecordingOf(Protocol):
-    """What the fixture `recording_of` gives."""
+    """The type of the fixture `recording_of`."""
 
     def __call__(self, given: str | Path | Scenario, seed: int = 0, duration: float | None = None) -> Recording:
-        """Record a scenario, as the fixture says."""
+        """Record a scenario, see the fixture."""
 
 
 class BenchmarkEpochs(Protocol):
-    """What the fixture `benchmark_epochs` gives."""
+    """The type of the fixture `benchmark_epochs`."""
 
     def __call__(
         self, make_estimator: Callable[[], Estimator], recording: Recording | None = None, epochs: int = 60
     ) -> Estimator:
-        """Time an estimator, as the fixture says."""
+        """Time the epochs of an estimator, see the fixture."""
 
 
 @pytest.fixture(scope="session")
@@ -72,7 +71,7 @@ def recording_of(_recordings: dict[tuple[Any, ...], Recording]) -> RecordingOf:
 
 @pytest.fixture
 def contract_recording(_recordings: dict[tuple[Any, ...], Recording]) -> Recording:
-    """A minute of a voyage with one instrument of every kind, as the contract test has it; a copy for each test."""
+    """The recording of the contract test: a minute with one instrument of every kind. Each test gets a copy."""
     key = ("the contract test",)
     if key not in _recordings:
         _recordings[key] = contract_check.contract_recording(0)

@@ -1,4 +1,4 @@
-"""What a test may give as an estimator: a class, a function that makes one, a name or a file, with parameters."""
+"""The forms of an estimator in a test: a class, a function that makes one, a name or a file, with parameters."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ EstimatorLike: TypeAlias = (
 
 
 def given(estimators: EstimatorLike | Iterable[EstimatorLike]) -> dict[str, Factory]:
-    """What makes each estimator, by label.
+    """Functions that make each estimator, by label.
 
     Parameters
     ----------
     estimators : estimator or iterable of them
-        Nothing is imported or made yet.
+        One or several estimators in any form of `EstimatorLike`. Nothing is imported or constructed here.
 
     Returns
     -------
     dict of str to callable
-        In the order given. Where two have the same label, the later ones get a number.
+        A function for each estimator, in the given order. If labels are equal, the later ones get a number.
 
     Raises
     ------
     TypeError
-        If one of them is no estimator.
+        If one of them is not an estimator.
 
     Examples
     --------
@@ -57,12 +57,12 @@ def given(estimators: EstimatorLike | Iterable[EstimatorLike]) -> dict[str, Fact
 
 
 def factory_of(estimator: EstimatorLike) -> Factory:
-    """What makes the estimator when called without arguments.
+    """A function without arguments that makes the estimator.
 
     Raises
     ------
     TypeError
-        If it is no estimator.
+        If it is not an estimator.
     """
     what, parameters = _parts(estimator)
     if callable(what):
@@ -93,7 +93,7 @@ def label_of(estimator: EstimatorLike) -> str:
 
 
 def listed(estimators: EstimatorLike | Iterable[EstimatorLike]) -> list[Any]:
-    """The estimators one by one; a single one is a list of one."""
+    """The estimators as a list; a single one gives a list with one element."""
     single = isinstance(estimators, (str, Path)) or callable(estimators) or _is_pair(estimators)
     return [estimators] if single or not isinstance(estimators, Iterable) else list(estimators)
 

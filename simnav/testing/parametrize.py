@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 __all__ = ["parametrize_with_checks", "parametrize_with_rows"]
 
-#: The rows that an estimator is timed beside, if no others are asked for.
+#: The rows that are timed together with an estimator by default.
 ROWS = ("gnss-only", "ekf", "sw-fgo")
 
 
 class EstimatorUnderTest:
-    """The estimator that a test gets: it is made at the first check, so that collecting tests stays quick.
+    """The estimator of a test. It is constructed at the first check, so that the collection of tests is quick.
 
     Attributes
     ----------
@@ -36,12 +36,12 @@ class EstimatorUnderTest:
 
     @cached_property
     def candidate(self) -> Candidate:
-        """The estimator as the contract test sees it; all checks share its first run."""
+        """The estimator in the form of the contract test; all checks share its first run."""
         return Candidate(self._factory)
 
 
 class AssertedCheck:
-    """A check of the contract that fails as a test does.
+    """A check of the contract that raises an AssertionError if it fails.
 
     Attributes
     ----------
@@ -61,9 +61,9 @@ class AssertedCheck:
         Raises
         ------
         AssertionError
-            If the estimator does not meet the demand; the message says where.
+            If the estimator does not meet the requirement; the message says where.
         EstimatorError
-            If there is no such estimator, or it cannot be made.
+            If there is no such estimator, or it cannot be constructed.
         """
         __tracebackhide__ = True
         left_out = self.check.left_out(estimator.candidate)
@@ -85,8 +85,8 @@ def parametrize_with_checks(
     """Make one test of each check of the contract and each estimator.
 
     The id of a test is the label of the estimator and the name of the check: ``MyFilter-causality``. The checks are
-    those of ``simnav check``. Where the check ``output`` fails, those that would only repeat it are skipped;
-    where ``determinism`` fails, ``reset`` and ``causality`` are.
+    those of ``simnav check``. If the check ``output`` fails, checks that would only repeat this failure are skipped;
+    if ``determinism`` fails, ``reset`` and ``causality`` are skipped.
 
     Parameters
     ----------
@@ -94,17 +94,17 @@ def parametrize_with_checks(
         A class of `simnav.Estimator`, a function that makes one, a registered name, a file (``my.py``,
         ``my.py:MyFilter``), or a pair of one of these and a mapping of parameters.
     expected_failures : mapping of str to str, optional
-        Reason by name of a check. These tests are marked ``xfail``.
+        The reason why a check is expected to fail, by the name of the check. These tests are marked ``xfail``.
 
     Returns
     -------
     pytest.MarkDecorator
-        For a function of the arguments ``estimator`` and ``check``.
+        Decorator for a function with the arguments ``estimator`` and ``check``.
 
     Raises
     ------
     TypeError
-        If one of the estimators is none.
+        If one of them is not an estimator.
     ValueError
         If there is no check with a name in ``expected_failures``.
 
@@ -143,22 +143,22 @@ def parametrize_with_rows(
     Parameters
     ----------
     estimators : estimator or iterable of them
-        As for `parametrize_with_checks`.
+        Estimators in any form, as for `parametrize_with_checks`.
     beside : estimator or sequence of them
-        Rows that are timed beside them.
+        Rows that are timed for comparison.
     group : str
-        Name of the group: pytest-benchmark prints a table for each.
+        Name of the group; pytest-benchmark prints one table for each group.
 
     Returns
     -------
     callable
-        Decorator for a function of the argument ``make_estimator``, which makes a new instance when called. The
+        Decorator for a function with the argument ``make_estimator``, a function that returns a new instance. The
         fixture ``benchmark_epochs`` of `simnav.testing.fixtures` times it.
 
     Raises
     ------
     TypeError
-        If one of the estimators is none.
+        If one of them is not an estimator.
 
     Examples
     --------

@@ -1,11 +1,12 @@
 """A trial: one estimator run over one recording, step by step, with every failure caught and named.
 
-The estimator sees copies, packet by packet: it can neither look ahead nor spoil the recording for the next one.
-Its output is checked at every step; the first step that fails ends the trial, and all that came before is kept.
+The estimator receives copies, packet by packet. So it cannot use later measurements, and cannot change the recording
+for the next estimator. Its output is checked at every step. The first step that fails ends the trial, and all earlier
+steps are kept.
 
-`simnav.trial.session` runs an estimator, here or in another process. `simnav.trial.wire` is the plain form in which
-packets and answers pass between the two. `simnav.trial.log` checks the answers and collects them, and
-`simnav.trial.trial` is what comes out, with the list of statuses.
+`simnav.trial.session` runs an estimator, in this or in another process. `simnav.trial.wire` is the form of packets and
+answers as plain arrays. `simnav.trial.log` checks and collects the answers, and `simnav.trial.trial` is the result,
+with the list of statuses.
 """
 
 from simnav.trial.log import DIVERGENCE_LIMIT

@@ -1,7 +1,7 @@
-"""What an estimator gave in a run, collected step by step, and every answer checked.
+"""The log of a trial: it checks every answer of an estimator and collects the answers.
 
-The answers come in the plain form of `simnav.trial.wire`, from this process or from another that cannot be trusted. An
-answer that is not well-formed is invalid output, whoever made it.
+The answers have the form of `simnav.trial.wire`. They come from this process, or from another one that is not trusted.
+An answer that is not well-formed is invalid output.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from simnav.types import COMPONENTS, Array, NavigationStates
 
 __all__ = ["DIVERGENCE_LIMIT", "DivergedError", "TrialLog"]
 
-#: Horizontal error [m] above which an estimate counts as diverged: no instrument of a vessel is of use that far off.
+#: Horizontal error above which an estimate counts as diverged [m].
 DIVERGENCE_LIMIT = 100e3
 
 _TIME_TOLERANCE = 1e-6  # s; steps are multiples of the sample interval up to rounding
@@ -48,7 +48,7 @@ _VECTORS = [struct.Struct(f"{3 * n}d") for n in range(4)]  # numbers of so many 
 
 
 class DivergedError(Exception):
-    """The estimate is finite and useless."""
+    """The estimate is finite, but its error is above `DIVERGENCE_LIMIT`."""
 
 
 class TrialLog:
@@ -57,18 +57,18 @@ class TrialLog:
     Parameters
     ----------
     truth : NavigationStates
-        At the ends of the steps; NaN where it is not known.
+        True states at the ends of the steps; NaN if they are not known.
     keep_covariance : bool
-        False saves 648 bytes an epoch; covariances are checked all the same.
+        False: covariances are checked but not kept, which saves 648 bytes an epoch.
     limit : float
-        Bytes that diagnostics and flags may take together.
+        Largest memory of diagnostics and flags together [bytes].
 
     Attributes
     ----------
     n : int
-        How many answers are good.
+        Number of valid answers.
     step : int
-        Number of the step whose answer is wanted next, or was refused.
+        Number of the next step, or of the step whose answer was refused.
     """
 
     def __init__(self, truth: NavigationStates, keep_covariance: bool, limit: float = math.inf):
@@ -95,18 +95,18 @@ class TrialLog:
         self._held = 0  # bytes of diagnostics and flags
 
     def put(self, answer: bytes, seconds: float) -> None:
-        """Lay the answer to a step by until `settle`; as of `add`."""
+        """Store the answer to a step until `settle`; the arguments are those of `add`."""
         self._pending.append((answer, seconds))
 
     def settle(self) -> None:
-        """Take all answers that were laid by, as `add` would one after the other; what follows a bad one is discarded.
+        """Check and add all stored answers, one after the other; answers after an invalid one are discarded.
 
-        Most answers are of one form and good. Such runs of answers are checked and stored together.
+        Most answers are valid and have the same form. Such answers are checked and added together.
 
         Raises
         ------
         InvalidOutputError, DivergedError, MemoryError
-            As of `add`.
+            For the first answer for which `add` raises it.
         """
         pending, self._pending = self._pending, []
         first = 0
@@ -127,14 +127,14 @@ class TrialLog:
         Parameters
         ----------
         answer : bytes
-            In the form of `simnav.trial.wire`.
+            The answer in the form of `simnav.trial.wire`.
         seconds : float
             Wall time of the update [s].
 
         Raises
         ------
         InvalidOutputError, DivergedError
-            With what is wrong.
+            If the answer is not valid, or the estimate has diverged; the message gives the reason.
         MemoryError
             If diagnostics and flags take more than the limit.
         """
@@ -285,7 +285,7 @@ class TrialLog:
             raise InvalidOutputError(f"at {self._time[self.n]:g} s the covariance {why}")
 
     def trial(self, estimator: str, status: str, reason: str) -> Trial:
-        """What was collected."""
+        """The trial with all collected answers."""
         n = self.n
         return Trial(
             estimator=estimator,
@@ -359,7 +359,7 @@ def _malformed() -> InvalidOutputError:
 
 
 def _check_vectors(given: int, bits: int, values: Sequence[float]) -> None:
-    """Raise where a component that is estimated is not finite."""
+    """Raise an error if an estimated component is not finite."""
     mask, begin = MASKS[bits], 0
     for bit, (name, section) in enumerate(VECTORS.items()):
         if not given >> bit & 1:

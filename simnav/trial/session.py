@@ -1,4 +1,4 @@
-"""Run an estimator over a recording, step by step, wherever the estimator is."""
+"""Run an estimator over a recording, step by step, in this or in another process."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ __all__ = [
 
 
 class FailureError(Exception):
-    """What a session that is elsewhere reports: the estimator failed.
+    """A session in another process reports that the estimator failed.
 
     Parameters
     ----------
     status : str
         ``error``, ``invalid-output``, ``out-of-memory`` or ``unsuitable`` (it refuses).
     reason : str
-        What happened, for people.
+        The reason, as text for people.
     """
 
     def __init__(self, status: str, reason: str):
@@ -45,11 +45,11 @@ class FailureError(Exception):
 
 
 class LostError(Exception):
-    """What a session that is elsewhere reports: the estimator is no more there."""
+    """A session in another process reports that the process of the estimator has ended."""
 
 
 class Session(Protocol):
-    """One estimator that is run, wherever it is.
+    """The run of one estimator, in this or in another process.
 
     Attributes
     ----------
@@ -61,15 +61,15 @@ class Session(Protocol):
 
     @property
     def needs(self) -> Any:
-        """What `Estimator.needs` says."""
+        """The value of `Estimator.needs`."""
         ...
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
-        """Begin the run: `Estimator.reset`."""
+        """Start the run: call `Estimator.reset`."""
         ...
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
-        """Hand over one packet after the other, each when the answer to the last one is there; log the answers."""
+        """Send one packet after the other, each after the answer to the last one, and log the answers."""
         ...
 
     def smooth(self) -> NavigationStates | None:
@@ -77,23 +77,23 @@ class Session(Protocol):
         ...
 
     def describe(self, error: BaseException) -> str:
-        """What an exception of the estimator says."""
+        """The description of an exception of the estimator."""
         ...
 
 
 def run_trial(estimator: Estimator, recording: Recording, *, keep_covariance: bool = True) -> Trial:
     """Run an estimator over a recording, in this process.
 
-    Campaigns run estimators elsewhere, in the same steps and on the same bytes, and get the same numbers.
+    Campaigns run estimators in other processes, with the same steps and the same bytes, so the numbers are the same.
 
     Parameters
     ----------
     estimator : Estimator
-        If it is a reference, the recording is revealed to it first.
+        The estimator. A reference receives the recording with the truth first.
     recording : Recording
-        Left as it is, whatever the estimator does to its input.
+        The recording. It is not changed, also if the estimator writes into its input.
     keep_covariance : bool
-        False saves 648 bytes an epoch; covariances are checked all the same.
+        False: covariances are checked but not kept, which saves 648 bytes an epoch.
 
     Returns
     -------
@@ -105,16 +105,16 @@ def run_trial(estimator: Estimator, recording: Recording, *, keep_covariance: bo
 
 
 def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
-    """Run an estimator, wherever it is, over a recording.
+    """Run an estimator over a recording, in this or in another process.
 
     Parameters
     ----------
     session : Session
-        The estimator, here or elsewhere.
+        The session of the estimator.
     recording : Recording
-        The run; its packets are handed over one by one.
+        The run; its packets are sent one by one.
     log : TrialLog
-        A new one.
+        A new, empty log.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
     Raises
     ------
     LostError
-        If the session does, and no answer before that was bad.
+        If the session raises it, and no earlier answer was invalid.
     """
     status, reason = "ok", ""
     reset_seconds = smooth_seconds = 0.0

@@ -28,7 +28,7 @@ __all__ = ["Trial"]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What an estimator gave on one recording, up to the end or to its failure: T epochs.
+    """The answers of an estimator on one recording, up to the end or to its failure: T epochs.
 
     Attributes
     ----------
@@ -37,21 +37,21 @@ class Trial:
     status, reason : str
         See the table in this module; ``reason`` is empty where the status is ``ok``.
     time : (T,) array
-        Ends of the steps that were completed [s]: the first T of ``recording.data.truth.time``.
+        Ends of the completed steps [s]: the first T of ``recording.data.truth.time``.
     position, velocity, attitude : (T, 3) array
-        As in `Estimate`; NaN where a vector was not given.
+        The vectors of each `Estimate`; NaN if a vector was not given.
     estimated : (T, 9) bool array
-        Which of `COMPONENTS` were estimated.
+        True for each estimated component of `COMPONENTS`.
     covariance : (T, 9, 9) array or None
-        NaN at epochs without one; None where there was none at all or it was not kept.
+        Covariances; NaN at epochs without one. None if there was none at all, or they were not kept.
     diagnostics : dict of str to (T, ...) array
-        NaN at epochs without the diagnostic; arrays of changing length are padded with NaN.
+        Diagnostics by name; NaN at epochs without the diagnostic. Arrays of changing length are padded with NaN.
     flagged : list of (instrument, time)
-        Measurements that the estimator judged faulty.
+        Measurements that the estimator considered faulty.
     update_seconds : (T,) array
         Wall time of each update [s].
     smoothed : NavigationStates or None
-        What ``smooth()`` returned: T states.
+        The T states of ``smooth()``; None without smoothing.
     reset_seconds, smooth_seconds : float
         Wall time of ``reset()`` and ``smooth()`` [s].
     """

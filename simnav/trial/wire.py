@@ -1,7 +1,7 @@
 """The plain form of packets and estimates: fixed headers and float64 buffers.
 
-An estimator may run in another process than the one that holds the recording (`simnav.leaderboard.campaign`). What
-crosses between the two is in this form, and it is the same form in one process, so that both ways give the same bits.
+An estimator may run in another process than the one that holds the recording (`simnav.leaderboard.campaign`). Packets
+and answers are sent in this form. The same form is used within one process, so that both give the same bits.
 
 A **packet** is a header (number of IMU samples, of other measurements, of float64 of the latter; start and end of the
 step) and float64 numbers: times, intervals, angular rates and specific forces of the IMU, then for each measurement
@@ -64,7 +64,7 @@ MASKS.flags.writeable = False
 
 
 class InvalidOutputError(Exception):
-    """The estimator returned something that is no valid estimate."""
+    """The estimator returned a value that is not a valid estimate."""
 
 
 # --- packets ------------------------------------------------------------------------------------------
@@ -83,7 +83,7 @@ class PacketEncoder:
     Attributes
     ----------
     streams : list of (str, str, int)
-        Name, kind and number of components of each aiding instrument: what `PacketDecoder` is told.
+        Name, kind and number of components of each aiding instrument, for `PacketDecoder`.
     """
 
     def __init__(self, data: Block, ends: Array):
@@ -141,7 +141,7 @@ class PacketDecoder:
     Parameters
     ----------
     streams : sequence of (str, str, int)
-        As of `PacketEncoder`.
+        Name, kind and number of components of each aiding instrument, from `PacketEncoder`.
     """
 
     #: Bytes of a header.

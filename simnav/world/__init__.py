@@ -1,4 +1,4 @@
-"""The world: a vessel's motion through manoeuvres, sea and current, and what perfect instruments see of it."""
+"""The world: the motion of a vessel by manoeuvres, sea and current, and the samples of ideal instruments on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The current: a set, a drift and a shear with depth, and eddies that change it with time and place."""
+"""The current: mean direction, speed, shear with depth, and eddies that change with time and place."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from simnav.types import Array
 
 __all__ = ["Current", "eddies"]
 
-#: Plane waves of velocity that make up what changes.
+#: Number of plane waves of velocity whose sum is the variable part of the current.
 _EDDIES = 8
 
 
 class Current(Spec):
-    """A current whose speed falls linearly with depth, to nothing and no further.
+    """A current whose speed decreases linearly with depth, down to zero.
 
-    With ``variation`` it changes with time and place, as tides and eddies make it: a sum of plane waves of velocity
-    whose lengths and periods are around ``length_scale`` and ``time_scale``, each across its wave number, so that no
-    water gathers anywhere.
+    With ``variation`` the current has a variable part, like that of tides and eddies: a sum of plane waves of velocity
+    whose wavelengths and periods are near ``length_scale`` and ``time_scale``. The velocity of each wave is
+    perpendicular to its wave vector, so that the sum has no divergence.
 
     Attributes
     ----------
     speed : float
-        Mean at the surface [m/s].
+        Mean speed at the surface [m/s].
     direction : float
-        Towards which it flows on average, from north over east [rad].
+        Direction towards which the water flows on average, clockwise from north [rad].
     shear : float
-        Loss of speed per metre of depth [1/s].
+        Decrease of the speed per metre of depth [1/s].
     variation : float
-        Standard deviation of the north and of the east component [m/s].
+        Standard deviation of the north and of the east component of the variable part [m/s].
     length_scale, time_scale : float
-        Over which it changes once to the other side and back [m, s].
+        Typical wavelength [m] and typical period [s] of the variable part.
     """
 
     speed: NonNegative = quantity("m_s", 0.0)
@@ -53,26 +53,27 @@ class Current(Spec):
 
 
 def eddies(current: Current | None, seed: int) -> Array:
-    """Draw the changing part of the current of one run.
+    """Draw the variable part of the current of one run.
 
     Parameters
     ----------
     current : Current or None
-        None is still water.
+        The current; None: there is none.
     seed : int
         Seed of the run.
 
     Returns
     -------
     (n, 6) array
-        Of each plane wave: wave number north and east [rad/m], frequency [rad/s], phase [rad], and amplitude of the
-        velocity north and east [m/s]. No row where nothing changes.
+        One row for each plane wave: wave number north and east [rad/m], angular frequency [rad/s], phase [rad], and
+        amplitude of the velocity north and east [m/s]. Without a variable part there is no row.
     """
     if current is None or current.variation == 0.0:
         return np.zeros((0, 6))
     rng = stream(seed, "current")
     n = _EDDIES
-    # Directions evenly around the compass, with a random turn each, so that both components have their variance.
+    # Directions are spread evenly around the compass, each with a random offset, so that both components have their
+    # variance.
     heading = 2.0 * np.pi * (np.arange(n) + rng.random(n)) / n
     number = 2.0 * np.pi / (current.length_scale * rng.uniform(0.7, 1.4, n))
     omega = 2.0 * np.pi / (current.time_scale * rng.uniform(0.7, 1.4, n))

@@ -1,4 +1,4 @@
-"""What an estimator is told at the start: the true state with errors drawn from their covariance."""
+"""The initial state that an estimator receives: the true state with errors drawn from their covariance."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ def draw_start(truth: NavigationStates, covariance: Array, seed: int, factors: A
     Parameters
     ----------
     truth : NavigationStates
-        A series of one: the state at the start.
+        A series of one state: the truth at the start.
     covariance : (9, 9) array
-        Of the errors, over `simnav.types.COMPONENTS`.
+        Covariance of the errors, in the order of `simnav.types.COMPONENTS`. The estimator receives it.
     seed : int
         Seed of the run.
     factors : (9,) array or float
-        How many times as large as the covariance says the errors really are.
+        Factors by which the true errors are larger than the covariance says.
 
     Returns
     -------
     InitialState
+        The state with errors, and ``covariance``.
 
     Raises
     ------

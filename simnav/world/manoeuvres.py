@@ -1,7 +1,7 @@
-"""Manoeuvres: what the vessel is told to do, one after the other.
+"""Manoeuvres: the commands of the vessel, one after the other.
 
-Each is a `Spec`; `table` turns a list of them into the numeric rows that the motion kernel walks through. After the
-last one the vessel holds its course, speed and depth.
+Each manoeuvre is a `Spec`. `table` converts a list of them into the numeric rows that the motion kernel executes. After
+the last one the vessel holds its course, speed and depth.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Hold(Spec):
 
 
 class Accelerate(Spec):
-    """Change to a speed, at a constant acceleration or as fast as the vessel answers; hold it if a duration is left."""
+    """Change to a speed, with a constant acceleration or as fast as possible; hold it until the end of the duration."""
 
     kind: Literal["accelerate"] = "accelerate"
     speed: NonNegative = quantity("m_s")
@@ -53,7 +53,8 @@ class Accelerate(Spec):
 class Turn(Spec):
     """Turn by an angle (positive to starboard) or for a time, at a rate or on a radius.
 
-    Without rate and radius the vessel's own turn rate holds; with a duration alone the sign of the rate decides.
+    Without rate and radius the turn rate of the vessel is used. With a duration and no angle, the sign of the rate
+    decides the direction.
     """
 
     kind: Literal["turn"] = "turn"
@@ -82,7 +83,7 @@ class Turn(Spec):
 
 
 class ZigZag(Spec):
-    """Swing to either side of the course: turn until the heading is off by the angle, then the other way."""
+    """Turn until the heading differs from the course by the angle, then by the same angle to the other side."""
 
     kind: Literal["zigzag"] = "zigzag"
     angle: Angle = quantity("deg")
@@ -95,7 +96,7 @@ class ZigZag(Spec):
 
 
 class Waypoints(Spec):
-    """Steer for points (north, east of the start) one after the other; a point counts as reached inside the radius."""
+    """Steer for points (north, east of the start) one after the other; a point is reached within the radius."""
 
     kind: Literal["waypoints"] = "waypoints"
     points: Annotated[tuple[Point, ...], Field(min_length=1)] = quantity("m")
@@ -109,7 +110,7 @@ class Waypoints(Spec):
 
 
 class LawnMower(Spec):
-    """Survey parallel legs, from where the vessel is and along its heading."""
+    """Survey parallel legs, from the present position and along the present heading."""
 
     kind: Literal["lawn_mower"] = "lawn_mower"
     leg: Positive = quantity("m")
@@ -125,7 +126,7 @@ class LawnMower(Spec):
         for i in range(self.legs):
             ends = (0.0, self.leg) if i % 2 == 0 else (self.leg, 0.0)
             points.extend((end, i * side) for end in ends)
-        del points[first]  # the vessel is there
+        del points[first]  # the vessel is at this point already
         return [WAYPOINTS, inf, float(first), float(len(points)), self.acceptance_radius, 1.0]
 
 
@@ -142,7 +143,7 @@ class Dive(Spec):
 
 
 class Surface(Spec):
-    """Come up to the surface at a path angle."""
+    """Go to the surface at a path angle."""
 
     kind: Literal["surface"] = "surface"
     angle: Angle = quantity("deg", 0.2617993877991494)

@@ -1,9 +1,9 @@
-"""The motion kernel: commands, vessel dynamics, waves and current to a smooth truth and ideal inertial samples.
+"""The motion kernel: from commands, vessel dynamics, waves and current to a smooth truth and ideal inertial samples.
 
-Per sample it walks the manoeuvre table (guidance), advances speed, yaw rate and flight-path angle through critically
-damped lags, turns the wave components by their encounter phase, composes velocity and attitude, and inverts the
-strapdown equations to what perfect instruments deliver (`simnav.strapdown.sample_from_motion`), so that truth and
-samples agree to rounding.
+For each sample it executes the manoeuvre table (guidance), advances speed, yaw rate and flight-path angle through
+critically damped lags, advances the wave components by their encounter phase, composes velocity and attitude, and
+computes the sample of ideal instruments by the inverse strapdown equations (`simnav.strapdown.sample_from_motion`). So
+truth and samples agree up to rounding.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from simnav.world.sea import ROWS
 
 __all__ = ["PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "command", "initialise"]
 
-# Where things stand in the state vector.
+# Indices in the state vector.
 U, DU, R, DR, PSI, GAMMA, DGAMMA, DEPTH_CALM, NORTH, EAST = range(10)
 LATITUDE, LONGITUDE, HEIGHT = 10, 11, 12
 V = 13
@@ -33,8 +33,8 @@ ERROR_NORTH, ERROR_EAST = 46, 47
 ROLL, PITCH = 48, 49
 COS_PSI, SIN_PSI, COS_GAMMA, SIN_GAMMA = range(50, 54)
 WATER_NORTH, WATER_EAST = 54, 55
-# In closed loop: error of the heading that the vessel is steered by, and what is steered to come back to the track.
-# In a turn for a time, where the rate is commanded and not the heading: how much of both has been turned already.
+# In closed loop: error of the heading by which the vessel is steered, and the heading correction back to the track.
+# In a turn for a given time, where the rate is commanded and not the heading: the parts of both already turned.
 ERROR_HEADING, TO_TRACK, TURNED = 56, 57, 58
 STATE = 59
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
@@ -59,14 +59,17 @@ Composed = tuple[
 
 @kernel(fastmath={"reassoc", "contract", "nsz", "arcp"})
 def _waves(phase: Array, table: Array, north: float, east: float, dt: float) -> Responses:
-    """Turn the components' phases by one step (velocity through the water north, east) and sum the seven responses."""
-    # Two loops: the first writes what the second only reads, so that the compiler can vectorize both without
-    # checking at run time whether the rows overlap.
+    """Advance the phases of the wave components by one step, and sum the seven responses.
+
+    ``north`` and ``east`` are the velocity of the vessel through the water [m/s], ``dt`` is the length of the step [s].
+    """
+    # Two loops: the second only reads the rows that the first writes. So the compiler can vectorise both without a
+    # check at run time whether the rows overlap.
     for i in range(phase.shape[1]):
         rate = table[0, i] - table[1, i] * north - table[2, i] * east
         d = rate * dt
         d2 = d * d
-        # Encounter phases turn by less than 0.2 rad a sample; the series are good to rounding there.
+        # Encounter phases advance by less than 0.2 rad a sample; the series are exact to rounding there.
         sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
         cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
         c, s = phase[0, i], phase[1, i]
@@ -88,7 +91,11 @@ def _waves(phase: Array, table: Array, north: float, east: float, dt: float) -> 
 
 @kernel()
 def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: float) -> tuple[float, float]:
-    """Exact step of a critically damped second-order lag under a constant command; ``decay`` is exp(-dt/tau)."""
+    """Exact step of a critically damped second-order lag under a constant command.
+
+    ``x`` and ``dx`` are the value and its rate, ``tau`` is the time constant [s], ``dt`` the step [s], and ``decay`` is
+    exp(-dt/tau). Returned are the value and its rate at the end of the step.
+    """
     y = x - command
     b = dx + y / tau
     return command + (y + b * dt) * decay, (dx - b * dt / tau) * decay
@@ -102,7 +109,7 @@ def _wrap(angle: float) -> float:
 
 @kernel()
 def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, float]:
-    """Waypoint j, north and east of the start of the run."""
+    """Waypoint j as distances north and east of the start of the run [m]."""
     a, b = points[j, 0], points[j, 1]
     if relative > 0.0:
         c, s = cos(x[SEGMENT_PSI]), sin(x[SEGMENT_PSI])
@@ -112,11 +119,11 @@ def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, 
 
 @kernel()
 def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time: float) -> float:
-    """Walk the manoeuvre table; leave the references in the state and return the commanded yaw rate."""
+    """Execute the manoeuvre table: store the references in the state, and return the commanded yaw rate [rad/s]."""
     psi = x[PSI] + x[ERROR_HEADING] - x[TO_TRACK]
-    # Where the heading would come to rest if the rate were commanded to zero now.
+    # The heading at which the vessel would stop turning if the commanded rate became zero now.
     rest = psi + 2.0 * p[TAU_R] * x[R] + p[TAU_R] ** 2 * x[DR]
-    direct = inf  # a rate commanded past the heading loop
+    direct = inf  # a rate that is commanded directly, without the heading loop
     for _ in range(rows.shape[0] + 1):
         i = index[1]
         if i >= rows.shape[0]:
@@ -172,7 +179,7 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
                 x[TURNED] += extra * p[DT]
                 direct = x[SEGMENT_SIGN] * rate + extra
         elif kind == WAYPOINTS:
-            # Steered by where the navigator believes the vessel to be.
+            # The vessel is steered by its estimated position.
             north, east = x[NORTH] + x[ERROR_NORTH], x[EAST] + x[ERROR_EAST]
             while index[2] < int(rows[i, 3]):
                 j = index[2]
@@ -180,10 +187,10 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
                 from_a, from_b = x[SEGMENT_NORTH], x[SEGMENT_EAST]
                 if j > int(rows[i, 2]):
                     from_a, from_b = _waypoint(points, j - 1, rows[i, 5], x)
-                # Reached inside the radius, or when passed abeam: a tight corner is not circled for ever.
+                # Reached within the radius, or when it is abeam: otherwise the vessel might circle a point for ever.
                 passed = (north - a) * (a - from_a) + (east - b) * (b - from_b) > 0.0
                 if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2 and not passed:
-                    # Waypoints are steered for by themselves: nothing is added to come back to a track.
+                    # The vessel steers for the waypoint itself: there is no correction back to a track.
                     x[PSI_REFERENCE] = psi + _wrap(atan2(b - east, a - north) - x[TO_TRACK] - psi)
                     break
                 index[2] += 1
@@ -198,7 +205,7 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
     if direct < inf:
         return direct
     x[TURNED] = x[TO_TRACK] - x[ERROR_HEADING]
-    # Steering the heading of rest makes the loop a plain exponential: its derivative is the commanded rate itself.
+    # Control of the heading at rest makes the loop a simple exponential: its derivative is the commanded rate itself.
     wanted = (x[PSI_REFERENCE] - rest) / (2.0 * p[TAU_R])
     rate_command: float = min(max(wanted, -x[RATE_LIMIT]), x[RATE_LIMIT])
     return rate_command
@@ -206,7 +213,7 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
 
 @kernel()
 def _cosine_sine(angle: float) -> tuple[float, float]:
-    """Cosine and sine; by their series, good to rounding, where the angle is small, as roll and pitch mostly are."""
+    """Cosine and sine. For small angles, as roll and pitch mostly are, by their series, exact to rounding."""
     if abs(angle) > 0.3:
         return cos(angle), sin(angle)
     a = angle * angle
@@ -219,7 +226,7 @@ def _cosine_sine(angle: float) -> tuple[float, float]:
 
 @kernel()
 def _compose(x: Array, p: Array, waves: Responses) -> Composed:
-    """Velocity, attitude, roll and pitch of the state with the responses to the waves on top."""
+    """Velocity, attitude, roll and pitch of the state, with the responses to the waves added."""
     w0, w1, w2, w3, w4, w5, w6 = waves
     cp, sp, cg, sg = x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA]
     shade, flow = 1.0, 1.0
@@ -247,7 +254,7 @@ def _compose(x: Array, p: Array, waves: Responses) -> Composed:
 
 @kernel()
 def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
-    """Leave the velocity of the surface water at the vessel's place in the state."""
+    """Store the velocity of the surface water at the vessel's position in the state."""
     north, east = p[CURRENT_N], p[CURRENT_E]
     for i in range(eddies.shape[0]):
         c = cos(eddies[i, 0] * x[NORTH] + eddies[i, 1] * x[EAST] - eddies[i, 2] * time + eddies[i, 3])
@@ -258,7 +265,7 @@ def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
 def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) -> None:
-    """Complete the state at time 0: velocity and attitude with the waves and the current as they are then."""
+    """Complete the state at time 0: velocity and attitude with the waves and the current of that time."""
     _water(x, p, eddies, 0.0)
     x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
     ahead = x[U] * x[COS_GAMMA]
@@ -275,7 +282,7 @@ def _advance_one(
     x: Array, index: Integers, p: Array, plan: tuple[Array, Array], water: tuple[Array, Array, Array],
     tap_time: Array, taps: Array, imu: tuple[Array, Array],
 ) -> None:  # fmt: skip
-    """Advance one world by as many samples as there is room for in ``imu``; the arguments as of `advance`."""
+    """Advance one world by as many samples as ``imu`` has room for. The arguments are those of `advance`."""
     rows, points = plan
     phase, table, eddies = water
     rate, force = imu
@@ -302,7 +309,7 @@ def _advance_one(
             x[GAMMA], x[DGAMMA] = _lag(x[GAMMA], x[DGAMMA], climb, dt, p[TAU_G], decay_g)
             x[COS_GAMMA], x[SIN_GAMMA] = cos(x[GAMMA]), sin(x[GAMMA])
             x[DEPTH_CALM] += 0.5 * dt * (sink - x[U] * x[SIN_GAMMA])
-        # Waves, met at the speed through the water
+        # Waves, with the encounter frequency of the speed through the water
         x[COS_PSI], x[SIN_PSI] = cos(x[PSI]), sin(x[PSI])
         ahead = x[U] * x[COS_GAMMA]
         waves = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], dt)
@@ -344,29 +351,32 @@ def advance(
 ) -> None:  # fmt: skip
     """Advance w worlds, each by its own number of samples.
 
-    One kernel for one world and for many: the sum over waves is the only arithmetic that a compiler may reorder, so
-    that a second copy could differ in the last bit.
+    There is one kernel for one world and for many. The compiler may reorder the sum over waves, so a second copy of it
+    could differ in the last bit.
 
     Parameters
     ----------
     active : (w,) bool array
-        Which worlds are advanced.
+        True for each world that is advanced.
     state : (w, 59) and (w, 4) int arrays
-        The state; sample, segment, waypoint, whether the segment has begun. Both are updated.
+        The state vector, and the integer state: sample, segment, waypoint, and 1 if the segment has begun. Both are
+        updated.
     p : (w, 11) array
-        Constants of the vessel, the water and the step, at the places that this module names.
+        Constants of the vessel, the water and the step, at the indices that this module names.
     sizes : (w, 4) int array
-        How many manoeuvres, points, waves and eddies each world has.
+        Number of manoeuvres, points, waves and eddies of each world.
     plan : two (w, ...) arrays
-        Rows and points of the manoeuvre tables, each flat and with room behind it, like those of ``water``.
+        Rows and points of the manoeuvre tables (`simnav.world.manoeuvres.table`), each flattened. A row of the array
+        may be longer than its content, like the rows of ``water``.
     water : three (w, ...) arrays
-        Phases, updated, and table of the wave components (`simnav.world.sea.components`); the part of the current that
-        changes (`simnav.world.current.eddies`).
+        Phases (updated) and table of the wave components (`simnav.world.sea.components`); the variable part of the
+        current (`simnav.world.current.eddies`).
     wanted : (w, ...), (w,) int, (w,) int and (w, ..., 14) arrays
-        Ascending times at which the state is wanted [s]; those of them, from the first up to, not including, the last,
-        that are within the block; filled with the states at those times.
+        Ascending times at which the state is required [s]; index of the first of these times within the block, and
+        index after the last one; the states at these times, overwritten.
     imu : (w,) int, (w, ..., 3) and (w, ..., 3) arrays
-        By how many samples each world is advanced; filled with the ideal mean angular rate and specific force.
+        Number of samples by which each world is advanced; ideal mean angular rate [rad/s] and specific force [m/s^2],
+        overwritten.
     """
     x, index = state
     rows, points = plan
@@ -391,11 +401,11 @@ def advance(
 
 @kernel()
 def _tap(out: Array, a: float, x: Array, p: Array, composed: Composed, sample: tuple[float, ...]) -> None:
-    """State at the fraction a of a sample interval: velocity and angles linear, position accordingly."""
+    """State at the fraction a of a sample interval: velocity and angles are linear, position is their integral."""
     v, c, roll, pitch = composed
     yaw = atan2(x[C + 3], x[C])
     new_yaw = atan2(c[3], c[0])
-    # The position's share of the interval under a linear velocity
+    # The fraction of the position change that belongs to a linear velocity
     for i in range(3):
         mean = 0.5 * (x[V + i] + v[i])
         gained = x[V + i] * a + 0.5 * (v[i] - x[V + i]) * a * a
@@ -416,18 +426,18 @@ def _tap(out: Array, a: float, x: Array, p: Array, composed: Composed, sample: t
 
 @kernel("void(b1[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
 def command(active: Flags, x: Array, wrong: Array, heading: Array, speed: Array) -> None:
-    """Steer w worlds without manoeuvres.
+    """Command heading and speed of w worlds without manoeuvres.
 
     Parameters
     ----------
     active : (w,) bool array
-        Which of them.
+        True for each world that gets a command.
     x : (w, 59) array
-        State; updated.
+        State vectors; updated.
     wrong : (w,) array
-        By how much the heading that is steered by is off [rad]; NaN: as before.
+        Error of the estimated heading by which the vessel is steered [rad]; NaN: as before.
     heading, speed : (w,) array
-        What is steered: the heading as it is believed [rad], the speed through the water [m/s].
+        Commanded heading, in terms of the estimated one [rad], and commanded speed through the water [m/s].
     """
     for w in range(active.size):
         if active[w]:

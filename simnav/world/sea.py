@@ -1,8 +1,8 @@
-"""The sea: a wave spectrum, and the motions that it gives a vessel.
+"""The sea: a wave spectrum, and the motion of a vessel in the waves.
 
-The surface is a sum of long-crested components, each with its own frequency and direction. The vessel answers to
-the elevation (heave), the slope (roll, pitch) and the orbital motion (surge, sway) of each through a second-order
-response, and meets each at its encounter frequency, which follows from the vessel's own speed and course. Sources:
+The surface is a sum of long-crested components, each with its own frequency and direction. The vessel responds to
+the elevation (heave), the slope (roll, pitch) and the orbital motion (surge, sway) of each component by a second-order
+response, at the encounter frequency, which depends on the speed and course of the vessel. Sources:
 DNV-RP-C205 section 3.5 (spectra); T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, Wiley
 2011, chapters 8 and 10.
 """
@@ -35,9 +35,9 @@ class Sea(Spec):
     significant_height, peak_period : float
         Significant height of the waves [m], and period of the spectral peak [s].
     peakedness : float
-        JONSWAP's gamma.
+        Peak enhancement factor gamma of JONSWAP [-].
     direction : float
-        From which the waves come [rad].
+        Direction from which the waves come, clockwise from north [rad].
     spreading : float
         Standard deviation of the components' directions [rad].
     components : int
@@ -45,10 +45,10 @@ class Sea(Spec):
     heave_period, roll_period, pitch_period : float
         Natural periods of the responses [s].
     heave_damping, roll_damping, pitch_damping : float
-        Damping ratios.
+        Damping ratios of the responses [-].
     roll_gain, pitch_gain, drift_gain : float
-        Response to the wave slope (roll, pitch) and to the orbital motion (surge, sway) well below resonance; a hull
-        that spans several wave lengths averages them, so its gains are below 1.
+        Ratio of roll and pitch to the wave slope, and of surge and sway to the orbital motion, well below resonance
+        [-]. A hull that is longer than a wavelength averages over it, so its gains are below 1.
     """
 
     spectrum: Literal["jonswap", "pierson_moskowitz"] = "jonswap"
@@ -106,27 +106,27 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     Parameters
     ----------
     sea : Sea or None
-        None is a flat sea.
+        The sea state; None: a flat sea.
     seed : int
         Seed of the run: it fixes frequencies, directions and phases.
 
     Returns
     -------
     phase : (3, n) array
-        Cosine and sine of the phase at time 0 at the start position, and room for the encounter frequency.
+        Cosine and sine of the phase at time 0 at the start position, and a row for the encounter frequency.
     table : (17, n) array
         Frequency [rad/s], wave number north and east [rad/m]; then pairs of cosine and sine gains of the
         displacements north, east, down [m], and of the slope responses roll-north, roll-east, pitch-north,
-        pitch-east [rad]: the vessel's roll is the projection of (roll-north, roll-east) on its axes, and pitch
-        likewise.
+        pitch-east [rad]. The roll of the vessel is the projection of (roll-north, roll-east) on its axes, and its pitch
+        that of (pitch-north, pitch-east).
     """
     if sea is None or sea.significant_height == 0.0:
         return np.zeros((3, 0)), np.zeros((ROWS, 0))
     rng = stream(seed, "sea")
     n = sea.components
     peak = 2.0 * np.pi / sea.peak_period
-    # Components of equal energy, one at random within each quantile: the variance is exact in every run and no
-    # two runs, and no two hours, repeat.
+    # Components of equal energy, with a random frequency within each quantile: the variance is exact in every run, and
+    # the waves repeat neither from run to run nor from hour to hour.
     grid = peak * np.geomspace(0.4, 4.0, 4000)
     cumulative = np.concatenate(
         [[0.0], np.cumsum(np.diff(grid) * 0.5 * (spectrum(sea, grid)[1:] + spectrum(sea, grid)[:-1]))]

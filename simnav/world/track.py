@@ -1,4 +1,4 @@
-"""The planned track: where the vessel would go in calm water if it knew exactly where it is."""
+"""The planned track: the track of the vessel in calm water, if its position were known exactly."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["PlannedTrack"]
 
 @kernel("Tuple((f8, i8))(f8[:, ::1], i8, i8, f8, f8)")
 def _aside(points: Array, at: int, window: int, north: float, east: float) -> tuple[float, int]:
-    """How far to starboard of the nearest point a position is, and which point that is."""
+    """The distance of a position to starboard of the nearest point [m], and the index of this point."""
     low, high = max(0, at - window), min(points.shape[0] - 1, at + window)
     least = np.inf
     for i in range(low, high + 1):
@@ -26,14 +26,14 @@ def _aside(points: Array, at: int, window: int, north: float, east: float) -> tu
     before, after = max(at - 1, 0), min(at + 1, points.shape[0] - 1)
     along_north, along_east = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
     length = sqrt(along_north * along_north + along_east * along_east)
-    if length < 1e-6:  # she lies still
+    if length < 1e-6:  # the vessel does not move
         return 0.0, at
     d_north, d_east = north - points[at, 0], east - points[at, 1]
     return (along_north * d_east - along_east * d_north) / length, at
 
 
 class _Mover(Protocol):
-    """A world, as far as it is needed here."""
+    """The part of the interface of a world that is needed here."""
 
     @property
     def track(self) -> Array: ...
@@ -44,17 +44,17 @@ class _Mover(Protocol):
 
 
 class PlannedTrack:
-    """The track of a vessel's manoeuvres, a point a second, made as far as it is asked for.
+    """The track of a vessel's manoeuvres, one point a second. It is extended when a later time is needed.
 
     Parameters
     ----------
     world : World
-        A world of its own, without waves, at time 0; it is advanced here and sampled at `RATE`.
+        A separate world without waves, at time 0. It is advanced here and sampled at `RATE`.
 
     Attributes
     ----------
     points : (k, 4) array
-        North and east of the start [m], heading [rad], speed through the water [m/s].
+        Distances north and east of the start [m], heading [rad], speed through the water [m/s].
     position : (k, 3) array
         Latitude, longitude [rad] and height [m].
     """
@@ -71,7 +71,7 @@ class PlannedTrack:
         self._at = 0
 
     def reach(self, time: float) -> None:
-        """Make the track at least so long [s]."""
+        """Extend the track up to a time [s]."""
         more = int(time) + 2 - len(self.points)
         if more > 0:
             track, position = self._world.trace(more)
@@ -79,16 +79,16 @@ class PlannedTrack:
             self.position = np.concatenate([self.position, position])
 
     def aside(self, north: float, east: float, time: float) -> tuple[float, float]:
-        """How far to starboard of the track a position is [m], and the planned speed there [m/s].
+        """The distance of a position to starboard of the track [m], and the planned speed there [m/s].
 
-        The nearest point is looked for around the last one that was found, no more than `WINDOW` seconds from it.
+        The nearest point is searched within `WINDOW` seconds of the last nearest point.
 
         Parameters
         ----------
         north, east : float
-            Of the start [m].
+            Distance of the position from the start, north and east [m].
         time : float
-            Now [s].
+            Present time of the run [s].
         """
         if int(time) + self.WINDOW >= len(self.points):
             self.reach(time + 4 * self.WINDOW)

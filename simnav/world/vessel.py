@@ -1,4 +1,4 @@
-"""The vessel: where it starts and how it answers to commands."""
+"""The vessel: its initial state and its response to commands."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class Start(Spec):
     Attributes
     ----------
     latitude, longitude : float
-        Geodetic [rad].
+        Geodetic latitude and longitude [rad].
     height : float
-        Of the vessel's reference point above the ellipsoid [m]; the sea surface is at 0.
+        Height of the vessel's reference point above the ellipsoid [m]; the sea surface is at 0.
     depth : float
-        The same, positive down; one of the two [m].
+        Depth of the reference point, positive down [m]; instead of ``height``.
     heading : float
         Direction of the bow, clockwise from north [rad].
     speed : float
-        Through the water [m/s].
+        Speed through the water [m/s].
     """
 
     latitude: Annotated[float, Field(gt=-1.5533, lt=1.5533)] = quantity("deg")
@@ -45,17 +45,17 @@ class Start(Spec):
 
     @property
     def altitude(self) -> float:
-        """Height above the ellipsoid [m], however it was given."""
+        """Height above the ellipsoid [m], from ``height`` or ``depth``."""
         return self.height if self.depth is None else -self.depth
 
 
 class Vessel(Spec):
-    """Answer of a vessel to its commands: critically damped second-order lags, so that accelerations are continuous.
+    """Response of a vessel to its commands: critically damped second-order lags, so that accelerations are continuous.
 
     Attributes
     ----------
     kind : str
-        ``ship`` stays on the surface; ``uuv`` follows dive commands and feels less of the waves the deeper it is.
+        ``ship`` stays on the surface; ``uuv`` follows dive commands, and its wave motion decreases with depth.
     speed_time_constant, turn_time_constant, climb_time_constant : float
         Time constants of speed, yaw rate and flight-path angle [s].
     turn_rate : float

@@ -1,4 +1,4 @@
-"""The world as a state machine: advanced in blocks of any length, in constant memory, always the same numbers."""
+"""The world as a state machine. It is advanced in blocks of any length, with the same numbers and constant memory."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ __all__ = ["World", "WorldBlock"]
 _ON = np.ones(1, np.bool_)
 _TRACK = np.array([motion.NORTH, motion.EAST, motion.PSI, motion.U])
 
-#: How far ahead the vessel looks to come back to its track: at least [m], and so many seconds of its speed.
+#: Lookahead distance for the return to the track: smallest distance [m], and time at the present speed [s].
 LEAST_LOOKAHEAD, LOOKAHEAD_TIME = 30.0, 20.0
 
 
 @dataclass(frozen=True, eq=False)
 class WorldBlock:
-    """The truth over a stretch of time.
+    """The truth in an interval of time.
 
     Attributes
     ----------
     imu : ImuSamples
-        What a perfect IMU delivers.
+        The samples of an ideal IMU.
     taps : dict of str to TapStates
-        The states at the times that were asked for.
+        The true states at the requested times, by the name of the request.
     """
 
     imu: ImuSamples
@@ -51,22 +51,22 @@ class World:
     start : Start
         State of the vessel at time 0.
     vessel : Vessel
-        How the vessel answers to commands and to waves.
+        Response of the vessel to commands and waves.
     manoeuvres : sequence of Manoeuvre
         Commands, one after the other.
     sea : Sea or None
-        Wave spectrum; None is a flat sea.
+        Sea state; None: a flat sea.
     current : Current or None
-        Movement of the water; None is still water.
+        Current; None: there is none.
     rate : float
-        Samples of the ideal IMU per second [Hz].
+        Sample rate of the ideal IMU [Hz].
     seed : int
-        Seed of the wave components and of what changes in the current.
+        Seed of the wave components and of the variable part of the current.
 
     Attributes
     ----------
     sizes : (4,) int array
-        How many manoeuvres, points, waves and eddies.
+        Number of manoeuvres, points, waves and eddies.
     """
 
     def __init__(
@@ -93,9 +93,9 @@ class World:
         if current is not None and current.speed > 0.0:
             p[motion.CURRENT_N] = current.speed * np.cos(current.direction)
             p[motion.CURRENT_E] = current.speed * np.sin(current.direction)
-            p[motion.SHEAR] = current.shear / current.speed  # what changes falls with depth as the mean does
+            p[motion.SHEAR] = current.shear / current.speed  # the variable part decreases with depth like the mean
         if sea is not None and vessel.kind == "uuv":
-            # Waves die off as exp(-k z); the wave number at the peak stands for all, to keep the motion smooth.
+            # Waves decrease as exp(-k z); the wave number at the peak is used for all, to keep the motion smooth.
             p[motion.ATTENUATION] = (2.0 * np.pi / sea.peak_period) ** 2 / 9.81
         x = np.zeros(motion.STATE)
         x[motion.U] = x[motion.SPEED_COMMAND] = x[motion.SPEED_TARGET] = start.speed
@@ -115,11 +115,11 @@ class World:
 
     @property
     def time(self) -> float:
-        """Seconds since the start."""
+        """Time since the start [s]."""
         return int(self._index[0]) / self.rate
 
     def state(self) -> NavigationStates:
-        """The present state, a series of one."""
+        """The present state, as a series of one state."""
         x = self._x
         position = x[motion.LATITUDE : motion.HEIGHT + 1]
         yaw = np.arctan2(x[motion.C + 3], x[motion.C])
@@ -128,17 +128,17 @@ class World:
         return NavigationStates(np.array([self.time]), position[None].copy(), velocity[None].copy(), attitude[None])
 
     def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
-        """Closed loop: from now on the guidance sees a position and a heading that are off by this much.
+        """Closed loop: set the errors of the estimated position and heading that the guidance uses from now on.
 
-        Waypoints are steered for from the position that is believed. In every other manoeuvre the vessel comes back to
-        the planned track (`simnav.world.track.PlannedTrack`), as far as it believes itself beside it.
+        The vessel steers for waypoints from the estimated position. In every other manoeuvre it returns to the planned
+        track (`simnav.world.track.PlannedTrack`) by the estimated distance from it.
 
         Parameters
         ----------
         north, east : float
-            Believed minus true position [m].
+            Estimated minus true position [m].
         heading : float
-            Likewise [rad].
+            Estimated minus true heading [rad].
         """
         x = self._x
         x[motion.ERROR_NORTH], x[motion.ERROR_EAST], x[motion.ERROR_HEADING] = north, east, heading
@@ -152,17 +152,17 @@ class World:
     def plan(
         cls, start: Start, vessel: Vessel, manoeuvres: Sequence[Manoeuvre] = (), current: Current | None = None
     ) -> PlannedTrack:
-        """The track that is planned: without waves, in the mean current."""
+        """The planned track: without waves, in the mean current."""
         steady = None if current is None else current.model_copy(update={"variation": 0.0})
         return PlannedTrack(cls(start, vessel, manoeuvres, None, steady, rate=PlannedTrack.RATE, seed=0))
 
     def command(self, heading: float, speed: float) -> None:
-        """Steer a heading, as it is believed [rad], and a speed through the water [m/s]; without manoeuvres only.
+        """Command an estimated heading [rad] and a speed through the water [m/s]. It works without manoeuvres only.
 
         Raises
         ------
         ValueError
-            If there are manoeuvres, which steer for themselves.
+            If there are manoeuvres, because these command the vessel.
         """
         if len(self._rows):
             raise ValueError("a world with manoeuvres steers for itself")
@@ -177,17 +177,17 @@ class World:
         return _ON, state, self._p[None], self.sizes[None], (rows, points), (phase, waves, eddies)
 
     def trace(self, seconds: int) -> tuple[Array, Array]:
-        """Advance second by second, without a look at what instruments would say.
+        """Advance second by second, without the samples of instruments.
 
         Parameters
         ----------
         seconds : int
-            By how much the world is advanced [s].
+            Time by which the world is advanced [s].
 
         Returns
         -------
         track : (seconds, 4) array
-            `track` at the end of each.
+            The values of `track` at the end of each second.
         position : (seconds, 3) array
             Latitude, longitude [rad], height [m].
         """
@@ -204,7 +204,10 @@ class World:
         return track, position
 
     def hand_over(self) -> dict[str, NDArray[Any]]:
-        """Its arrays, under the names of the arguments of `simnav.world.motion.advance`; this world is used up."""
+        """Return the arrays of this world, by the names of the arguments of `simnav.world.motion.advance`.
+
+        The world must not be advanced by itself any more.
+        """
         return {
             "x": self._x, "index": self._index, "p": self._p, "sizes": self.sizes, "rows": self._rows.ravel(),
             "points": self._points.ravel(), "phase": self._phase.ravel(), "table": self._waves.ravel(),
@@ -212,7 +215,7 @@ class World:
         }  # fmt: skip
 
     def live_in(self, x: Array, index: NDArray[Any]) -> None:
-        """Read and write the state in these arrays from now on, which whoever took over advances."""
+        """Use these arrays as the state from now on. The caller of `hand_over` advances them."""
         self._x, self._index = x, index
 
     @property
@@ -227,13 +230,14 @@ class World:
         Parameters
         ----------
         until : float
-            A multiple of the sample interval [s].
+            End of the block, a multiple of the sample interval [s].
         taps : mapping of str to (m,) array
-            Ascending times within (now, until] at which states are wanted.
+            Ascending times within (now, until] at which states are requested [s], by name.
 
         Returns
         -------
         WorldBlock
+            The ideal IMU samples and the requested states.
         """
         first = int(self._index[0])
         n = round(until * self.rate) - first
@@ -255,6 +259,6 @@ class World:
             water = np.zeros((len(t), 3))
             water[:, :2] = s[:, 12:14]
             out[name] = TapStates(t, s[:, 0:3], s[:, 3:6], s[:, 6:9], s[:, 9:12], water)
-        # Divided, not multiplied by the interval: 2.29 s is then the float that a person writes.
+        # Division, not multiplication by the interval: the time is then the float nearest to the decimal, 2.29 s.
         time = np.arange(first + 1, first + n + 1) / self.rate
         return WorldBlock(ImuSamples(time, np.full(n, 1.0 / self.rate), rate[0], force[0]), out)

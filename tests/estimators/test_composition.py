@@ -267,7 +267,7 @@ def test_isolation_is_a_piece_of_windows_with_a_weighting():
 
     row = Isolated(together=5)
     assert (row.isolation.together, row.isolation.recent) == (5, 5.0)
-    assert "times running" in documented(Isolated)["together"][1]
+    assert "times in a row" in documented(Isolated)["together"][1]
     with pytest.raises(TypeError, match="takes no isolation: a filter sees one measurement at a time"):
         type(Row)("Filter", (Row,), {}, solver=KalmanEstimator, model=InertialModel, isolation=FaultIsolation)
     with pytest.raises(ValueError, match="FaultIsolation changes weights, and there is no weighting"):

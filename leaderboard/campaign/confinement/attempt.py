@@ -53,7 +53,7 @@ class Attempt:
     Attributes
     ----------
     status, reason : str
-        As of a trial, and what ended the process.
+        Status and reason as in a trial, or the cause that ended the process.
     trial : Trial or None
         None where the process ended before the trial did.
     seconds : float
@@ -61,7 +61,7 @@ class Attempt:
     peak_memory : int
         Beyond what the process started with [bytes].
     confinement : str
-        What was in force.
+        Confinement that was in force.
     """
 
     status: str
@@ -106,7 +106,7 @@ def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, se
     Parameters
     ----------
     confinement, hidden, loaded, sealed
-        As of `EstimatorServer`. To look at estimators needs no kernels.
+        As of `EstimatorServer`. Kernels are not needed to inspect estimators.
     """
     global _server, _owner
     if _server is not None and _owner != os.getpid():

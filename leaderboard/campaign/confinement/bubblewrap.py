@@ -49,7 +49,7 @@ def wrapped(
     command : sequence of str
         Program and arguments.
     environment : dict
-        That the command is started with; what the sandbox needs is set in it.
+        Environment variables of the command; the function sets those that the sandbox needs.
     hidden : sequence of Path
         Folders and files that are shown empty.
     writable : Path or None

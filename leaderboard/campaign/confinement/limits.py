@@ -68,9 +68,9 @@ def limit(seconds: float, memory: int, *, final: bool = True) -> None:
     seconds : float
         Wall-clock limit of which the CPU time allows four times as much, and a minute [s].
     memory : int
-        That it may take beyond what it has now [bytes].
+        Memory that the process may take in addition to its present memory [bytes].
     final : bool
-        The process cannot raise the limits again.
+        True: the process cannot raise the limits again.
     """
     import resource
 

@@ -70,7 +70,7 @@ class StoppedError(LostError):
     status : str
         As of `simnav.leaderboard.campaign.isolation.Outcome`.
     reason : str
-        What happened, for people.
+        Description of the event, for the user.
     """
 
     def __init__(self, status: str, reason: str):
@@ -111,11 +111,12 @@ class EstimatorServer:
     Attributes
     ----------
     confinement : str
-        What is in force: ``process``, ``landlock`` or ``bubblewrap``.
+        Confinement in force: ``process``, ``landlock`` or ``bubblewrap``.
     hidden : tuple of Path
-        What estimators cannot read.
+        Paths that estimators cannot read.
     sealed : bool
-        Of ``bubblewrap`` what is hidden is fixed; otherwise both count for the next run.
+        Whether the campaign is sealed. Under ``bubblewrap`` the hidden paths are fixed; otherwise both apply to the
+        next run.
 
     Raises
     ------

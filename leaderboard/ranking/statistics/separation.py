@@ -249,7 +249,7 @@ def tiers(order: Sequence[int], better: NDArray[np.bool_]) -> list[int]:
     order : sequence of int
         The rows, the best score first.
     better : (n, n) bool array
-        As of a `Separation`.
+        Significant differences, as in `Separation`.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Faults: composable layers over the streams of instruments, simulated or real, with their labels.
 
-`build_layers` makes the layers of a run and `labels` the truth about them; the bits of both agree.
+`build_layers` makes the layers of a run, and `labels` makes the labels of the faults. Both use the same bits.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ __all__ = [
 
 
 def fault_specs() -> list[type[FaultSpec]]:
-    """The specifications of all kinds of faults that are known."""
+    """The specifications of all registered kinds of faults."""
     return list(FAULTS.items().values())
 
 
-#: Any fault that is known; ``kind`` tells which.
+#: Any registered fault; its ``kind`` decides the class.
 AnyFault = Annotated[FaultSpec, OneOf(fault_specs)]
 
 
@@ -71,8 +71,8 @@ def build_layers(faults: Sequence[FaultSpec], seed: int) -> tuple[FaultLayer, ..
     Returns
     -------
     tuple of FaultLayer
-        Their bits are those of `labels`. The random streams of a fault are named by it and not by its place, so
-        that adding another one leaves it as it was.
+        One layer for each fault, with the bits of `labels`. The random streams of a fault are named after the fault and
+        not after its position in the list, so that an additional fault does not change it.
     """
     layers, bit = [], 0
     seen: Counter[str] = Counter()
@@ -90,7 +90,7 @@ def build_layers(faults: Sequence[FaultSpec], seed: int) -> tuple[FaultLayer, ..
 
 
 def labels(faults: Sequence[FaultSpec], duration: float, instruments: Mapping[str, str]) -> tuple[FaultLabel, ...]:
-    """The truth about the faults of a run: label j belongs to bit j.
+    """The labels of the faults of a run: label j belongs to bit j.
 
     Parameters
     ----------
@@ -99,6 +99,6 @@ def labels(faults: Sequence[FaultSpec], duration: float, instruments: Mapping[st
     duration : float
         Length of the run [s].
     instruments : mapping
-        Name to kind.
+        The kind of each instrument, by its name.
     """
     return tuple(label for fault in faults for label in fault.label(duration, instruments))

@@ -29,7 +29,7 @@ def _not_negative(spec: FaultSpec) -> None:
 
 
 def _all_times(stream: AidStream) -> tuple[Array, NDArray[np.intp] | None]:
-    """All sample times, delivered or dropped, and where among them the delivered ones are (None: all)."""
+    """All sample times, delivered or dropped, and the indices of the delivered ones among them (None: all)."""
     if len(stream.dropped) == 0:
         return stream.time, None
     times = np.sort(np.concatenate([stream.time, stream.dropped]), kind="stable")
@@ -37,7 +37,7 @@ def _all_times(stream: AidStream) -> tuple[Array, NDArray[np.intp] | None]:
 
 
 class AdditiveLayer(FaultLayer):
-    """Lays an error over the measurements within the intervals; a subclass gives `error`."""
+    """Adds an error to the measurements within the intervals; a subclass defines `error`."""
 
     @abstractmethod
     def error(self, stream: AidStream, time: Array, since: Array) -> Array:
@@ -46,14 +46,15 @@ class AdditiveLayer(FaultLayer):
         Parameters
         ----------
         stream : AidStream
-            The block of the instrument.
+            The measurements of the instrument in the present block.
         time, since : (m,) array
-            Of the measurements, since the start of the run and of their interval [s].
+            Times of the measurements since the start of the run, and since the start of their interval [s].
 
         Returns
         -------
         (m, d) array
-            Components as in ``KINDS[stream.kind].errors``, SI units; a row of zeros does not touch its measurement.
+            The errors; components as in ``KINDS[stream.kind].errors``, SI units. A measurement with a row of zeros is
+            not changed and not labelled.
         """
 
     @staticmethod
@@ -68,7 +69,7 @@ class AdditiveLayer(FaultLayer):
         return values
 
     def ahead(self, name: str, kind: str, time: Array) -> tuple[NDArray[np.int64], Array]:
-        """See `FaultLayer.ahead`; for those whose `error` asks for no more of a stream than what it is called."""
+        """See `FaultLayer.ahead`. It requires that `error` uses only the name and kind of the stream."""
         interval, error = super().ahead(name, kind, time)
         rows = np.flatnonzero(interval >= 0)
         if len(rows):
@@ -95,7 +96,7 @@ class AdditiveLayer(FaultLayer):
             )
         rows = active
         if delivered is not None:
-            # Back from all sample times to those that are in the stream.
+            # From all sample times back to the delivered ones.
             place = np.full(len(times), -1)
             place[delivered] = np.arange(len(delivered))
             rows = place[active]
@@ -117,8 +118,9 @@ class AdditiveLayer(FaultLayer):
 class NoiseStep(FaultSpec):
     """The white noise grows, by a factor or to a new sigma.
 
-    Noise is added whose variance is the difference of the new one and the measurement's own ``sigma``, so that it works
-    on real logs too; where the measurement is noisier already, nothing is added.
+    Noise is added to the measurement. Its variance is the difference between the new variance and the square of the
+    measurement's own ``sigma``, so that the fault also works on real logs. If the measurement is noisier already,
+    nothing is added.
     """
 
     stems: ClassVar[tuple[str, ...]] = ("sigma",)
@@ -167,10 +169,11 @@ class _NoiseStep(AdditiveLayer):
 
 @register_fault
 class GrossError(FaultSpec):
-    """Single measurements go wrong, each with a ``probability``.
+    """Single measurements have a gross error, each with the given ``probability``.
 
-    ``distribution`` "uniform": size = [minimum, maximum], with a random sign; "normal": size is the sigma; "fixed":
-    size is added as it is. With ``common`` all axes share one draw, else each has its own.
+    The ``distribution`` is "uniform": size = [minimum, maximum], with a random sign; "normal": size is the standard
+    deviation; or "fixed": size is the error itself. With ``common`` one random number is drawn for all axes, otherwise
+    one for each axis.
     """
 
     stems: ClassVar[tuple[str, ...]] = ("size",)
@@ -232,7 +235,7 @@ class _GrossError(AdditiveLayer):
 
 @register_fault
 class Multipath(FaultSpec):
-    """Time-correlated error: a first-order Gauss-Markov process, stationary from the start."""
+    """A time-correlated error: a first-order Gauss-Markov process, stationary from the start."""
 
     stems: ClassVar[tuple[str, ...]] = ("sigma",)
     effect: ClassVar[Effect] = "lasting"
@@ -270,7 +273,7 @@ class _Multipath(AdditiveLayer):
 
 @register_fault
 class Ramp(FaultSpec):
-    """An error that grows from zero at the start of each interval, by ``slope`` a second."""
+    """An error that grows from zero at the start of each interval, with the rate ``slope``."""
 
     stems: ClassVar[tuple[str, ...]] = ("slope",)
     effect: ClassVar[Effect] = "growing"

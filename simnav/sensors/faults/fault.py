@@ -1,9 +1,9 @@
-"""What all faults share in a scenario: where and when they act, their sizes and their labels.
+"""The common properties of faults in a scenario: their instruments and times, their sizes and their labels.
 
-Bits: a fault takes one bit of the labels, and one `FaultLabel`, per interval in ``intervals``, consecutive; a fault
-with a start and an end, or with random intervals, takes one.
+Bits: for each interval in ``intervals`` a fault has one bit of the labels and one `FaultLabel`; the bits are
+consecutive. A fault with a start and an end, or with random intervals, has one bit.
 
-`register_fault` makes a kind of fault known, ours and others' alike (``docs/how-to/add-an-instrument.md``).
+`register_fault` registers a kind of fault, of simnav or of a third party (``docs/how-to/add-an-instrument.md``).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FAULTS", "Effect", "FaultError", "FaultSpec", "Names", "effect_of", "register_fault"]
 
-#: Least mean length of random intervals: shorter ones touch no measurement, and cost memory [s].
+#: Smallest mean length of random intervals [s]: shorter ones contain no measurement, and need memory.
 _LEAST_MEAN = 1e-3
 
 
@@ -45,13 +45,13 @@ def _intervals(value: Any) -> Any:
     return tuple(value)
 
 
-#: Names of instruments; TOML may give one alone.
+#: Names of instruments; TOML may have one name without a list.
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 _Intervals = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_intervals)]
 
-#: What a fault does to a measurement: it takes it away; adds white noise; adds an error that lasts, or one that grows
-#: from the start of each interval; adds gross errors to single measurements; puts another value in its place; disturbs
-#: the IMU; or something else.
+#: The effect of a fault on measurements: they are missing; white noise is added; a lasting error is added, or one that
+#: grows from the start of each interval; gross errors are added to single measurements; measurements are replaced by
+#: other values; the IMU is disturbed; or something else.
 Effect = Literal["missing", "noise", "lasting", "growing", "gross", "replaced", "imu", "other"]
 
 
@@ -62,27 +62,27 @@ class FaultError(SpecError):
 class FaultSpec(Spec):
     """Base of all faults.
 
-    A size is given in the unit of the instruments that it touches: a field like ``offset`` exists as
+    A size is given in the unit of the instruments that the fault affects. So a size like ``offset`` has the fields
     ``offset_position`` (TOML ``offset_m``; also for depths), ``offset_velocity`` (``offset_m_s``) and
     ``offset_heading`` (``offset_deg``).
 
     Attributes
     ----------
     instruments : tuple of str
-        Names, or kinds, of the instruments that it touches.
+        Names or kinds of the affected instruments.
     start, end : float
-        When it acts [s]; by default the whole run.
+        Beginning and end of the fault [s]; by default the whole run.
     intervals : tuple of (float, float)
-        Instead of start and end: several intervals [s].
+        Several intervals in which the fault acts [s], instead of start and end.
     mean_active, mean_gap : float
-        Random intervals within start and end: the mean of their exponentially distributed lengths and of the gaps
-        between them [s].
+        The fault acts in random intervals within start and end: mean of their exponentially distributed lengths, and
+        mean of the gaps between them [s].
     name : str
-        Of the fault's random streams; by default its kind and instruments.
+        Name of the random streams of the fault; by default its kind and instruments.
     stems : tuple of str
-        Stems of the fields that exist per quantity.
+        Names of the sizes, without the quantity: ``offset`` in the example above.
     effect : Effect
-        What it does to a measurement; estimators that are told of the faults (oracles) go by it.
+        Effect on a measurement. The oracles, which know the faults, use it.
     """
 
     stems: ClassVar[tuple[str, ...]] = ()
@@ -99,7 +99,7 @@ class FaultSpec(Spec):
 
     @classmethod
     def toml_keys(cls) -> dict[str, tuple[str, FieldInfo]]:
-        """As `Spec.toml_keys`; the unit tells the quantity, so ``offset_position`` is ``offset_m``."""
+        """See `Spec.toml_keys`. The unit gives the quantity, so ``offset_position`` has the key ``offset_m``."""
         keys = {}
         for name, info in cls.model_fields.items():
             stem, _, last = name.rpartition("_")
@@ -131,7 +131,7 @@ class FaultSpec(Spec):
 
     @property
     def bits(self) -> int:
-        """How many bits, and labels, the fault takes."""
+        """Number of bits, and of labels, of the fault."""
         return max(1, len(self.intervals))
 
     @property
@@ -140,7 +140,7 @@ class FaultSpec(Spec):
         return True
 
     def sizes(self, stem: str) -> dict[str, Any]:
-        """The fields of a stem, by name."""
+        """The sizes of a stem, by the name of the field."""
         return {f"{stem}_{q}": getattr(self, f"{stem}_{q}") for q in QUANTITIES}
 
     def size(self, stem: str, kind: str) -> Array:
@@ -154,7 +154,7 @@ class FaultSpec(Spec):
         return next(key for key, (name, _) in self.toml_keys().items() if name == field)
 
     def touched(self, instruments: Mapping[str, str]) -> tuple[str, ...]:
-        """Names of the instruments that it touches, of a mapping from name to kind."""
+        """Names of the affected instruments, from a mapping from name to kind."""
         return tuple(n for n, k in instruments.items() if n in self.instruments or k in self.instruments)
 
     def check(self, instruments: Mapping[str, str], *, imu: bool = True) -> None:
@@ -163,14 +163,14 @@ class FaultSpec(Spec):
         Parameters
         ----------
         instruments : mapping
-            Name to kind.
+            The kind of each instrument, by its name.
         imu : bool
-            Whether there is an IMU.
+            Whether the scenario has an IMU.
 
         Raises
         ------
         SpecError
-            On an instrument that is not there, or a size in a unit that does not fit one.
+            If an instrument does not exist, or the unit of a size does not fit an instrument.
         """
         for name in self.instruments:
             if name == "imu":
@@ -215,14 +215,14 @@ class FaultSpec(Spec):
                 )
 
     def label(self, duration: float, instruments: Mapping[str, str]) -> list[FaultLabel]:
-        """The truth about the fault: one label per bit.
+        """The labels of the fault: one for each bit.
 
         Parameters
         ----------
         duration : float
-            Length of the run [s]; labels are cut off there.
+            Length of the run [s]; labels end there at the latest.
         instruments : mapping
-            Name to kind.
+            The kind of each instrument, by its name.
         """
         names = self.touched(instruments)
         intervals = self.intervals or ((self.start, self.end),)
@@ -231,26 +231,26 @@ class FaultSpec(Spec):
         return [FaultLabel(self.kind, names, min(a, duration), min(b, duration), parameters) for a, b in intervals]
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
-        """The fault of one run.
+        """Make the layer of this fault for one run.
 
         Parameters
         ----------
         index : int
-            Its first bit.
+            First bit of the fault in the labels.
         seed : int
             Seed of the run.
         occurrence : int, optional
-            Tells faults of the same name apart (`build_layers` counts them); by default the index.
+            Number that distinguishes faults of the same name (`build_layers` counts them); by default the index.
         """
         raise NotImplementedError(f"{type(self).__qualname__} has no build()")
 
     @property
     def stream_name(self) -> str:
-        """What the fault's random streams are named after, besides its occurrence."""
+        """Name of the random streams of the fault, without its occurrence."""
         return self.name or f"{self.kind}:{','.join(self.instruments)}"
 
     def key_of_streams(self, index: int, occurrence: int | None) -> str:
-        """The key of the random streams of one run's layer, from what `build` is given."""
+        """The key of the random streams of a layer, from the arguments of `build`."""
         return f"{self.stream_name}#{index if occurrence is None else occurrence}"
 
 
@@ -260,12 +260,13 @@ F = TypeVar("F", bound=FaultSpec)
 
 
 def register_fault(cls: type[F]) -> type[F]:
-    """Class decorator: make a kind of fault known, by the default of the field ``kind`` of its specification.
+    """Register a kind of fault (class decorator). Its name is the default of the field ``kind`` of the specification.
 
     Raises
     ------
     PluginError
-        If the class is no `FaultSpec`, its name is taken, or its effect or one of its fields is not valid.
+        If the class is not a subclass of `FaultSpec`, another class has its name, or its effect or one of its fields is
+        not valid.
     """
     if not (isinstance(cls, type) and issubclass(cls, FaultSpec)):
         raise PluginError(f"@register_fault: {cls!r} is not a subclass of simnav.sensors.faults.FaultSpec")
@@ -307,6 +308,6 @@ def _named(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def effect_of(kind: str) -> Effect:
-    """What a kind of fault does to a measurement; "other" if it is not known."""
+    """The effect of a kind of fault on measurements; "other" if the kind is not registered."""
     cls = FAULTS.get(kind)
     return "other" if cls is None else cls.effect

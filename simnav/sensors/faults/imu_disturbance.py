@@ -21,9 +21,9 @@ __all__ = ["ImuDisturbance"]
 
 @register_fault
 class ImuDisturbance(FaultSpec):
-    """A constant and white noise on the IMU's output, by body axis; one number is for all three.
+    """A constant error and white noise on the IMU's output, for each body axis; one number sets all three axes.
 
-    ``specific_force_noise`` and ``angular_rate_noise`` are the sigma of a sample.
+    ``specific_force_noise`` and ``angular_rate_noise`` are the standard deviation of a sample.
     """
 
     effect: ClassVar[Effect] = "imu"

@@ -1,8 +1,8 @@
-"""A fault in one run: a layer over whatever delivered the measurements, a simulator or a real log.
+"""A fault in one run: a layer that is applied to measurements, simulated or from a real log.
 
-It acts at the measurement times within its intervals [start, end); elsewhere it neither changes nor draws anything.
-Within them it draws a fixed number of variates per measurement, those counted that something else has dropped, so that
-faults never change one another.
+It acts at the measurement times within its intervals [start, end). Outside of them it neither changes a measurement nor
+draws a random number. Within them it draws a fixed number of variates for each measurement, also for measurements that
+another fault has removed, so that faults do not change one another.
 """
 
 from __future__ import annotations
@@ -35,23 +35,24 @@ __all__ = [
     "FaultLayer",
 ]
 
-#: Times are multiples of the sample interval up to rounding: half a microsecond decides [s].
+#: Tolerance for times, which are multiples of the sample interval up to rounding: half a microsecond [s].
 TOLERANCE = 0.5e-6
 
-#: What a layer does to a measurement, as far as it is known from the times alone (`FaultLayer.ahead`): it adds an
-#: error; adds noise up to a new sigma; takes it away; repeats an earlier one; says zero; disturbs the IMU.
+#: The action of a layer on a measurement, for layers that depend on the times only (`FaultLayer.ahead`): it adds an
+#: error; adds noise up to a new sigma; removes the measurement; repeats an earlier one; sets it to zero; disturbs the
+#: IMU.
 ADDS, STEPS_NOISE, DROPS, HOLDS, ZEROES, DISTURBS_IMU = range(6)
 
 
 class Activity:
-    """When a fault acts.
+    """The times at which a fault acts.
 
     Parameters
     ----------
     spec : FaultSpec
-        The fault, with its intervals or how they are drawn.
+        The fault, with its intervals or the parameters of random intervals.
     rng : numpy.random.Generator
-        For random intervals.
+        Generator for random intervals.
     """
 
     def __init__(self, spec: FaultSpec, rng: np.random.Generator):
@@ -77,17 +78,18 @@ class Activity:
         self.starts, self.ends = np.append(self.starts, starts), np.append(self.ends, ends)
 
     def locate(self, time: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-        """Which of the n times lie in an interval.
+        """Find the times within the intervals.
 
         Parameters
         ----------
         time : (n,) array
-            Ascending [s].
+            Measurement times, ascending [s].
 
         Returns
         -------
         rows, interval : (m,) int array
-            The times that do, and the number of the interval of each; None for none.
+            Indices of the times within an interval, and the number of the interval of each. None if there is no such
+            time.
         """
         if len(time) == 0:
             return None
@@ -101,25 +103,25 @@ class Activity:
 
 
 class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have some are abstract)
-    """A fault in one run, laid over the streams of its instruments block by block.
+    """A fault in one run. It is applied to the streams of its instruments block by block.
 
     Parameters
     ----------
     spec : FaultSpec
-        What the scenario says of the fault.
+        Specification of the fault in the scenario.
     index : int
         First bit of the fault in the labels of measurements.
     seed : int
         Seed of the run.
     key : str
-        Name of its random streams.
+        Name of the random streams of the fault.
 
     Attributes
     ----------
     spec : FaultSpec
-        What the scenario says of the fault.
+        Specification of the fault in the scenario.
     activity : Activity
-        When it acts.
+        The times at which the fault acts.
     """
 
     #: One of `ADDS`, ..., for runs that go step by step (`simnav.simulation.steps`); None: `apply` alone knows what it
@@ -132,21 +134,21 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
         self.activity = Activity(spec, self.rng("intervals"))
 
     def rng(self, *names: str) -> np.random.Generator:
-        """A random stream of this fault's own, the same generator for the same names: "gnss", "noise"."""
+        """A random stream of this fault. The same names, such as "gnss", "noise", give the same generator."""
         if names not in self._generators:
             self._generators[names] = random_stream(self._seed, "fault", self._key, *names)
         return self._generators[names]
 
     def touches(self, stream: AidStream) -> bool:
-        """Whether the fault is one of this instrument's."""
+        """Whether the fault affects the instrument of this stream."""
         return self.touches_kind(stream.name, stream.kind)
 
     def touches_kind(self, name: str, kind: str) -> bool:
-        """Whether the fault is one of the instrument of this name and kind."""
+        """Whether the fault affects an instrument of this name and kind."""
         return name in self.spec.instruments or kind in self.spec.instruments
 
     def bits(self, interval: NDArray[np.intp]) -> NDArray[np.uint32]:
-        """The label of measurements in intervals of the given numbers."""
+        """The label bits of measurements, from the numbers of their intervals."""
         number = interval if self.spec.intervals else np.zeros_like(interval)
         return np.left_shift(np.uint32(1), (self._index + number).astype(np.uint32))
 
@@ -156,21 +158,21 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
         return self._index
 
     def ahead(self, name: str, kind: str, time: Array) -> tuple[NDArray[np.int64], Array]:
-        """What `apply` finds and draws for the next n samples of an instrument, delivered or not.
+        """Compute in advance the intervals and the random values of `apply`, for the next n samples of an instrument.
 
         Parameters
         ----------
         name, kind : str
-            Of one of its instruments.
+            Name and kind of one of the affected instruments.
         time : (n,) array
-            Sample times [s].
+            Sample times, delivered or not [s].
 
         Returns
         -------
         interval : (n,) int array
-            Number of the interval that each sample lies in; -1 for none.
+            Number of the interval of each sample; -1 outside of all intervals.
         error : (n, d) array
-            What is drawn for it; zero where there is nothing to draw.
+            Error or noise that is drawn for each sample; zero if nothing is drawn.
         """
         interval, error = np.full(len(time), -1, np.int64), np.zeros((len(time), len(KINDS[kind].components)))
         found = self.activity.locate(time)
@@ -179,7 +181,7 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
         return interval, error
 
     def ahead_imu(self, time: Array) -> tuple[NDArray[np.bool_], Array]:
-        """Likewise of the IMU: the n samples that are disturbed, and the (n, 6) errors of rate and force."""
+        """The same for the IMU: an (n,) mask of disturbed samples, and (n, 6) errors of angular rate and force."""
         raise NotImplementedError(f"{type(self).__name__} does not disturb an IMU")
 
     def laid_over(self, stream: AidStream) -> AidStream:
@@ -208,34 +210,35 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
         return result
 
     def apply(self, stream: AidStream) -> AidStream:
-        """Lay the fault over the next block of a stream.
+        """Apply the fault to the next block of a stream.
 
         Parameters
         ----------
         stream : AidStream
-            Measurements of one of the fault's instruments, with what earlier faults did to them.
+            Measurements of one of the affected instruments, after earlier faults.
 
         Returns
         -------
         AidStream
-            The same one where the fault does nothing to it; the argument is never changed.
+            The measurements with the fault. If the fault changes nothing, it is the argument itself. The argument is
+            never modified.
         """
         return stream
 
     def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
-        """Lay the fault over the next block of IMU samples.
+        """Apply the fault to the next block of IMU samples.
 
         Parameters
         ----------
         samples : ImuSamples
-            Samples, with what earlier faults did to them.
+            Samples after earlier faults.
         labels : ImuLabels or None
-            Labels of these samples; None where no fault of the scenario touches the IMU.
+            Labels of these samples; None if no fault of the scenario affects the IMU.
 
         Returns
         -------
         samples, labels
-            As given where the fault is none of the IMU's.
+            Samples and labels with the fault. If the fault does not affect the IMU, they are the arguments themselves.
         """
         return samples, labels
 

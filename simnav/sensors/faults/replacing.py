@@ -1,4 +1,4 @@
-"""Faults that take a measurement away or replace it: outage, frozen output, false zero."""
+"""Faults that remove or replace measurements: outage, frozen output, false zero."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["FalseZero", "Frozen", "Outage", "ReplacingLayer"]
 
 @register_fault
 class Outage(FaultSpec):
-    """Nothing is delivered; the times of what is missing go to ``AidStream.dropped``."""
+    """No measurements are delivered. The times of the missing ones are in ``AidStream.dropped``."""
 
     effect: ClassVar[Effect] = "missing"
     kind: Literal["outage"] = "outage"
@@ -43,7 +43,7 @@ class _Outage(FaultLayer):
 
 
 class ReplacingLayer(FaultLayer):
-    """Puts other values in the place of the measurements within the intervals."""
+    """Replaces the measurements within the intervals by other values."""
 
     def replace_values(
         self, stream: AidStream, rows: NDArray[np.intp], values: Array, interval: NDArray[np.intp]
@@ -58,7 +58,7 @@ class ReplacingLayer(FaultLayer):
 
 @register_fault
 class Frozen(FaultSpec):
-    """The instrument repeats the last value that it delivered before the interval (or else its first one within)."""
+    """The instrument repeats its last value before the interval (or its first value within, if there is none)."""
 
     effect: ClassVar[Effect] = "replaced"
     kind: Literal["frozen"] = "frozen"
@@ -98,7 +98,7 @@ class _Frozen(ReplacingLayer):
 
 @register_fault
 class FalseZero(FaultSpec):
-    """The instrument says zero on all axes: a DVL that lost lock, or a receiver in the Gulf of Guinea."""
+    """The instrument reads zero on all axes, like a DVL that lost bottom lock."""
 
     effect: ClassVar[Effect] = "replaced"
     kind: Literal["false_zero"] = "false_zero"

@@ -1,4 +1,4 @@
-"""Sizes of faults: one for each quantity, and from it one for each component of an instrument."""
+"""Sizes of faults: from one size for each quantity to one size for each component of an instrument."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["QUANTITIES", "QUANTITY_OF", "Size", "axes_of", "size_by_component", 
 #: A number for all axes, or one per axis.
 Size = float | tuple[float, ...] | None
 
-#: Sizes are given for errors of these: the end of a field's name, and the units of the components that it is for.
+#: The quantities of sizes: the end of a field's name, and the units of the components to which it applies.
 QUANTITIES = {
     "position": ("m", "mm", "cm", "km"),
     "velocity": ("m_s", "mm_s", "cm_s", "kn"),
@@ -24,7 +24,7 @@ QUANTITY_OF = {unit: name for name, units in QUANTITIES.items() for unit in unit
 
 
 def axes_of(kind: str) -> dict[str, list[int]]:
-    """The components of a kind of instrument whose errors are of each quantity; "" for those of none."""
+    """The components of a kind of instrument, by the quantity of their errors; "" for components of no quantity."""
     axes: dict[str, list[int]] = {}
     for i, component in enumerate(KINDS[kind].components):
         axes.setdefault(QUANTITY_OF.get(component.error_unit, ""), []).append(i)
@@ -39,14 +39,14 @@ def size_by_component(sizes: Mapping[str, Any], stem: str, kind: str) -> Array |
     sizes : mapping
         Fields of the fault's specification, or of its label, SI units.
     stem : str
-        As in ``FaultSpec.stems``.
+        Name of the size without the quantity, one of ``FaultSpec.stems``.
     kind : str
         Kind of the instrument.
 
     Returns
     -------
     (d,) array or None
-        None where a size is not given.
+        The size for each component, SI units; None if a size is not given.
     """
     result = np.empty(len(KINDS[kind].components))
     for name, axes in axes_of(kind).items():
@@ -58,7 +58,7 @@ def size_by_component(sizes: Mapping[str, Any], stem: str, kind: str) -> Array |
 
 
 def size_range(sizes: Mapping[str, Any], stem: str, kind: str) -> tuple[Array, Array]:
-    """Likewise the (d,) smallest and largest size, where a size is [minimum, maximum]."""
+    """The (d,) smallest and (d,) largest size for each component, if a size is [minimum, maximum]."""
     low, high = np.empty((2, len(KINDS[kind].components)))
     for name, axes in axes_of(kind).items():
         low[axes], high[axes] = sizes[f"{stem}_{name}"]

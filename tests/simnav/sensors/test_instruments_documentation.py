@@ -33,5 +33,5 @@ def test_the_tables_hold_what_there_is():
     fields = {name for name in Kind.__dataclass_fields__ if not name.startswith("_")}
     assert set(rows) == fields | set(EQUATIONS)
     assert re.findall(r'`"(\w+)"`', rows["role"]) == list(get_args(Role))
-    told = next(line for line in TEXT.splitlines() if line.startswith("`effect` tells oracles"))
+    told = next(line for line in TEXT.splitlines() if line.startswith("`effect` describes"))
     assert set(re.findall(r'`"(\w+)"`', told)) == set(get_args(Effect)) - {"imu"}

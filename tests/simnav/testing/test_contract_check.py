@@ -201,7 +201,7 @@ def test_a_good_one_passes():
         (Emptying, "input", "the list of measurements"),
         (AliasingDiagnostic, "estimates", "the diagnostic 'count' differs at 1 s"),
         (Aliasing, "estimates", "copy it"),
-        (NeedsData, "silence", "every aiding instrument falls silent: error"),
+        (NeedsData, "silence", "after every aiding instrument stopped: error"),
         (NeedsDvl, "missing instruments", "without dvl: error"),
         (Picky, "missing instruments", "without dvl: error: reset(): it refuses a scenario that has all instruments"),
     ],
