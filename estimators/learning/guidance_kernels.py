@@ -171,7 +171,7 @@ def _number(value: float) -> float:
     "Tuple((i8[::1], f8[:, ::1], f8[:, ::1])), f4[:, ::1])"
 )
 def look(
-    active: Flags, clock: tuple[Integers, Array, Array], believed: tuple[Array, Array],
+    active: Flags, clock: tuple[Integers, Array, Array], estimated: tuple[Array, Array],
     delivered: tuple[Integers, Integers, Array, Flags], tracks: Tracks, half_width: float,
     memory: tuple[Integers, Array, Array], observation: NDArray[np.float32],
 ) -> None:  # fmt: skip
@@ -184,7 +184,7 @@ def look(
     clock : three (b,) arrays
         Number of the step (0 at the start of a voyage, before any step); time of the estimate, and length of a step
         [s].
-    believed : (b, 9) and (b, 2) arrays
+    estimated : (b, 9) and (b, 2) arrays
         Estimated position, velocity and attitude; variances of the horizontal position [m^2] and of the heading
         [rad^2].
     delivered : tuple of arrays
@@ -201,7 +201,7 @@ def look(
         Overwritten for the voyages that are active.
     """
     steps, now, step = clock
-    estimate, variance = believed
+    estimate, variance = estimated
     count, who, when, fix = delivered
     route, length, points, geodetic, course, along = tracks
     at, notes, start = memory

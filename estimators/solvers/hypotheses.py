@@ -113,7 +113,7 @@ class WatchedFilter(KalmanEstimator):
             if nis == nis:
                 self.mean_nis[name] = fading * self.mean_nis.get(name, 1.0) + (1.0 - fading) * nis / m
 
-    def doubt_motion(self) -> None:
+    def inflate_motion(self) -> None:
         """Inflate the covariance of position, velocity and attitude; the attitude within the linear range."""
         first = self._first_variances.copy()
         attitude = self.model.moving[1]

@@ -228,21 +228,21 @@ class SolutionSeparation(Solver):
                 self._begin(sub, begin, None)
         self._coasting: float | None = None
         self._settled = start.time
-        self._heard = dict.fromkeys(self._names, start.time)
+        self._last_delivery = dict.fromkeys(self._names, start.time)
         self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
         self._readmitted: dict[str, float] = {}
         self._count = dict.fromkeys(self._names, 0)
         self._alternatives: dict[str, Hypothesis] = {}
         self._time = start.time
         sigma = np.sqrt(np.diag(start.covariance))
-        self._unbelieving: Hypothesis | None = None
+        self._wrong_start: Hypothesis | None = None
         if self._inertial and sigma[8] <= KNOWN_HEADING:
-            self._unbelieving = Hypothesis(_START, self._filter(start=uncertain_start(start)), start.time)
+            self._wrong_start = Hypothesis(_START, self._filter(start=uncertain_start(start)), start.time)
         self._disturbed = False
         witnesses = self._inertial and len(set(self._group.values())) > 1
         self._imu = self._other_opinion_of_the_imu() if witnesses else None
         self._trial = -np.inf
-        self._searching = self._inertial and self._unbelieving is None
+        self._searching = self._inertial and self._wrong_start is None
         if self._searching:  # a filter that finds its heading may think too early that it has
             self._settled = start.time + _ALIGNMENT
 
@@ -277,7 +277,8 @@ class SolutionSeparation(Solver):
                 before = self._exclusion.usual.get(name, 1.0)
                 self._exclusion.usual[name] = before + slow * (min(nis, _UNUSUAL * before) - before)
         self._time = measurements.time
-        self._heard.update({m.instrument: m.time for m in measurements.aids if m.instrument in self._heard})
+        delivered = {m.instrument: m.time for m in measurements.aids}
+        self._last_delivery |= {name: time for name, time in delivered.items() if name in self._last_delivery}
         running = [(sub, {sub.name, *out}) for name in self._names if name not in out for sub in self._pairs[name]]
         running += [(sub, {sub.name}) for sub in self._alternatives.values()]
         for sub, without in running:
@@ -290,9 +291,9 @@ class SolutionSeparation(Solver):
         flagged = list(estimate.flagged)
         ratios = {name: self._separation(name, estimate) for name in self._names if name not in out}
         most = max(ratios.values(), default=0.0)  # the start is blamed only where instruments contradict each other
-        ratios |= self._doubt_of_the_start(measurements, estimate, fading)
-        ratios |= self._doubt_of_the_imu(measurements, estimate, fading)
-        aligning = self._unbelieving is not None and _START not in ratios
+        ratios |= self._test_of_the_start(measurements, estimate, fading)
+        ratios |= self._test_of_the_imu(measurements, estimate, fading)
+        aligning = self._wrong_start is not None and _START not in ratios
         lost = self._searching and since < self._horizon and self._disagreement(self._main) > _AGREEMENT
         if lost or self._disturbed or not self._test.applies(estimate):
             self._settled = max(self._settled, measurements.time + _RECENT)
@@ -306,7 +307,7 @@ class SolutionSeparation(Solver):
         if faulty is not None:
             estimate = self._exclude(faulty)
             flagged += [(faulty, m.time) for m in measurements.aids if m.instrument == faulty]
-        estimate = self._believe_the_imu_again() or estimate
+        estimate = self._readmit_the_imu() or estimate
         self._readmit(measurements.time)
         self._renew(measurements.time)
         diagnostics["protection_level"] = self._protection_level(estimate)
@@ -319,13 +320,13 @@ class SolutionSeparation(Solver):
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 
-    def _doubt_of_the_start(self, measurements: Measurements, estimate: Estimate, fading: float) -> dict[str, float]:
-        """The separation of the filter that does not believe the start, if it agrees with all instruments."""
-        sub = self._unbelieving
+    def _test_of_the_start(self, measurements: Measurements, estimate: Estimate, fading: float) -> dict[str, float]:
+        """The separation of the filter that allows for a wrong start, if it agrees with all instruments."""
+        sub = self._wrong_start
         if sub is None:
             return {}
         if measurements.time - sub.start > _ALIGNMENT:
-            self._unbelieving = None
+            self._wrong_start = None
             return {}
         sub.estimate = sub.filter.update(measurements)
         sub.filter.watch(sub.estimate, self._components, fading)
@@ -340,7 +341,7 @@ class SolutionSeparation(Solver):
             _IMU, self._filter(exclusion, disturbed=not self._disturbed), self._time, exclusion=exclusion
         )
 
-    def _doubt_of_the_imu(self, measurements: Measurements, estimate: Estimate, fading: float) -> dict[str, float]:
+    def _test_of_the_imu(self, measurements: Measurements, estimate: Estimate, fading: float) -> dict[str, float]:
         """The separation of the filter that does not believe the IMU, if it agrees with all instruments."""
         imu = self._imu
         if imu is None:
@@ -374,9 +375,9 @@ class SolutionSeparation(Solver):
         self._trial = self._time
         self._begin_imu(self._imu, without=())
         self._imu.filter.mean_nis.clear()
-        self._imu.filter.doubt_motion()
+        self._imu.filter.inflate_motion()
 
-    def _believe_the_imu_again(self) -> Estimate | None:
+    def _readmit_the_imu(self) -> Estimate | None:
         """Use the IMU again if a filter that believes it has agreed with all instruments for long enough."""
         imu = self._imu
         if imu is None or not self._disturbed:
@@ -406,7 +407,7 @@ class SolutionSeparation(Solver):
         contradicting = self._exclusion.contradicting(self._time) & ratios.keys()
         instruments = {*suspects, *probation, *contradicting} - {_IMU}
         spared = [name for name in instruments if self._can_spare(name)]
-        apart = {name: self._disagreement(self._elder(name).filter, {name, *out}) for name in spared}
+        apart = {name: self._disagreement(self._older_filter(name).filter, {name, *out}) for name in spared}
         if self._imu is not None and _IMU in suspects:
             apart[_IMU] = self._disagreement(self._imu.filter, self._imu.exclusion.excluded)
         if not apart:
@@ -418,26 +419,26 @@ class SolutionSeparation(Solver):
 
     def _pays(self, name: str, estimate: Estimate) -> bool:
         """Whether the filter without an instrument knows the position well enough to be believed."""
-        without = self._elder(name).estimate
+        without = self._older_filter(name).estimate
         assert without is not None
-        carried = set(self._speaking(self._group)) - {name, *self._exclusion.excluded}
+        carried = set(self._delivering(self._group)) - {name, *self._exclusion.excluded}
         return self._rules.pays(without, estimate, bool(carried))
 
     def _can_spare(self, name: str) -> bool:
         """Whether what is left without an instrument gives a position."""
         out = {name} if self._mistaken(name) else {name, *self._exclusion.excluded}
-        return self._rules.can_spare([n for n in self._speaking(self._names) if n not in out])
+        return self._rules.can_spare([n for n in self._delivering(self._names) if n not in out])
 
-    def _speaking(self, names: Iterable[str]) -> list[str]:
+    def _delivering(self, names: Iterable[str]) -> list[str]:
         """Those of the instruments that are not silent."""
-        return [n for n in names if self._time - self._heard[n] <= self._silence[n]]
+        return [n for n in names if self._time - self._last_delivery[n] <= self._silence[n]]
 
     def _mistaken(self, name: str) -> bool:
         """Whether it was this instrument that should have been excluded, and not the one that was."""
         before = self._alternatives.get(name)
         return before is not None and self._disagreement(before.filter, {before.name}) <= _AGREEMENT
 
-    def _elder(self, name: str) -> Hypothesis:
+    def _older_filter(self, name: str) -> Hypothesis:
         return min(self._pairs[name], key=lambda sub: sub.start)
 
     def _separation(self, name: str, estimate: Estimate) -> float:
@@ -451,13 +452,13 @@ class SolutionSeparation(Solver):
         if name == _IMU:
             return self._change_imu(self._imu)
         excluded, before = self._exclusion.excluded, self._alternatives.get(name)
-        chosen = self._elder(name)
+        chosen = self._older_filter(name)
         if before is not None and self._mistaken(name):
             chosen = before
             excluded.clear()
         elif not excluded:
             rivals = self._rules.rivals(self._names)
-            self._alternatives = {n: self._elder(n) for n in rivals if n != name and name in rivals}
+            self._alternatives = {n: self._older_filter(n) for n in rivals if n != name and name in rivals}
             for n, sub in self._alternatives.items():
                 self._pairs[n] = [other for other in self._pairs[n] if other is not sub]
                 self._pairs[n].append(Hypothesis(n, self._filter(), self._time))
@@ -469,7 +470,7 @@ class SolutionSeparation(Solver):
         excluded.add(name)
         estimate = self._go_on_from(chosen)
         if (
-            excluded.issuperset(self._speaking(self._group))
+            excluded.issuperset(self._delivering(self._group))
             or self._disagreement(chosen.filter, excluded) > _NOTHING_AGREES
         ):
             self._try_without_the_imu()
@@ -482,7 +483,7 @@ class SolutionSeparation(Solver):
         if self._disturbed:
             self._count[_IMU] = self._count.get(_IMU, 0) + 1
             self._exclusion.begin_again(chosen.exclusion.excluded)
-        self._alternatives, self._unbelieving = {}, None
+        self._alternatives, self._wrong_start = {}, None
         self._main = self._filter(self._exclusion, disturbed=self._disturbed)
         for pair in self._pairs.values():
             for sub in pair:
@@ -493,9 +494,9 @@ class SolutionSeparation(Solver):
         return estimate
 
     def _start_again(self) -> Estimate:
-        """Take the filter that does not believe the start for the main one, with all instruments."""
-        assert self._unbelieving is not None
-        chosen, self._unbelieving, self._alternatives = self._unbelieving, None, {}
+        """Make the filter that allows for a wrong start the main one, with all instruments."""
+        assert self._wrong_start is not None
+        chosen, self._wrong_start, self._alternatives = self._wrong_start, None, {}
         self._exclusion.begin_again()
         return self._go_on_from(chosen)
 
@@ -516,8 +517,8 @@ class SolutionSeparation(Solver):
             for name, since in agrees.items()
             if time - since >= self.recovery * min(2.0 ** (self._count[name] - 1), _LONGEST)
         ]
-        heard = self._speaking(self._group)
-        fixes, logs = ([n for n in heard if self._group[n] is kind] for kind in (True, False))
+        delivering = self._delivering(self._group)
+        fixes, logs = ([n for n in delivering if self._group[n] is kind] for kind in (True, False))
         needed, first, longest = self._rules.lost_without(fixes, logs)
         coasting = bool(needed) and set(needed) <= excluded
         self._coasting = (time if self._coasting is None else self._coasting) if coasting else None
@@ -559,7 +560,7 @@ class SolutionSeparation(Solver):
             for name in self._names:
                 if name in self._exclusion.excluded:
                     continue
-                own, apart = self._test.variances(self._elder(name), estimate)
+                own, apart = self._test.variances(self._older_filter(name), estimate)
                 level = max(level, self._test.factor * sqrt(float(apart[q])) + self._missed * sqrt(float(own[q])))
             levels.append(level)
         return hypot(*levels)

@@ -94,6 +94,8 @@ def load(name_or_path: str | Path) -> Scenario:
     SpecError
         If there is no such scenario or file, or it is not valid: one sentence.
     """
+    if not isinstance(name_or_path, (str, os.PathLike)):
+        raise SpecError(f"{name_or_path!r} is not a scenario; a name or the path of a TOML file is wanted")
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or os.sep in text:
         return _read(Path(text))

@@ -92,17 +92,17 @@ class SteppedRuns:
         self._compiled[b] = known
         state = simulator.initial_truth
         self.truth[b] = np.concatenate([state.position[0], state.velocity[0], state.attitude[0]])
-        for name, array in simulator.world.hand_over().items():
+        for name, array in simulator.world.share_state().items():
             self._put(name, b, array)
         if known:
             self._put_instruments(b, simulator, layers)
-        simulator.world.live_in(self.x[b], self.index[b])
+        simulator.world.use_state(self.x[b], self.index[b])
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         for b, simulator in enumerate(self.simulators):  # a copy no longer shares its arrays with the worlds
             if simulator is not None:
-                simulator.world.live_in(self.x[b], self.index[b])
+                simulator.world.use_state(self.x[b], self.index[b])
 
     def _put(self, name: str, b: int, value: Any) -> None:
         """Store an array of run b. If it does not fit, the shared array is enlarged for all runs."""

@@ -443,6 +443,6 @@ def command(active: Flags, x: Array, wrong: Array, heading: Array, speed: Array)
         if active[w]:
             if wrong[w] == wrong[w]:
                 x[w, ERROR_HEADING] = wrong[w]
-            believed = x[w, PSI] + x[w, ERROR_HEADING]
-            x[w, PSI_REFERENCE] = believed + wrap_scalar(heading[w] - believed)
+            estimated = x[w, PSI] + x[w, ERROR_HEADING]
+            x[w, PSI_REFERENCE] = estimated + wrap_scalar(heading[w] - estimated)
             x[w, SPEED_TARGET] = max(speed[w], 0.0)

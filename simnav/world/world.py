@@ -203,7 +203,7 @@ class World:
             position[i] = self._x[motion.LATITUDE : motion.HEIGHT + 1]
         return track, position
 
-    def hand_over(self) -> dict[str, NDArray[Any]]:
+    def share_state(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of this world, by the names of the arguments of `simnav.world.motion.advance`.
 
         The world must not be advanced by itself any more.
@@ -214,8 +214,8 @@ class World:
             "eddies": self._eddies.ravel(),
         }  # fmt: skip
 
-    def live_in(self, x: Array, index: NDArray[Any]) -> None:
-        """Use these arrays as the state from now on. The caller of `hand_over` advances them."""
+    def use_state(self, x: Array, index: NDArray[Any]) -> None:
+        """Use these arrays as the state from now on. The caller of `share_state` advances them."""
         self._x, self._index = x, index
 
     @property

@@ -48,7 +48,7 @@ def run(recording, **parameters):
 
 def without(estimator: SolutionSeparation, name: str) -> Estimate:
     """What the older sub-filter without an instrument says; it is never given out, so it is not public."""
-    return estimator._elder(name).estimate
+    return estimator._older_filter(name).estimate
 
 
 def test_difference_and_displacement_are_inverse():

@@ -466,3 +466,9 @@ def test_nonsense_anywhere_gives_one_sentence_or_a_scenario(text):
                 assert Scenario.from_toml(scenario.to_toml()) == scenario
                 assert math.isfinite(scenario.instruments_sheet().step)
     assert refused > 300
+
+
+@pytest.mark.parametrize("given", [None, 3, ["open-sea"]])
+def test_what_is_no_name_and_no_path_is_refused_in_one_sentence(given):
+    with pytest.raises(SpecError, match="is not a scenario; a name or the path of a TOML file is wanted"):
+        load(given)
