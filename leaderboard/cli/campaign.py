@@ -69,7 +69,7 @@ def command(
         bool, typer.Option("--keep-trials", help="Keep the estimates, for 'simnav rescore'.")
     ] = False,
     covariance_interval: Annotated[
-        float, typer.Option(min=0.0, help="Smallest time between two kept covariances [s]. 0 keeps all.")
+        float, typer.Option(min=0.0, help="Smallest number of seconds between two kept covariances. 0 keeps all.")
     ] = 0.0,
     backend: Annotated[Backend, typer.Option(help="Processes of this machine, or a Dask cluster.")] = Backend.LOKY,
     scheduler: Annotated[

@@ -206,7 +206,7 @@ def test_a_docstring_and_the_chart_keep_the_recordings_and_a_constant_changes_th
 
     assert not after(comment, library / "strapdown.py")
     assert not after(
-        edit, library / "simulation" / "simulator.py", '"""What happens from now to a time.', '"""Something else.'
+        edit, library / "simulation" / "simulator.py", '"""Simulate the run up to a time.', '"""Something else.'
     )
     assert not after(constant, library / "environment" / "rendering.py")
     assert not after(edit, library / "scoring" / "outages.py", "RECOVERY_THRESHOLD = 10.0", "RECOVERY_THRESHOLD = 11.0")
