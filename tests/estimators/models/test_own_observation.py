@@ -21,6 +21,7 @@ from simnav.sensors import GnssPosition, register_instrument
 from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Measurement
+from tests.cases.derivatives import innovation
 
 #: Steps of the finite differences: position, velocity, attitude, biases, calibration.
 STEPS = np.concatenate([np.repeat([1.0, 1e-2, 1e-5, 1e-5, 1e-3], 3), np.full(2, 1e-3)])
@@ -51,14 +52,6 @@ def tilted(model: InertialModel, recording: Recording) -> Measurement:
     model.calibration += 0.01
     stream = recording.data.aids["transponder"]
     return Measurement(1.0, "transponder", "beacon", stream.value[0])
-
-
-def innovation(model: InertialModel, m: Measurement, error: np.ndarray) -> np.ndarray:
-    kept = model.snapshot()
-    model.correct(error)
-    found = model.measure(m).innovation
-    model.restore(kept)
-    return found
 
 
 def test_the_model_has_the_jacobian_of_the_file_and_of_the_bias(recording):

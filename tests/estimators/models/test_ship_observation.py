@@ -13,6 +13,7 @@ from simnav.scoring import score
 from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Measurement
+from tests.cases.derivatives import innovation
 
 #: A ship that loses its GNSS receiver after 60 s and turns; a radar measures range and bearing to a beacon ashore.
 COAST = """
@@ -86,14 +87,6 @@ def begun(model, recording):
     model.propagate(covariance, 1.0)
     model.x[4:] = np.linspace(0.01, 0.02, len(model.x) - 4)
     return Measurement(1.0, "radar", "beacon", recording.data.aids["radar"].value[0])
-
-
-def innovation(model, m: Measurement, error: np.ndarray) -> np.ndarray:
-    kept = model.snapshot()
-    model.correct(error)
-    found = model.measure(m).innovation
-    model.restore(kept)
-    return found
 
 
 def test_the_jacobian_is_that_of_finite_differences(recording):
