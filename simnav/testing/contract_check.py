@@ -425,13 +425,14 @@ def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     needed: list[str] = []
     for absent in (["imu"], *([n] for n in names), names, [*names, "imu"]):
         trial = run_trial(candidate.factory(), _without(recording, absent))
-        label = absent[0] if len(absent) == 1 else "all" if "imu" in absent else "all but the IMU"
+        label = absent[0] if len(absent) == 1 else "instruments" if "imu" in absent else "aiding instruments"
         if trial.status not in ("ok", "unsuitable"):
             return False, f"without {label}: {trial.status}: {trial.reason}"
         if trial.status == "unsuitable":
             needed.append(label)
-    sentence = f"it declares that it needs {', '.join(needed)}" if needed else "it works without any of them"
-    return True, sentence
+    if not needed:
+        return True, "it works without any of them"
+    return True, f"it declares that it cannot run without {', or without '.join(needed)}"
 
 
 #: All checks, in the order of the report.
