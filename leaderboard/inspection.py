@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.request import Estimators, requests
 from simnav.leaderboard.given import ScenarioLike, Scenarios, absolute, results_of, scenario_of, scenarios_of, whole
+from simnav.leaderboard.results import requested
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
@@ -61,14 +62,16 @@ def rank(
     if score is not None:
         require_lower(score, "a ranking is by errors")
     wanted = RANKED_SCORES | ({score} if score else set())
+    asked: Mapping[str, Sequence[int]] = {}
     if results is None or isinstance(results, (str, os.PathLike)):
         given = results_of(results, scores=wanted)
+        asked = requested.read(results)
     else:
         given = list(results)
     if not all(isinstance(r, Result) for r in given):
         raise RequestError("a folder of results is wanted, or results; 'simnav.merge' puts several folders together")
     require_score(score, given)
-    return rank(given, score=score, tracks=tracks)
+    return rank(given, score=score, tracks=tracks, requested=asked)
 
 
 def rescore(

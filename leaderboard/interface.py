@@ -390,6 +390,7 @@ def campaign(
     from simnav.leaderboard.profiles import load
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.results import requested
 
     parts: list[tuple[Scenarios, Estimators, int]] = [(scenarios, estimators, RUNS if runs is None else runs)]
     if profile is not None:
@@ -413,7 +414,8 @@ def campaign(
                                   minutes=None if end is None else max(0.0, (end - time.monotonic()) / 60.0)))
     # fmt: on
     results = results_of(folder)
-    return CampaignReport(results, rank(results, tracks=tracks), combined(summaries))
+    ranking = rank(results, tracks=tracks, requested=requested.read(folder))
+    return CampaignReport(results, ranking, combined(summaries))
 
 
 def sweep(

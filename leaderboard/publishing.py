@@ -85,13 +85,15 @@ def site(
     """
     from simnav.leaderboard.papers.page import find
     from simnav.leaderboard.ranking.agreement import rank_correlations
+    from simnav.leaderboard.ranking.ranking import rank as ranked
+    from simnav.leaderboard.results import requested
     from simnav.leaderboard.site import sweeps as swept
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
 
     shown, processes = whole("runs_shown", runs_shown, 1), whole("workers", workers, 1)
     found = results_of(results, series=True)
-    ranking = rank(found)
+    ranking = ranked(found, requested=requested.read(results))
     correlations = () if against is None else tuple(rank_correlations(ranking, rank(against)))
     index = build(
         found, ranking, absolute(output), progress=progress, workers=processes, papers=find(Path(papers)),

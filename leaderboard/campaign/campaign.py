@@ -36,7 +36,7 @@ from simnav.leaderboard.campaign.resolution import resolve, variant_of
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
-from simnav.leaderboard.results import store, trials
+from simnav.leaderboard.results import requested, store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
@@ -254,6 +254,7 @@ def run_campaign(
     }  # scenario -> label -> variant
     current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
     store.select(path, current)
+    requested.add(path, (s.id for s in scenarios), len(seeds))
 
     scores, scoring = own_scores(), scoring_code()
     plan = Plan(scenarios, entrants, seeds, variants, shard=shard)

@@ -17,6 +17,7 @@ from simnav.leaderboard.results.plain import plain
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from simnav.leaderboard.ranking.statistics import Gain
     from simnav.scoring.consistency import Badge
 
 __all__ = [
@@ -32,13 +33,16 @@ __all__ = [
     "TrackRow",
 ]
 
+_GAIN = ("value", "low", "high", "scenarios_low", "scenarios_high", "won", "worse")
+
 #: A reference figure of fewer runs is provisional.
 FIRM_REFERENCE = 50
 
 #: Whether a row is ranked, and if not, why: a reference is told the truth; one that is unsuitable needs instruments
-#: that a scenario of the track lacks; one that is incomplete has not run the whole track; one that is implausible has
-#: smaller errors than are possible; one that is identical is another row in real time, and only smooths beside.
-Standing = Literal["ranked", "reference", "unsuitable", "incomplete", "implausible", "identical"]
+#: that a scenario of the track lacks; one that is incomplete lacks scenarios or seeds of the track; one that is
+#: implausible has smaller errors than are possible; one that is identical is another row in real time, and only smooths
+#: beside; a variant is one of many of the same row.
+Standing = Literal["ranked", "reference", "unsuitable", "incomplete", "implausible", "identical", "variant"]
 
 
 @dataclass(frozen=True)
@@ -64,12 +68,12 @@ class Consistency:
 
 @dataclass(frozen=True)
 class Reference:
-    """The fixed figure that the errors of a scenario are divided by.
+    """What the errors of a scenario are divided by: the errors of an oracle on the same runs, or else a fixed figure.
 
     Attributes
     ----------
     value : float
-        In the unit of the score [m].
+        In the unit of the score [m]; of paired runs, the geometric mean.
     estimator : str
         Whose error it is; empty where there is none, and the figures are in metres.
     runs : int
@@ -85,6 +89,8 @@ class Reference:
         The oracle's error over the Cramer-Rao bound, and its standard error; NaN where not known.
     nees, nees_error : float
         The oracle's mean normalised error squared of the horizontal position, likewise.
+    paired : bool
+        Whether the error of each run is divided by that of the reference in the same run.
     """
 
     value: float = 1.0
@@ -97,6 +103,7 @@ class Reference:
     to_bound_error: float = math.nan
     nees: float = math.nan
     nees_error: float = math.nan
+    paired: bool = field(default=False, kw_only=True)
 
     @property
     def standard_error(self) -> float:
@@ -105,8 +112,8 @@ class Reference:
 
     @property
     def provisional(self) -> bool:
-        """Whether it is a geometric mean of fewer runs than `FIRM_REFERENCE`."""
-        return bool(self.estimator) and self.runs < FIRM_REFERENCE
+        """Whether it is a fixed figure of fewer runs than `FIRM_REFERENCE`."""
+        return bool(self.estimator) and not self.paired and self.runs < FIRM_REFERENCE
 
     @property
     def bounds(self) -> bool:
@@ -118,9 +125,14 @@ class Reference:
         """What the ratios are to, in words."""
         if not self.estimator:
             return "1 m: there is no reference figure"
+        what = "" if self.bounds else ", a plain filter: no oracle and no bound is known here"
+        if self.paired:
+            return (
+                f"the error of {self.estimator} on the same run (geometric mean {self.value:.4g} m over {self.runs} "
+                f"runs){what}"
+            )
         origin = "shipped with the scenario" if self.stored else "of this campaign"
         error = f" +- {100.0 * self.standard_error:.2g} %" if math.isfinite(self.standard_error) else ""
-        what = "" if self.bounds else ", a plain filter: no oracle and no bound is known here"
         return (
             f"{self.value:.4g} m{error}, the geometric mean of {self.estimator} over {self.runs} runs ({origin}){what}"
         )
@@ -138,22 +150,24 @@ class Row:
         Whether it is ranked.
     why : str
         Why it is not ranked, in one sentence; empty for those that are, and for references.
-    rank : int or None
-        Position by score from 1; equal scores share it. None for rows that are not ranked.
     rank_low, rank_high : int or None
         Interval of the rank: the rows above ``rank_low`` are told from it and better, those below ``rank_high`` are
-        told from it and worse. The intervals of all rows hold together with 95 % probability.
-    tier : int or None
-        Tier, from 1 (the best). Rows of one tier do not differ significantly.
+        told from it and worse. The intervals of all rows hold together with 95 % probability. None for rows that are
+        not ranked, and on a board whose rows cannot be ordered.
     may_be_best : bool
         Whether it belongs to the set that holds the best row with 95 % probability.
     provisional : bool
         Whether it has fewer than ten seeds (recordings) somewhere.
     score, low, high : float
-        Geometric mean of the ratio of the error to the reference figure, with its 95 % interval (NaN with fewer than
-        six seeds). The interval takes the share of failures as it was observed.
-    adjustment : float
-        Factor in the score for seeds that others have run and it has not; 1 without such seeds.
+        Geometric mean of the ratio of the error to the reference, with its 95 % interval over seeds (NaN where it is
+        not known). The interval takes the share of failures as it was observed.
+    scenarios_low, scenarios_high : float
+        Interval of the score over seeds and scenarios: what it would be on other scenarios of the same kind; NaN with
+        too few scenarios.
+    gain : Gain or None
+        The row beside the plain row on the same runs; None where there is none.
+    far : float
+        Share of the runs whose error is more than ten times that of the oracle; NaN without a paired oracle.
     worst, p95 : float
         Largest ratio of a run, and the one that 95 % of the runs do not exceed.
     runs, failed : int
@@ -175,16 +189,17 @@ class Row:
     estimator: str
     standing: Standing
     why: str = ""
-    rank: int | None = None
     rank_low: int | None = None
     rank_high: int | None = None
-    tier: int | None = None
     may_be_best: bool = False
     provisional: bool = False
     score: float
     low: float = math.nan
     high: float = math.nan
-    adjustment: float = 1.0
+    scenarios_low: float = math.nan
+    scenarios_high: float = math.nan
+    gain: Gain | None = None
+    far: float = math.nan
     worst: float = math.nan
     p95: float = math.nan
     runs: int = 0
@@ -201,7 +216,7 @@ class Row:
 
     @property
     def ranked(self) -> bool:
-        """Whether it has a rank."""
+        """Whether it is compared with the others, and has a rank where the rows can be ordered."""
         return self.standing == "ranked"
 
     @property
@@ -267,12 +282,16 @@ class ScenarioRanking:
         Key of `simnav.scoring.SCORES` that is ranked.
     reference : Reference
         Reference, whose error is the denominator of the ratios.
+    plain : str
+        The plain row that gains are over; empty without one.
     unit : str
         ``seed`` or ``recording``: the unit that tests and intervals treat as independent.
     units : int
         How many of them the ranked rows have, at least.
     remarks : tuple of str
         Sentences that a table has to show: which conclusions the data do not allow, and why.
+    insufficient : str
+        Why the rows cannot be ordered, in one sentence; then none has a rank. Empty where they can.
     rows : tuple of ScenarioRow
         In order of score; then those not ranked, then the references.
     unsuitable : dict of str to str
@@ -283,9 +302,11 @@ class ScenarioRanking:
     track: str
     score: str
     reference: Reference
+    plain: str
     unit: str
     units: int
     remarks: tuple[str, ...]
+    insufficient: str
     rows: tuple[ScenarioRow, ...]
     unsuitable: dict[str, str] = field(default_factory=dict)
 
@@ -307,8 +328,11 @@ class TrackRanking:
         Title of the track, for display.
     score : str
         Key of `simnav.scoring.SCORES` that is ranked.
-    relative : bool
-        Whether the figures are multiples of a reference figure; otherwise they are in the unit of the score.
+    reference : str
+        What the figures are multiples of: ``oracle`` or ``plain`` (on the same runs, in all scenarios), ``figure``
+        (other references), or empty: the figures are in the unit of the score.
+    plain : str
+        The plain row that gains are over; empty without one.
     unit : str
         ``seed`` or ``recording``: the unit that tests and intervals treat as independent.
     units : int
@@ -317,6 +341,8 @@ class TrackRanking:
         Versioned ids.
     remarks : tuple of str
         Sentences that a table has to show: which conclusions the data do not allow, and why.
+    insufficient : str
+        Why the rows cannot be ordered, in one sentence; then none has a rank. Empty where they can.
     rows : tuple of TrackRow
         In order of score; then those not ranked, then the references.
     """
@@ -324,17 +350,31 @@ class TrackRanking:
     track: str
     title: str
     score: str
-    relative: bool
+    reference: str
+    plain: str
     unit: str
     units: int
     scenarios: tuple[str, ...]
     remarks: tuple[str, ...]
+    insufficient: str
     rows: tuple[TrackRow, ...]
 
     @property
     def provisional(self) -> bool:
         """Whether a ranked row has fewer than ten seeds or recordings."""
         return any(r.provisional for r in self.rows if r.ranked)
+
+    @property
+    def relative(self) -> bool:
+        """Whether the figures are multiples of a reference; otherwise they are in the unit of the score."""
+        return bool(self.reference)
+
+    @property
+    def sentence(self) -> str:
+        """What can be quoted of the track; see `simnav.leaderboard.ranking.summary.sentence`."""
+        from simnav.leaderboard.ranking.summary import sentence
+
+        return sentence(self)
 
     def plot(self) -> Figure:
         """The scores with their intervals."""
@@ -388,7 +428,8 @@ class Ranking:
         scenarios = [s.scenario for s in self.scenarios]
         return frame([
             {"track": t.track}
-            | {k: v for k, v in vars(row).items() if not isinstance(v, (Mapping, tuple, Consistency))}
+            | {k: v for k, v in vars(row).items() if k != "gain" and not isinstance(v, (Mapping, tuple, Consistency))}
+            | {f"gain_{k}": getattr(row.gain, k, math.nan) for k in _GAIN}
             | {f"{part}_{k}": v for part in ("clean", "faulty") for k, v in vars(getattr(row, part)).items()}
             | {s: row.ratios.get(s, math.nan) for s in scenarios}
             for t in self.tracks

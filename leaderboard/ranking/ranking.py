@@ -1,22 +1,23 @@
-"""The ranking: who has which error, as a multiple of a fixed reference figure, and how sure we are.
+"""The ranking: who has which error beside an oracle on the same runs, which rows may be the best, and how sure that is.
 
-**Score.** The figure of a run is the ratio of its error to the scenario's reference figure
-(`simnav.leaderboard.ranking.reference`). The score of a row is the geometric mean over its runs; each scenario counts
-the same (`simnav.leaderboard.ranking.statistics`). It never improves when a run gets worse or fails.
+**Score.** The figure of a run is the ratio of its error to that of an oracle on the same run
+(`simnav.leaderboard.ranking.scenario_runs`). The score of a row is the geometric mean over its runs; each scenario
+counts the same (`simnav.leaderboard.ranking.statistics`). It never improves when a run gets worse or fails.
 
 **Failures count.** A failed run (error, timeout, out of memory, diverged, invalid output, no position at all) has the
 ratio `FAILURE`; no run has more. An epoch without a position counts with the last position that was given. Nothing is
 dropped.
 
 **Tracks.** There are ranks within a track only. A row is ranked if it has run all scenarios of the track that are on
-the board. One that needs other instruments is listed as unsuitable, whatever it does elsewhere.
+the board, with all seeds that the track asks (`simnav.leaderboard.ranking.evidence`); otherwise it is incomplete. One
+that needs other instruments is listed as unsuitable, whatever it does elsewhere. Variants of one row beyond the first
+few are listed apart (`simnav.leaderboard.ranking.variants`).
 
-**Runs that count.** Seeds count in order up to the first that a row has not run, so that nobody can choose seeds. The
-score of a row with fewer seeds than others is adjusted for how hard the missing ones are
-(`simnav.leaderboard.ranking.adjustment`).
+**Who is told from whom.** All pairs of rows at once, by seed. On recorded tracks the unit is the recording: each one
+counts the same, whatever its scenario, and seeds over one recording are averaged. Where the rows of a track cannot be
+ordered, none has a rank, and the board says why.
 
-**Who is told from whom.** Sign flips over all pairs of rows at once, by seed. On recorded tracks the unit is the
-recording: each one counts the same, whatever its scenario, and seeds over one recording are averaged.
+**Gain.** Each row is compared with the plain row on the same runs (`simnav.leaderboard.ranking.plain_row`).
 
 **Plausible.** A row whose errors are below the oracle's by more than chance is not ranked.
 """
@@ -24,18 +25,18 @@ recording: each one counts the same, whatever its scenario, and seeds over one r
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.ranking.adjustment import adjustments
+from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.ranking.board import (
     Consistency,
     Ranking,
+    Reference,
     Row,
     ScenarioRanking,
     ScenarioRow,
@@ -43,21 +44,25 @@ from simnav.leaderboard.ranking.board import (
     TrackRanking,
     TrackRow,
 )
+from simnav.leaderboard.ranking.evidence import lacking
 from simnav.leaderboard.ranking.identity import real_time_twin
-from simnav.leaderboard.ranking.plausibility import beats, too_good
-from simnav.leaderboard.ranking.reference import reference_of
-from simnav.leaderboard.ranking.remarks import reference_remarks, remarks
+from simnav.leaderboard.ranking.remarks import reference_remarks, remarks, request_remarks
 from simnav.leaderboard.ranking.runs import Runs, group
+from simnav.leaderboard.ranking.scenario_runs import Cell, ScenarioRuns
 from simnav.leaderboard.ranking.statistics import (
-    FAILURE,
+    Gain,
+    Interval,
     Separation,
+    gain,
+    scenario_interval,
     score,
     separate,
     share,
-    tiers,
+    unorderable,
     weighted_quantile,
 )
-from simnav.leaderboard.ranking.tracks import RECORDED, Track, catalogued_tracks, tracks_of
+from simnav.leaderboard.ranking.tracks import Track, catalogued, tracks_of
+from simnav.leaderboard.ranking.variants import families, surplus
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scoring import SCORES, badge
 from simnav.spec import closest
@@ -65,22 +70,23 @@ from simnav.spec import closest
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["PROVISIONAL", "RANKED_SCORES", "rank", "require_lower", "require_score"]
+__all__ = ["FAR", "PROVISIONAL", "RANKED_SCORES", "rank", "require_lower", "require_score"]
 
 Array = NDArray[np.float64]
-Unit = tuple[str, Any]  # scenario, and seed or recording
 
 #: Fewer seeds or recordings than this are provisional.
 PROVISIONAL = 10
+#: A run is far off from this multiple of an oracle's error on.
+FAR = 10.0
 
 #: All scores that a ranking reads, unless it is asked for another one.
 RANKED_SCORES = frozenset({"horizontal_rmse", "smoothed_horizontal_rmse", "update_median"}) | {
     f"{name}{part}" for name in ("nees_horizontal", "coverage_95") for part in ("_clean", "_faulty")
 }
 
-_CAP = math.log(FAILURE)
-_LEAST = math.log(1e-9)  # of an error of zero
-_RECORDING = re.compile(r"recording '([^']*)'")
+_ORDER: Mapping[Standing, int] = {
+    "ranked": 0, "variant": 1, "identical": 2, "implausible": 3, "incomplete": 4, "unsuitable": 5, "reference": 6,
+}  # fmt: skip
 
 
 def require_lower(score: str, why: str) -> None:
@@ -97,7 +103,13 @@ def require_score(score: str | None, results: Iterable[Result]) -> None:
         raise RequestError(f"no result has the score {score!r}; 'simnav rescore' computes it from kept trials")
 
 
-def rank(results: Iterable[Result], *, score: str | None = None, tracks: Mapping[str, str] | None = None) -> Ranking:
+def rank(
+    results: Iterable[Result],
+    *,
+    score: str | None = None,
+    tracks: Mapping[str, str] | None = None,
+    requested: Mapping[str, Sequence[int]] | None = None,
+) -> Ranking:
     """Rank estimators by their results.
 
     Parameters
@@ -109,6 +121,8 @@ def rank(results: Iterable[Result], *, score: str | None = None, tracks: Mapping
         error, and for post-processing the smoothed one.
     tracks : mapping of str to str, optional
         Track of scenarios that are not in the catalogue, by versioned id; otherwise they are in ``other``.
+    requested : mapping of str to sequence of int, optional
+        How many seeds of each scenario were asked for, one number a time (`simnav.leaderboard.results.requested`).
 
     Returns
     -------
@@ -121,210 +135,45 @@ def rank(results: Iterable[Result], *, score: str | None = None, tracks: Mapping
     """
     runs = group(results)
     known = dict(tracks or {})
-    if not known.keys() >= runs.keys():
-        known = {**catalogued_tracks(), **known}
+    headers = {} if known.keys() >= runs.keys() else catalogued()
+    known = {**{name: h.track for name, h in headers.items()}, **known}
     boards: list[TrackRanking] = []
     scenarios: dict[str, ScenarioRanking] = {}
     for track in tracks_of(runs, known, score):
-        tables = [_Scenario(name, runs[name], track) for name in track.scenarios]
-        tables = [t for t in tables if t.cells]
+        apart = surplus(_families(track, runs))
+        recorded = {s: headers[s].recorded for s in track.scenarios if s in headers}
+        every = (ScenarioRuns(s, runs[s], track, recorded.get(s), apart) for s in track.scenarios)
+        tables = [t for t in every if t.cells]
         if not tables:
             continue
-        boards.append(_track(track, tables))
+        boards.append(_track(track, tables, apart, requested or {}))
         if track.name != "post-processing":
-            scenarios |= {t.name: t.ranking() for t in tables}
+            scenarios |= {t.name: _scenario(t, apart) for t in tables}
     return Ranking(tuple(boards), tuple(scenarios[name] for name in sorted(scenarios)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Cell:
-    """The runs of one estimator on one scenario that count.
-
-    Attributes
-    ----------
-    runs : Runs
-        All runs of the estimator on the scenario.
-    units : list
-        The seed or recording of each.
-    logs : (n,) array
-        Logarithms of the ratios to the reference figure; infinite where a run failed.
-    adjustment : float
-        What the score adds to them for the seeds that are missing.
-    """
-
-    runs: Runs
-    units: list[Any]
-    logs: Array
-    adjustment: float = 0.0
-
-    @property
-    def capped(self) -> Array:
-        """The logarithms as they count in a comparison by seed."""
-        return np.minimum(self.logs, _CAP)
-
-    @property
-    def adjusted(self) -> Array:
-        """The logarithms as they count in the score."""
-        return np.minimum(self.logs + self.adjustment, _CAP)
-
-    @property
-    def failed(self) -> NDArray[np.bool_]:
-        """Which runs failed."""
-        return np.isinf(self.logs)
+def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list[str]]:
+    """Variants of one row on a track, by name and by what they estimate."""
+    logs: dict[str, dict[object, float]] = {}
+    for s in track.scenarios:
+        for label, found in runs[s].items():
+            if not found.reference:
+                errors = np.maximum(found.column(track.score), 1e-9)
+                with np.errstate(invalid="ignore"):
+                    values = np.log(errors).tolist()
+                logs.setdefault(label, {}).update(
+                    {(s, r.seed): x for r, x in zip(found.results, values, strict=True) if r.status == "ok"}
+                )
+    return families(logs, _comes_with_simnav)
 
 
-class _Scenario:
-    """One scenario with its rows: those that have runs, and those that it does not suit."""
+def _comes_with_simnav(name: str) -> bool:
+    from simnav.estimator import EstimatorError, find
 
-    def __init__(self, name: str, by: Mapping[str, Runs], track: Track):
-        self.name, self.track = name, track
-        self.recorded = track.name == RECORDED or any(_RECORDING.match(r.note) for x in by.values() for r in x.results)
-        self.unsuitable = {n: why for n in sorted(by) if (why := by[n].unsuitable())}
-        entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
-        if track.name == "post-processing":  # whoever never smooths is not in it
-            entries = {n: r for n, r in entries.items() if np.isfinite(r.scores(track.score)).any()}
-        self.reference = reference_of(name, track.score, entries, self.recorded)
-        ranked = [r for r in entries.values() if not r.reference] or list(entries.values())
-        seeds = sorted({x.seed for r in ranked for x in r.tried})
-        self._logs = {n: self._logs_of(r) for n, r in entries.items()}
-        cells = {n: self._cell(r, seeds) for n, r in entries.items()}
-        references = [n for n, c in cells.items() if c.runs.reference]
-        added = adjustments({n: _by_unit(c) for n, c in cells.items()}, references)
-        self.cells = {n: replace(c, adjustment=added[n]) for n, c in cells.items()}
-
-    def _cell(self, runs: Runs, seeds: Sequence[int]) -> _Cell:
-        there = {r.seed: r for r in runs.tried}
-        logs, counted = self._logs[runs.estimator], []
-        for seed in seeds if not runs.reference else sorted(there):
-            if seed not in there:
-                break
-            counted.append(there[seed])
-        units = [self.unit(r) for r in counted]
-        return _Cell(runs, units, np.array([logs[r.seed] for r in counted], dtype=np.float64))
-
-    def _logs_of(self, runs: Runs) -> dict[int, float]:
-        """By seed: logarithm of the ratio to the reference figure; infinite where a run failed."""
-
-        def log(status: str, value: float) -> float:
-            if status != "ok" or not math.isfinite(value):
-                return math.inf
-            return max(math.log(value / self.reference.value), _LEAST) if value > 0.0 else _LEAST
-
-        values = runs.column(self.track.score).tolist()
-        return {r.seed: log(r.status, v) for r, v in zip(runs.results, values, strict=True) if r.tried}
-
-    def unit(self, result: Result) -> Any:
-        """The independent unit of a run."""
-        if not self.recorded:
-            return result.seed
-        found = _RECORDING.match(result.note)
-        return found.group(1) if found else result.note
-
-    def implausible(self, name: str, scenarios: int = 1) -> bool:
-        """Whether a row is better here than what is possible."""
-        cell = self.cells[name]
-        if cell.runs.reference or not self.reference.bounds:
-            return False
-        oracle = self.cells.get(self.reference.estimator)
-        best = self._logs[self.reference.estimator] if oracle is not None else {}
-        mine = self._logs[name]
-        pairs = [log - best[seed] for seed, log in mine.items() if math.isfinite(log - best.get(seed, math.inf))]
-        return beats(pairs, scenarios) or too_good(cell.logs[~cell.failed], self.reference, scenarios)
-
-    def ranking(self) -> ScenarioRanking:
-        """The ranking on this scenario alone."""
-        shown = {n: {self.name: c} for n, c in self.cells.items() if len(c.logs)}
-        standing = {n: _standing(n, [self], c, self.track.score) for n, c in shown.items()}
-        rows, separation = _rows([self], shown, standing)
-        found = []
-        for row in rows:
-            cell = self.cells[row["estimator"]]
-            found.append(ScenarioRow(
-                **row,
-                median=_median(cell.runs.scores(self.track.score)),
-                statuses=cell.runs.statuses,
-                ratios={str(u): math.exp(x) for u, x in zip(*_by_unit(cell), strict=True)},
-            ))  # fmt: skip
-        unit = "recording" if self.recorded else "seed"
-        return ScenarioRanking(
-            self.name, self.track.name, self.track.score, self.reference, unit, _units(found, [self], shown),
-            remarks(separation, unit, found, [self.reference]), tuple(found), self.unsuitable,
-        )  # fmt: skip
-
-
-_NO_SEED = "it has not run the first seed that the others have run"
-_IMPLAUSIBLE = (
-    "its errors on {} are below those of an oracle, which knows the noise and every fault, by more than chance"
-)
-_IDENTICAL = "in real time it is {}, to the bit; it is ranked by what it smooths"
-
-
-def _track(track: Track, tables: Sequence[_Scenario]) -> TrackRanking:
-    """The ranking over the scenarios of a track."""
-    names = sorted({n for t in tables for n in (*t.cells, *t.unsuitable)})
-    used = [t for t in tables if any(len(c.logs) and not c.runs.reference for c in t.cells.values())] or list(tables)
-    standing: dict[str, tuple[Standing, str]] = {}
-    cells: dict[str, dict[str, _Cell]] = {}
-    for n in names:
-        cells[n] = {t.name: t.cells[n] for t in used if n in t.cells and len(t.cells[n].logs)}
-        if cells[n]:
-            standing[n] = _standing(n, used, cells[n], track.score)
-        elif track.name != "post-processing" and (why := _not_suited(n, used)):
-            standing[n] = "unsuitable", why
-        elif any(n in t.cells for t in used):
-            standing[n] = "incomplete", _NO_SEED
-    shown = {n: c for n, c in cells.items() if c}
-    rows, separation = _rows(used, shown, standing)
-    found = []
-    for row in rows:
-        mine = shown[row["estimator"]]
-        found.append(TrackRow(
-            **row,
-            covered=len(mine),
-            scenarios=len(used),
-            ratios={s: math.exp(float(c.adjusted.mean())) for s, c in mine.items()},
-        ))  # fmt: skip
-    for n, (kind, why) in standing.items():
-        if n not in shown:
-            found.append(TrackRow(estimator=n, standing=kind, why=why, score=math.nan, scenarios=len(used)))
-    unit = "recording" if any(t.recorded for t in used) else "seed"
-    references = [t.reference for t in used]
-    relative = any(r.estimator for r in references)
-    return TrackRanking(
-        track.name, track.title, track.score, relative, unit, _units(found, used, shown),
-        tuple(t.name for t in used), (*remarks(separation, unit, found, references), *reference_remarks(references)),
-        tuple(found),
-    )  # fmt: skip
-
-
-def _standing(name: str, tables: Sequence[_Scenario], cells: Mapping[str, _Cell], score: str) -> tuple[Standing, str]:
-    """Whether a row that has runs (by scenario: ``cells``) is ranked over some scenarios, and if not, why."""
-    if any(c.runs.reference for c in cells.values()):
-        return "reference", ""
-    if why := _not_suited(name, tables):
-        return "unsuitable", why
-    if missing := [t.name for t in tables if t.name not in cells]:
-        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-        return "incomplete", f"it has not run {missing[0]}{more}"
-    if bad := [t.name for t in tables if t.implausible(name, len(tables))]:
-        return "implausible", _IMPLAUSIBLE.format(bad[0])
-    if twin := real_time_twin(name, score, [{m: c.runs for m, c in t.cells.items()} for t in tables]):
-        return "identical", _IDENTICAL.format(twin)
-    return "ranked", ""
-
-
-def _not_suited(name: str, tables: Sequence[_Scenario]) -> str:
-    """Which scenario does not suit a row, the first one, and why; empty where all suit it."""
-    return next((f"{t.name}: {t.unsuitable[name]}" for t in tables if name in t.unsuitable), "")
-
-
-def _by_unit(cell: _Cell) -> tuple[list[Any], Array]:
-    """The units of a cell, each once, and the mean of what counts."""
-    if len(set(cell.units)) == len(cell.units):
-        return cell.units, cell.capped
-    units = list(dict.fromkeys(cell.units))
-    index = np.array([units.index(u) for u in cell.units])
-    return units, np.bincount(index, cell.capped) / np.bincount(index)
+    try:
+        return comes_with_simnav(find(name))
+    except EstimatorError:
+        return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,45 +183,152 @@ class _Figures:
     strata: list[str]
     clusters: list[Any]
     logs: Array
-    adjusted: Array
     failed: NDArray[np.bool_]
 
     @property
-    def keys(self) -> list[Unit]:
+    def keys(self) -> list[tuple[str, Any]]:
         return list(zip(self.strata, self.clusters, strict=True))
 
 
-def _figures(tables: Sequence[_Scenario], cells: Mapping[str, _Cell]) -> _Figures:
-    """Simulated: a figure a scenario and seed. Recorded: one a recording, each counting the same."""
+def _scenario(table: ScenarioRuns, apart: Mapping[str, Sequence[str]]) -> ScenarioRanking:
+    """The ranking on one scenario alone."""
+    cells = {n: {table.name: c} for n, c in table.cells.items() if len(c.logs)}
+    standing = {n: _standing(n, [table], c, apart) for n, c in cells.items()}
+    rows, separation, why = _rows([table], cells, standing)
+    found = []
+    for row in rows:
+        cell = table.cells[row["estimator"]]
+        found.append(ScenarioRow(
+            **row,
+            median=_median(cell.runs.scores(table.track.score)),
+            statuses=cell.runs.statuses,
+            ratios={str(u): math.exp(x) for u, x in zip(*cell.by_unit, strict=True)},
+        ))  # fmt: skip
+    unit = "recording" if table.recorded else "seed"
+    return ScenarioRanking(
+        table.name, table.track.name, table.track.score, table.reference, table.plain, unit,
+        _units(found, [table], cells), remarks(separation, unit, found, [table.reference], why), why, tuple(found),
+        table.unsuitable,
+    )  # fmt: skip
+
+
+def _track(
+    track: Track,
+    tables: Sequence[ScenarioRuns],
+    apart: Mapping[str, Sequence[str]],
+    requested: Mapping[str, Sequence[int]],
+) -> TrackRanking:
+    """The ranking over the scenarios of a track."""
+    names = sorted({n for t in tables for n in (*t.cells, *t.unsuitable)})
+    used = [t for t in tables if any(len(c.logs) and not c.runs.reference for c in t.cells.values())] or list(tables)
+    cells = {n: {t.name: t.cells[n] for t in used if n in t.cells and len(t.cells[n].logs)} for n in names}
+    standing: dict[str, tuple[Standing, str]] = {}
+    for n in names:
+        if cells[n] or any(n in t.cells for t in used):
+            standing[n] = _standing(n, used, cells[n], apart)
+        elif track.name != "post-processing" and (why := _not_suited(n, used)):
+            standing[n] = "unsuitable", why
+    shown = {n: c for n, c in cells.items() if c}
+    rows, separation, why = _rows(used, shown, standing)
+    found = [
+        TrackRow(
+            **row,
+            covered=len(shown[row["estimator"]]),
+            scenarios=len(used),
+            ratios={s: math.exp(float(c.capped.mean())) for s, c in shown[row["estimator"]].items()},
+        )
+        for row in rows
+    ]
+    found += [
+        TrackRow(estimator=n, standing=kind, why=reason, score=math.nan, scenarios=len(used))
+        for n, (kind, reason) in standing.items()
+        if n not in shown
+    ]
+    unit = "recording" if _all_recorded(used) else "seed"
+    references = [t.reference for t in used]
+    plain = sorted({t.plain for t in used if t.plain}) if all(t.plain for t in used) else []
+    return TrackRanking(
+        track.name, track.title, track.score, _kind(references), " or ".join(plain), unit,
+        _units(found, used, shown), tuple(t.name for t in used),
+        (
+            *remarks(separation, unit, found, references, why),
+            *request_remarks([(len(t.seeds), requested.get(t.name, ())) for t in used]),
+            *reference_remarks(references),
+        ), why, tuple(found),
+    )  # fmt: skip
+
+
+def _kind(references: Sequence[Reference]) -> str:
+    """What the scores of a track are multiples of."""
+    oracles = {r.bounds for r in references}
+    if all(r.paired for r in references) and len(oracles) == 1:
+        return "oracle" if oracles == {True} else "plain"
+    return "figure" if any(r.estimator for r in references) else ""
+
+
+_IMPLAUSIBLE = (
+    "its errors on {} are below those of an oracle, which knows the noise and every fault, by more than chance"
+)
+_IDENTICAL = "in real time it is {}, to the bit; it is ranked by what it smooths"
+_VARIANT = "it is one of {} variants of {}; {} of them are ranked"
+
+
+def _standing(
+    name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell], apart: Mapping[str, Sequence[str]]
+) -> tuple[Standing, str]:
+    """Whether a row that has runs (by scenario: ``cells``) is ranked over some scenarios, and if not, why."""
+    if any(c.runs.reference for c in cells.values()):
+        return "reference", ""
+    if why := _not_suited(name, tables):
+        return "unsuitable", why
+    if why := lacking({t.name: (len(cells[t.name].logs) if t.name in cells else 0, len(t.seeds)) for t in tables}):
+        return "incomplete", why
+    if bad := [t.name for t in tables if t.implausible(name, len(tables))]:
+        return "implausible", _IMPLAUSIBLE.format(bad[0])
+    boards = [{m: c.runs for m, c in t.cells.items()} for t in tables]
+    if twin := real_time_twin(name, tables[0].track.score, boards):
+        return "identical", _IDENTICAL.format(twin)
+    if family := apart.get(name):
+        ranked = [m for m in family if m not in apart]
+        return "variant", _VARIANT.format(len(family), family[0], len(ranked))
+    return "ranked", ""
+
+
+def _not_suited(name: str, tables: Sequence[ScenarioRuns]) -> str:
+    """Which scenario does not suit a row, the first one, and why; empty where all suit it."""
+    return next((f"{t.name}: {t.unsuitable[name]}" for t in tables if name in t.unsuitable), "")
+
+
+def _figures(tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> _Figures:
+    """A figure a scenario and seed. Where all scenarios are recorded, one a recording, each counting the same."""
     strata: list[str] = []
     clusters: list[Any] = []
-    logs, adjusted, failed = [], [], []
+    logs, failed = [], []
     for t in tables:
         if t.name not in cells:
             continue
         cell = cells[t.name]
-        units, values = _by_unit(cell)
+        units, values = cell.by_unit
         completed = {u for u, failed_here in zip(cell.units, cell.failed.tolist(), strict=True) if not failed_here}
-        strata += ["recordings" if t.recorded else t.name] * len(units)
+        strata += ["recordings" if _all_recorded(tables) else t.name] * len(units)
         clusters += [(t.name, u) if t.recorded else u for u in units]
         logs.append(values)
-        adjusted.append(np.minimum(values + cell.adjustment, _CAP))
         failed += [u not in completed for u in units]
-    return _Figures(strata, clusters, np.concatenate(logs), np.concatenate(adjusted), np.array(failed, dtype=bool))
+    return _Figures(strata, clusters, np.concatenate(logs), np.array(failed, dtype=bool))
 
 
 def _rows(
-    tables: Sequence[_Scenario], cells: Mapping[str, Mapping[str, _Cell]], standing: Mapping[str, tuple[Standing, str]]
-) -> tuple[list[dict[str, Any]], Separation | None]:
-    """The fields that all rows have, in the order of a table, and which ranked rows are told apart."""
+    tables: Sequence[ScenarioRuns],
+    cells: Mapping[str, Mapping[str, Cell]],
+    standing: Mapping[str, tuple[Standing, str]],
+) -> tuple[list[dict[str, Any]], Separation | None, str]:
+    """The fields that all rows have, in the order of a table; which are told apart; why they cannot be ordered."""
     figures = {n: _figures(tables, c) for n, c in cells.items()}
-    scores = {n: score(f.adjusted, f.strata, f.clusters, f.failed) for n, f in figures.items()}
+    scores = {n: score(f.logs, f.strata, f.clusters, f.failed) for n, f in figures.items()}
     ranked = sorted((n for n in cells if standing[n][0] == "ranked"), key=lambda n: (scores[n].value, n))
-    separation, places = _places(ranked, {n: figures[n] for n in ranked}, {n: scores[n].value for n in ranked})
-    order: dict[str, int] = {
-        "ranked": 0, "identical": 1, "implausible": 2, "incomplete": 3, "unsuitable": 4, "reference": 5,
-    }  # fmt: skip
-    rest = sorted((n for n in cells if n not in places), key=lambda n: (order[standing[n][0]], scores[n].value, n))
+    separation, places, why = _places(ranked, figures)
+    rest = sorted((n for n in cells if n not in ranked), key=lambda n: (_ORDER[standing[n][0]], scores[n].value, n))
+    oracle = any(t.reference.bounds and t.reference.paired for t in tables)
     rows = []
     for n in [*ranked, *rest]:
         f, mine = figures[n], list(cells[n].values())
@@ -381,7 +337,8 @@ def _rows(
         weights = np.concatenate([np.full(len(c.logs), 1.0 / len(c.logs)) for c in mine])
         every = np.concatenate([c.capped for c in mine])
         lost = share(failed, runs)
-        units = min(len(set(f.clusters)), *(len(set(c.units)) for c in mine)) if not tables[0].recorded else len(f.logs)
+        units = _count(tables, cells[n])
+        over = scenario_interval(f.logs, f.strata, f.clusters) if standing[n][0] != "incomplete" else Interval(math.nan)
         rows.append({
             "estimator": n,
             "standing": standing[n][0],
@@ -391,7 +348,10 @@ def _rows(
             "score": scores[n].value,
             "low": scores[n].low,
             "high": scores[n].high,
-            "adjustment": math.exp(float(np.mean([c.adjustment for c in mine]))),
+            "scenarios_low": over.low,
+            "scenarios_high": over.high,
+            "gain": _gain(n, tables, cells[n]),
+            "far": float(np.mean(every > math.log(FAR))) if oracle else math.nan,
             "worst": math.exp(float(every.max())),
             "p95": math.exp(weighted_quantile(every, weights, 0.95)),
             "runs": runs,
@@ -403,46 +363,76 @@ def _rows(
             "update_median": _median([_median(x) for c in mine if len(x := c.runs.numbers("update_median"))]),
             "peak_memory": max(c.runs.peak_memory for c in mine),
         })  # fmt: skip
-    return rows, separation
+    return rows, separation, why
+
+
+def _gain(name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> Gain | None:
+    """A row beside the plain row of each scenario, over the seeds that both have; None where there is no plain row."""
+    if any(t.plain not in t.cells for t in tables) or any(t.name not in cells for t in tables):
+        return None
+    mine, theirs, strata, clusters = [], [], list[str](), list[Any]()
+    for t in tables:
+        plain = dict(zip(*_by_seed(t.cells[t.plain]), strict=True))
+        for seed, log in zip(*_by_seed(cells[t.name]), strict=True):
+            mine.append(log)
+            theirs.append(plain[seed])
+            strata.append(t.name)
+            clusters.append((t.name, t.unit(seed)) if t.recorded else seed)
+    return gain(np.array(mine), np.array(theirs), strata, clusters)
+
+
+def _by_seed(cell: Cell) -> tuple[list[int], list[float]]:
+    return [r.seed for r in cell.runs.tried], cell.capped.tolist()
 
 
 def _places(
-    ranked: Sequence[str], figures: Mapping[str, _Figures], scores: Mapping[str, float]
-) -> tuple[Separation | None, dict[str, dict[str, Any]]]:
-    """Ranks, tiers and what is told apart, of the rows that are ranked, which are given in order of score."""
+    ranked: Sequence[str], figures: Mapping[str, _Figures]
+) -> tuple[Separation | None, dict[str, dict[str, Any]], str]:
+    """Ranks and what is told apart, of the rows that are ranked, which are given in order of score.
+
+    Where they cannot be ordered, they have no ranks, and the reason is the last that is returned.
+    """
     if not ranked:
-        return None, {}
-    keys = sorted({k for f in figures.values() for k in f.keys}, key=repr)
+        return None, {}, ""
+    keys = sorted({k for n in ranked for k in figures[n].keys}, key=repr)
     index = {k: i for i, k in enumerate(keys)}
     values = np.full((len(keys), len(ranked)), np.nan)
     for j, n in enumerate(ranked):
         values[[index[k] for k in figures[n].keys], j] = figures[n].logs
-    found = separate(values, [k[0] for k in keys], [k[1] for k in keys])
-    tier = tiers(range(len(ranked)), found.better)
+    strata, clusters = [k[0] for k in keys], [k[1] for k in keys]
+    found = separate(values, strata, clusters)
+    why = unorderable(values, strata, clusters)
     places: dict[str, dict[str, Any]] = {}
     for j, n in enumerate(ranked):
-        equal = next(i for i, m in enumerate(ranked) if math.isclose(scores[m], scores[n], rel_tol=1e-9))
         places[n] = {
-            "rank": equal + 1,
-            "rank_low": int(found.rank_low[j]),
-            "rank_high": int(found.rank_high[j]),
-            "tier": tier[j],
-            "may_be_best": bool(found.may_be_best[j]),
             "p_value": None if j == 0 else float(found.p_values[0, j]),
             "better_than": tuple(m for i, m in enumerate(ranked) if found.better[j, i]),
             "worse_than": tuple(m for i, m in enumerate(ranked) if found.better[i, j]),
         }
-    return found, places
+        if not why:
+            places[n] |= {
+                "rank_low": int(found.rank_low[j]),
+                "rank_high": int(found.rank_high[j]),
+                "may_be_best": bool(found.may_be_best[j]),
+            }
+    return found, places, why
 
 
-def _units(rows: Sequence[Row], tables: Sequence[_Scenario], cells: Mapping[str, Mapping[str, _Cell]]) -> int:
+def _all_recorded(tables: Sequence[ScenarioRuns]) -> bool:
+    return all(t.recorded for t in tables)
+
+
+def _count(tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> int:
+    """How many seeds a row has in the simulated scenario with the fewest; over recorded ones only, its recordings."""
+    every = _all_recorded(tables)
+    each = [len(set(cells[t.name].units)) for t in tables if t.name in cells and (every or not t.recorded)]
+    return sum(each) if every else min(each, default=0)
+
+
+def _units(rows: Sequence[Row], tables: Sequence[ScenarioRuns], cells: Mapping[str, Mapping[str, Cell]]) -> int:
     """How many seeds (recordings) the ranked rows have at least, in a scenario (over a recorded track)."""
     names = [r.estimator for r in rows if r.ranked] or [r.estimator for r in rows if r.estimator in cells]
-    counts = []
-    for n in names:
-        each = [len(set(c.units)) for c in cells[n].values()]
-        counts.append(sum(each) if tables[0].recorded else min(each))
-    return min(counts, default=0)
+    return min((_count(tables, cells[n]) for n in names), default=0)
 
 
 def _consistency(runs: Sequence[Runs], part: str) -> Consistency:

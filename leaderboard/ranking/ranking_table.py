@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.statistics import FAILURE
+from simnav.leaderboard.ranking.summary import sentence
 from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Consistency, Ranking, TrackRanking
+    from simnav.leaderboard.ranking.board import Consistency, Ranking, Row, TrackRanking
 
 __all__ = [
     "between",
     "consistency",
+    "gain_cell",
     "ranking_tables",
     "ratio",
     "score_caption",
@@ -29,16 +31,29 @@ _CAPTION = (
 )
 
 
+_TITLES = {"oracle": "× oracle", "plain": "× plain row", "figure": "× reference", "": "error [m]"}
+_OVER = {
+    "oracle": "that of an oracle on the same run",
+    "plain": "that of the plain row on the same run",
+    "figure": "the scenario's reference figure",
+}
+
+
 def score_title(track: TrackRanking) -> str:
-    """Heading of the score: ``× reference``, or the error in metres where there is no reference figure."""
-    return "× reference" if track.relative else "error [m]"
+    """Heading of the score: what it is a multiple of, or the error in metres."""
+    return _TITLES[track.reference]
 
 
 def score_caption(track: TrackRanking) -> str:
     """What the score and the rank are."""
     what = f"{SCORES[track.score].title} [{SCORES[track.score].unit}]" if track.score in SCORES else track.score
-    what = f"× reference: {what} over the scenario's reference figure" if track.relative else f"Error: {what}"
+    what = f"{score_title(track)}: {what} over {_OVER[track.reference]}" if track.relative else f"Error: {what}"
     return _CAPTION.format(score=what, cap=FAILURE)
+
+
+def gain_cell(row: Row) -> str:
+    """The gain of a row over the plain row with its interval over seeds, as a ratio of errors."""
+    return "" if row.gain is None else tables.interval(row.gain.value, row.gain.low, row.gain.high)
 
 
 def ratio(value: float) -> str:
@@ -74,19 +89,22 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
         name = r.estimator + (" *" if r.reference else "")
         failed = f"{r.failed} of {r.runs}" if r.runs else ""
         cells.append([
-            r.ranks if r.ranked else tables.MISSING, r.tier, name, ratio(r.score), between(r.low, r.high, ratio),
-            ratio(r.p95), ratio(r.worst), failed, f"{r.covered} of {r.scenarios}", consistency(r.clean),
-            consistency(r.faulty), tables.percent(r.clean.coverage), tables.percent(r.clean.worst_coverage),
-            tables.duration(r.update_median), tables.size(r.peak_memory or None),
+            r.ranks or tables.MISSING, name, ratio(r.score), between(r.low, r.high, ratio),
+            between(r.scenarios_low, r.scenarios_high, ratio), gain_cell(r), _won(r), tables.percent(_worse(r)),
+            tables.percent(r.far), ratio(r.p95), ratio(r.worst), failed, f"{r.covered} of {r.scenarios}",
+            consistency(r.clean), consistency(r.faulty), tables.percent(r.clean.coverage),
+            tables.percent(r.clean.worst_coverage), tables.duration(r.update_median), tables.size(r.peak_memory or None),
         ])  # fmt: skip
-    columns = ["rank", "tier", "estimator", title, "95 % interval", "95th perc.", "worst run", "failed", "scenarios",
-               "NEES, no fault", "NEES, faults", "95 % coverage, no fault", "worst coverage, no fault",
-               "per epoch", "memory"]  # fmt: skip
-    value = ["estimator", title, "rank", "95 % interval", "failed", "worst run", "per epoch", "NEES, no fault",
-             "scenarios", "NEES, faults", "95th perc.", "tier", "95 % coverage, no fault", "memory",
-             "worst coverage, no fault"]  # fmt: skip
-    numeric = [c for c in columns if c not in ("estimator", "95 % interval", "NEES, no fault", "NEES, faults")]
-    notes = [score_caption(track), *track.remarks]
+    gained = f"× {track.plain}" if track.plain else "× plain row"
+    columns = ["rank", "estimator", title, "95 % interval", "over scenarios", gained, "scenarios won", "above 1.5 ×",
+               "above 10 ×", "95th perc.", "worst run", "failed", "scenarios", "NEES, no fault", "NEES, faults",
+               "95 % coverage, no fault", "worst coverage, no fault", "per epoch", "memory"]  # fmt: skip
+    value = ["estimator", title, "rank", "95 % interval", gained, "failed", "scenarios won", "above 1.5 ×",
+             "over scenarios", "above 10 ×", "per epoch", "NEES, no fault", "scenarios", "NEES, faults", "worst run",
+             "95th perc.", "95 % coverage, no fault", "memory", "worst coverage, no fault"]  # fmt: skip
+    texts = ("estimator", "95 % interval", "over scenarios", gained, "NEES, no fault", "NEES, faults")
+    numeric = [c for c in columns if c not in texts]
+    notes = [sentence(track), score_caption(track), *track.remarks]
     best = [r.estimator for r in track.rows if r.may_be_best]
     if len(best) > 1 and len(best) < sum(r.ranked for r in track.rows):
         notes.append(f"May be the best (95 %): {', '.join(best)}.")
@@ -111,5 +129,21 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
         dim=[i for i, r in enumerate(track.rows) if not r.ranked],
         strong=[i for i, r in enumerate(track.rows) if r.estimator in mine],
         caption=" ".join(notes),
-        explained={"95 % interval": "95 % interval: of the errors of completed runs."},
+        explained={
+            "95 % interval": "95 % interval: over seeds, of the errors of completed runs.",
+            "over scenarios": "Over scenarios: 95 % interval over seeds and scenarios.",
+            gained: f"{gained}: errors over those of {track.plain or 'the plain row'} on the same runs, with the "
+            "interval over seeds.",
+            "scenarios won": "Scenarios won: those with a smaller error than the plain row's.",
+            "above 1.5 ×": "Above 1.5 ×: share of runs with more than 1.5 times the error of the plain row.",
+            "above 10 ×": "Above 10 ×: share of runs with more than ten times the error of the oracle.",
+        },
     )
+
+
+def _won(row: Row) -> str:
+    return "" if row.gain is None else f"{row.gain.won} of {row.gain.scenarios}"
+
+
+def _worse(row: Row) -> float | None:
+    return None if row.gain is None else row.gain.worse

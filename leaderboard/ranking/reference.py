@@ -67,8 +67,8 @@ def _read(entry: Mapping[str, Any]) -> Reference:
     value, spread, runs = float(entry["value"]), float(entry["spread"]), int(entry["runs"])
     if not (0.0 < value < math.inf and 0.0 <= spread < math.inf and runs > 0):
         raise ValueError(f"value = {value}, spread = {spread}, runs = {runs}: they should be finite and above 0")
-    checks = {name: float(entry.get(name, math.nan)) for name in _CHECKS}
-    return Reference(value, str(entry["estimator"]), runs, spread, True, str(entry["content"]), **checks)
+    checks = [float(entry.get(name, math.nan)) for name in _CHECKS]
+    return Reference(value, str(entry["estimator"]), runs, spread, True, str(entry["content"]), *checks)
 
 
 def entry(figure: Reference) -> dict[str, Any]:

@@ -11,13 +11,13 @@ from simnav.leaderboard.ranking.statistics import FEWEST, Separation, smallest_p
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Reference, Row
 
-__all__ = ["reference_remarks", "remarks"]
+__all__ = ["reference_remarks", "remarks", "request_remarks"]
 
 _LEVEL = 0.05
 
 
 def remarks(
-    separation: Separation | None, unit: str, rows: Sequence[Row], references: Sequence[Reference]
+    separation: Separation | None, unit: str, rows: Sequence[Row], references: Sequence[Reference], unorderable: str
 ) -> tuple[str, ...]:
     """Sentences that stand with a board.
 
@@ -31,17 +31,22 @@ def remarks(
         Rows of the ranking.
     references : sequence of Reference
         References of the scenarios.
+    unorderable : str
+        Why the rows cannot be ordered; empty where they can.
     """
     found = []
     ranked = [r for r in rows if r.ranked]
+    if unorderable:
+        found.append(f"Not enough data: {unorderable}. No row has a rank.")
     if any(r.provisional for r in ranked):
         found.append(f"Provisional: fewer than ten {unit}s.")
-    fewer = [r for r in ranked if r.adjustment != 1.0]
-    if fewer:
-        found.append(
-            f"{len(fewer)} of {len(ranked)} rows have run fewer {unit}s than others. Their scores are adjusted for how "
-            f"hard the missing {unit}s are."
-        )
+    incomplete = [r for r in rows if r.standing == "incomplete"]
+    if incomplete:
+        rows_are = "row is" if len(incomplete) == 1 else "rows are"
+        found.append(f"{len(incomplete)} {rows_are} incomplete: not all {unit}s and scenarios of the others were run.")
+    variants = [r for r in rows if r.standing == "variant"]
+    if variants:
+        found.append(f"{len(variants)} variants of other rows are listed apart, and cost the others nothing.")
     if separation is not None and len(ranked) > 1:
         count = separation.clusters
         if smallest_p_value(count) > _LEVEL:
@@ -59,20 +64,56 @@ def remarks(
     return tuple(found)
 
 
+def request_remarks(scenarios: Sequence[tuple[int, Sequence[int]]]) -> tuple[str, ...]:
+    """Whether a campaign was stopped early, or made longer after results were there.
+
+    Parameters
+    ----------
+    scenarios : sequence of (int, sequence of int)
+        Of each scenario, how many seeds count, and how many were asked for, one number a time.
+
+    Examples
+    --------
+    >>> request_remarks([(13, (10, 50)), (50, (50,))])
+    ('Stopped early: 13 of 50 seeds that were asked for count on 1 of 2 scenarios.', 'The number of seeds was raised \
+    after results were there (10, 50) on 1 of 2 scenarios.')
+    >>> request_remarks([(30, (30,)), (30, ())])
+    ()
+    """
+    found = []
+    of = f"of {len(scenarios)} scenarios"
+    early = [(count, asked[-1]) for count, asked in scenarios if asked and count < asked[-1]]
+    if early:
+        count, asked_for = min(early)
+        found.append(f"Stopped early: {count} of {asked_for} seeds that were asked for count on {len(early)} {of}.")
+    raised = [asked for _, asked in scenarios if len(asked) > 1]
+    if raised:
+        steps = ", ".join(map(str, max(raised, key=lambda numbers: len(numbers))))
+        found.append(f"The number of seeds was raised after results were there ({steps}) on {len(raised)} {of}.")
+    return tuple(found)
+
+
 def reference_remarks(references: Sequence[Reference]) -> tuple[str, ...]:
-    """What the ratios of a track are to: figures that are shipped, or those of an oracle of this campaign.
+    """What the ratios of a track are to: an oracle on the same runs, shipped figures, or those of this campaign.
 
     Examples
     --------
     >>> from simnav.leaderboard.ranking.board import Reference
+    >>> reference_remarks([Reference(2.0, "oracle", 30, 0.3, paired=True)])
+    ('Scores are multiples of the error of oracle on the same runs.',)
     >>> reference_remarks([Reference(2.0, "oracle", 60, 0.3, stored=True)])
     ('Reference figures: the error of oracle over 60 runs, shipped with the scenario.',)
     >>> reference_remarks([Reference(2.0, "oracle", 9, 0.3, stored=True)])[-1]
     'Ratios are provisional: the reference figure is of fewer than 50 runs.'
     """
     found = []
+    paired = [r for r in references if r.paired]
+    if paired:
+        names = " or ".join(sorted({r.estimator for r in paired}))
+        where = "" if len(paired) == len(references) else f" on {len(paired)} of {len(references)} scenarios"
+        found.append(f"Scores are multiples of the error of {names} on the same runs{where}.")
     for shipped in (True, False):
-        those = [r for r in references if r.estimator and r.stored == shipped]
+        those = [r for r in references if r.estimator and r.stored == shipped and not r.paired]
         if not those:
             continue
         names = " or ".join(sorted({r.estimator for r in those}))

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-__all__ = ["POST_PROCESSED", "RECORDED", "SMOOTHED", "Track", "catalogued_tracks", "tracks_of"]
+if TYPE_CHECKING:
+    from simnav.scenario.catalogue import Header
+
+__all__ = ["POST_PROCESSED", "RECORDED", "SMOOTHED", "Track", "catalogued", "tracks_of"]
 
 RECORDED = "recorded"
 #: The score of the track of smoothed trajectories.
@@ -51,11 +55,11 @@ class Track:
     scenarios: tuple[str, ...]
 
 
-def catalogued_tracks() -> dict[str, str]:
-    """The track of every scenario of the catalogue, by versioned id."""
+def catalogued() -> dict[str, Header]:
+    """What the catalogue says of each of its scenarios, by versioned id."""
     from simnav.scenario.catalogue import headers
 
-    return {h.id: h.track for h in headers()}
+    return {h.id: h for h in headers()}
 
 
 def tracks_of(scenarios: Iterable[str], track: Mapping[str, str], score: str | None = None) -> list[Track]:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.results import store
+from simnav.leaderboard.results import requested, store
 from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.folder import COMPACTED, LOOSE, DamagedError, tables_of
 from simnav.leaderboard.results.provenance import BENCHMARK
@@ -57,6 +57,7 @@ def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[s
                         shutil.copyfileobj(original, copy)
                     if part in (COMPACTED, LOOSE):
                         _looked_through(target / part / file.name)
+    requested.copy(target, paths)
     store.select(target, {s: (e["recording"], e["estimators"]) for s, e in current.items()})
     store.compact(target)
     return target

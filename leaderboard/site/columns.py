@@ -124,7 +124,11 @@ _GLOSSARY: tuple[tuple[str, str], ...] = (
     ("Scenario", "A simulated or recorded voyage with its instruments and faults."),
     ("Seed", "The number that fixes everything random of a run. All estimators run on the same seeds."),
     ("Track", "Scenarios that the same estimators can do. There are ranks within a track only."),
-    ("Reference figure", "The fixed error of a scenario that the errors of all estimators are divided by."),
+    (
+        "Reference",
+        "What the errors of a scenario are divided by: the errors of an oracle on the same runs; without these a fixed "
+        "figure of the scenario, and on recorded voyages the errors of the plain row.",
+    ),
     (
         "Oracle",
         "An estimator that is told the true noise and every fault. It is shown for comparison and is not ranked.",
@@ -133,7 +137,10 @@ _GLOSSARY: tuple[tuple[str, str], ...] = (
         "Rank interval",
         "The ranks that an estimator may have. The intervals of all rows hold together with 95 % probability.",
     ),
-    ("Tier", "Rows of one tier cannot be told apart by these runs."),
+    ("May be the best", "The set of rows that holds the best one with 95 % probability."),
+    ("Plain row", "The simplest filter that suits the scenario. Gains are over its errors on the same runs."),
+    ("Incomplete", "The row lacks seeds or scenarios that the track asks. It has a score, and no rank."),
+    ("Variant", "One of more than three rows that differ in parameters only, or agree in nearly every run."),
     ("Provisional", "Fewer than ten seeds or recordings: the rank may still change much."),
     (
         "Failed run",

@@ -31,10 +31,8 @@ _COLUMNS = (
     Column("name", "Scenario", "The name leads to the page of the scenario.", "name", fixed=True),
     Column("track", "Track", "Scenarios of one track are ranked together.", "text", filter=True),
     Column("group", "Difficulty", "What makes the scenario difficult.", "text", filter=True),
-    Column("rank", "Rank", "On this scenario.", "integer"),
-    Column(
-        "score", "× reference", "Geometric mean of the error, divided by the reference figure of the scenario.", "ratio"
-    ),
+    Column("ranks", "Rank", "Interval of the rank on this scenario."),
+    Column("score", "× reference", "Geometric mean of the error over the reference of the scenario.", "ratio"),
     Column("interval", "95 % interval", "Interval of the score.", "interval"),
     Column("failed", "Failed", "Runs that failed count as the worst.", "text"),
 )
@@ -51,7 +49,8 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
             costs.append(row.update_median)
             place: str = row.standing
             if row.ranked:
-                place = f"rank {row.ranks.replace('-', '–') or row.rank}" + (", provisional" if row.provisional else "")
+                place = f"rank {row.ranks.replace('-', '–')}" if row.ranks else "not enough data for a rank"
+                place += ", provisional" if row.provisional else ""
             found.append(Fact(f"{track.title}: {place}", tables.number(row.score)))
     known = [c for c in costs if c > 0.0]
     if known:
@@ -135,7 +134,7 @@ def estimator_data(
                 "words": scenario.title,
                 "track": table.track,
                 "group": scenario.group,
-                "rank": row.rank,
+                "ranks": {"text": row.ranks.replace("-", "–") or None, "sort": row.rank_low},
                 "score": short(row.score),
                 "interval": {"value": None, "low": short(row.low), "high": short(row.high)},
                 "failed": {"text": f"{row.failed} of {row.runs}", "value": row.failed},
@@ -188,9 +187,11 @@ def _profile(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry
 def worst_runs(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> list[tuple[Result, float]]:
     """The runs that ended well with their errors as multiples of the reference figure, the largest first."""
     found = []
-    for table, _ in _tables(label, ranking):
+    for table, row in _tables(label, ranking):
         for result in runs[table.scenario][label].good:
-            ratio = result.scores.get("horizontal_rmse", math.nan) / table.reference.value
+            ratio = row.ratios.get(str(result.seed), math.nan)  # a run that does not count has none
+            if table.unit != "seed":
+                ratio = result.scores.get("horizontal_rmse", math.nan) / table.reference.value
             if math.isfinite(ratio):
                 found.append((result, ratio))
     return sorted(found, key=lambda f: -f[1])

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.confinement import confined
+from simnav.leaderboard.ranking.ranking_table import score_caption, score_title
 from simnav.leaderboard.site.charts import accuracy_and_cost, columns, detection, spread, spread_data
 from simnav.leaderboard.site.columns import Column, plain
 from simnav.leaderboard.site.rounding import short
@@ -29,16 +30,13 @@ _NAME = Column(
     fixed=True,
 )
 _BEFORE = (
-    Column("rank", "Rank", "Position by score. Equal scores share a rank.", "integer"),
-    _NAME,
-    Column("ranks", "Ranks", "Interval of the rank. The intervals of all rows hold together with 95 % probability."),
     Column(
-        "tier",
-        "Tier",
-        "Rows of one tier cannot be told apart by these runs. Bands show the tiers.",
-        "integer",
-        wide=True,
+        "ranks",
+        "Rank",
+        "Interval of the rank. Rows that share ranks cannot be told apart. The intervals of all rows hold together "
+        "with 95 % probability.",
     ),
+    _NAME,
 )
 _AFTER = (
     Column("family", "Family", "Kind of method.", "text", filter=True),
@@ -65,14 +63,39 @@ _AFTER = (
         "Runs with an exception, an invalid output, a timeout, too much memory or divergence. They count as the worst.",
         "text",
     ),
+    Column("gain", "× plain row", "Error over that of the plain row on the same runs; below 1 is better.", "ratio"),
+    Column("gain_interval", "× plain row, 95 %", "Interval over the seeds.", "interval", wide=True),
     Column(
-        "p95",
-        "95 % of runs",
-        "Ratio to the reference figure that 95 % of the runs do not exceed.",
-        "ratio",
+        "gain_scenarios",
+        "× plain row, 95 % over scenarios",
+        "Interval over seeds and scenarios: what the gain may be on other scenarios of the same kind.",
+        "interval",
+        wide=True,
+    ),
+    Column("won", "Scenarios won", "Scenarios with a smaller error than the plain row's.", "text", wide=True),
+    Column(
+        "worse",
+        "Above 1.5 ×",
+        "Share of the runs with more than 1.5 times the error of the plain row.",
+        "percent",
         hidden=True,
     ),
-    Column("worst", "Worst run", "Largest ratio to the reference figure of a run.", "ratio", hidden=True),
+    Column(
+        "far",
+        "Above 10 ×",
+        "Share of the runs with more than ten times the error of the oracle.",
+        "percent",
+        hidden=True,
+    ),
+    Column(
+        "over_scenarios",
+        "Score, 95 % over scenarios",
+        "Interval of the score over seeds and scenarios.",
+        "interval",
+        hidden=True,
+    ),
+    Column("p95", "95 % of runs", "Ratio to the reference that 95 % of the runs do not exceed.", "ratio", hidden=True),
+    Column("worst", "Worst run", "Largest ratio to the reference of a run.", "ratio", hidden=True),
     Column("p", "p-value", "Adjusted for all pairs of rows, against the row with the best score.", "p", hidden=True),
     Column("cost", "Time per epoch", "Median wall-clock time of one epoch.", "duration"),
     Column("memory", "Memory", "Largest memory of all runs.", "size", hidden=True),
@@ -122,13 +145,15 @@ def board_row(
     if same:
         notes.append(f"same result: {', '.join(same)}")
     return {
-        "rank": row.rank,
         "name": {"text": row.estimator, "page": entry.page, "note": ", ".join(notes)},
         "ranks": {"text": row.ranks.replace("-", "–") or None, "sort": row.rank_low},
-        "tier": row.tier,
+        "best": row.may_be_best,
         "score": {"value": short(row.score), "help": row.why or None},
         "bar": {"value": short(row.score), "low": short(row.low), "high": short(row.high)},
-        "interval": {"value": None, "low": short(row.low), "high": short(row.high)},
+        "interval": _ends(row.low, row.high),
+        "over_scenarios": _ends(row.scenarios_low, row.scenarios_high),
+        **_gain(row),
+        "far": short(row.far),
         "family": entry.facts.family,
         "badge": "" if row.faulty.badge == "unknown" else row.faulty.badge,
         "coverage": short(row.faulty.coverage),
@@ -143,6 +168,24 @@ def board_row(
         "reference": row.reference,
         "mark": row.standing if not row.ranked else "",
         "words": f"{entry.facts.summary} {row.why}",
+    }
+
+
+def _ends(low: float, high: float) -> dict[str, Any]:
+    return {"value": None, "low": short(low), "high": short(high)}
+
+
+def _gain(row: Row) -> dict[str, Any]:
+    """What a board shows of the comparison with the plain row."""
+    g = row.gain
+    if g is None:
+        return dict.fromkeys(("gain", "gain_interval", "gain_scenarios", "won", "worse"))
+    return {
+        "gain": short(g.value),
+        "gain_interval": _ends(g.low, g.high),
+        "gain_scenarios": _ends(g.scenarios_low, g.scenarios_high),
+        "won": {"text": f"{g.won} of {g.scenarios}", "value": g.won},
+        "worse": short(g.worse),
     }
 
 
@@ -172,13 +215,8 @@ def _track(
     scenarios: Mapping[str, ScenarioEntry],
     runs: Mapping[str, Mapping[str, Runs]],
 ) -> dict[str, Any]:
-    title = "× reference" if track.relative else "Error [m]"
-    explanation = (
-        "Geometric mean of the error of each run, divided by the reference figure of its scenario. Each scenario "
-        "counts the same."
-        if track.relative
-        else "Geometric mean of the error of each run."
-    )
+    title = score_title(track).replace("error", "Error")
+    explanation = score_caption(track)
     more = [
         Column(
             f"s:{s}", scenarios[s].name, f"{title} on {scenarios[s].title or scenarios[s].name}.", "ratio", hidden=True
@@ -195,6 +233,8 @@ def _track(
     return {
         "key": track.track,
         "title": track.title,
+        "best": any(r.may_be_best for r in track.rows),
+        "sentence": track.sentence.replace("`", ""),
         "remarks": list(track.remarks),
         "provisional": track.provisional,
         "facts": f"{_count(len(track.scenarios), 'scenario')}, {_count(len(scored), 'ranked estimator')}, "

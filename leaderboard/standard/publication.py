@@ -13,7 +13,7 @@ from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank
-from simnav.leaderboard.results import store
+from simnav.leaderboard.results import requested, store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.gathering import gather
@@ -125,11 +125,12 @@ def publish(
             f"{sum(lacking.values())} runs of the profile {profile.name} are missing, such as of {first}; "
             "'simnav standard run' continues, and --preliminary publishes what is there"
         )
-    ranking = rank(results)
+    ranking = rank(results, requested=requested.read(working))
     of = len(results) + sum(lacking.values())
     text = replaced(readme, tables(ranking, results, of)) if readme is not None else ""  # fails before all is written
     if working.resolve() != folder.resolve() or without:
         pack(working, folder, without=without, single=True)
+        requested.copy(folder, [working])
     edition = 0 if lacking else append(history, ranking, results)
     if readme is not None:
         write_whole(readme, text)

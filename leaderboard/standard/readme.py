@@ -9,7 +9,9 @@ from pathlib import Path
 
 from simnav.estimator import EstimatorError, describe
 from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
-from simnav.leaderboard.ranking.ranking_table import ratio
+from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
+from simnav.leaderboard.ranking.summary import best_rows, gain_text, sentence, spread
+from simnav.leaderboard.ranking.tables import MISSING
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
@@ -50,31 +52,38 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     preliminary = of is not None and len(results) < of
     few = f"**Preliminary: {len(results)} of {of} results.** " if preliminary else ""
     parts = [
-        f"{few}{sum(r.tried for r in results)} runs of {benchmark} with commit {commits}{when}. A score is the "
-        "geometric mean of the horizontal error, divided by the scenario's reference figure: the error of an oracle "
-        "that knows the true noise and every fault, or of a plain filter on recorded voyages. Smaller is better."
+        f"{few}{sum(r.tried for r in results)} runs of {benchmark} with commit {commits}{when}. All rows of a track "
+        "are judged on the same seeds. A score is the geometric mean of the horizontal error over that of an oracle on "
+        "the same run; the oracle knows the true noise and every fault. Recorded voyages have no oracle: there the "
+        "plain filter on the same run is the divisor. Smaller is better."
     ]
     if tracks:
         parts.append("\n".join([
-            "| track | scenarios | runs of a row | rows | first by score | may be the best (95 %) | `ekf` |",
-            "|---|---|---|---|---|---|---|", *map(_track, tracks),
+            "| track | scenarios | seeds | complete rows | may be the best (95 %) | error beside the plain row's "
+            "| 95 % over seeds | 95 % over scenarios | × oracle |",
+            "|---|---|---|---|---|---|---|---|---|", *map(_track, tracks),
         ]))  # fmt: skip
     main = _main(ranking)
     if main is not None:
+        parts.append(sentence(main))
         parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
         ranked = [r for r in main.rows if r.ranked]
-        fewer = sum(r.adjustment != 1.0 for r in ranked)
-        adjusted = (
-            f" {fewer} of {len(ranked)} rows have run fewer seeds; their scores are adjusted for that." if fewer else ""
+        parts.append(
+            f"The {min(_ROWS, len(ranked))} rows of the track *{main.title}* with the smallest scores, "
+            f"of {len(ranked)} complete rows. Rows that share ranks cannot be told apart."
         )
-        parts.append(f"The first {min(_ROWS, len(ranked))} rows of the track *{main.title}*.{adjusted}")
         parts.append("\n".join([
-            "| rank | estimator | method | score, 95 % interval | worst run | failed runs |",
-            "|---|---|---|---|---|---|",
-            *(f"| {r.ranks} | `{r.estimator}` | {_method(r)} | {ratio(r.score)}{_interval(r)} | {ratio(r.worst)} "
-              f"| {r.failed} of {r.runs} |" for r in ranked[:_ROWS]),
+            f"| rank | estimator | method | × oracle, 95 % interval | × `{main.plain}`, 95 % interval | scenarios won "
+            "| failed runs |",
+            "|---|---|---|---|---|---|---|",
+            *(f"| {r.ranks or MISSING} | `{r.estimator}` | {_method(r)} | {ratio(r.score)}{_interval(r)} "
+              f"| {gain_cell(r)} | {_won(r)} | {r.failed} of {r.runs} |" for r in ranked[:_ROWS]),
         ]))  # fmt: skip
     return "\n\n".join(parts)
+
+
+def _won(row: TrackRow) -> str:
+    return "" if row.gain is None else f"{row.gain.won} of {row.gain.scenarios}"
 
 
 def _main(ranking: Ranking) -> TrackRanking | None:
@@ -109,15 +118,20 @@ def _interval(row: TrackRow) -> str:
 
 
 def _track(track: TrackRanking) -> str:
+    """A line of the table of tracks: the set that may be the best, and what it gains."""
     ranked = [r for r in track.rows if r.ranked]
-    best = [f"`{r.estimator}`" for r in ranked if r.may_be_best]
-    may = ", ".join(best) if len(best) <= _BEST else f"{len(best)} rows"
-    plain = next((ratio(r.score) for r in ranked if r.estimator == "ekf"), "")
-    runs = sorted({r.runs for r in ranked})
-    count = f"{runs[0]} to {runs[-1]}" if len(runs) > 1 else str(runs[0])
-    leader = ranked[0]
-    first = f"`{leader.estimator}` {ratio(leader.score)}"
-    return f"| {track.title} | {len(track.scenarios)} | {count} | {len(ranked)} | {first} | {may} | {plain} |"
+    best = best_rows(track)
+    shown = best or ranked
+    names = ", ".join(f"`{r.estimator}`" for r in best) if len(best) <= _BEST else f"{len(best)} rows"
+    gained = [r for r in shown if r.estimator != track.plain]
+    cells = [
+        track.title, len(track.scenarios), track.units, len(ranked), "not enough data" if track.insufficient else names,
+        *(gain_text(gained, part) or MISSING for part in ("value", "seeds", "scenarios")),
+        spread((r.score for r in shown), "{:.2f}") if track.reference == "oracle" else "",
+    ]  # fmt: skip
+    if track.insufficient:
+        cells[5:] = [""] * len(cells[5:])
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def marked(readme: Path) -> str:

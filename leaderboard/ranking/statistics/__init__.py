@@ -22,6 +22,7 @@ from simnav.leaderboard.ranking.statistics.intervals import (
 )
 from simnav.leaderboard.ranking.statistics.pairs import Comparison, compare
 from simnav.leaderboard.ranking.statistics.separation import Separation, separate, smallest_p_value, tiers
+from simnav.leaderboard.ranking.statistics.temp_ import Gain, gain, scenario_interval, unorderable
 
 __all__ = [
     "FAILURE",

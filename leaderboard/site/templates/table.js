@@ -141,12 +141,8 @@
     draw() {
       const columns = this.visible(), rows = this.rows();
       this.head.replaceChildren(...columns.map((c) => this.heading(c)));
-      let tier = null;
-      const ranked = !this.order || this.order.key === this.given.sort;
       this.body.replaceChildren(...rows.map((row) => {
-        const classes = [row.reference && "reference", row.mark, ranked && row.tier && `tier-${row.tier % 2}`];
-        if (ranked && tier !== null && (row.tier ?? 0) !== tier) classes.push("tier-start");
-        tier = row.tier ?? 0;
+        const classes = [row.reference && "reference", row.mark, row.best && "may-be-best"];
         const line = make("tr", { class: classes.filter(Boolean).join(" ") || null });
         for (const column of columns) {
           const value = row[column.key];

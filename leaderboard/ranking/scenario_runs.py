@@ -1,0 +1,198 @@
+"""The runs of all rows on one scenario, as a board counts them: the same seeds for each, relative to the same oracle.
+
+**Runs that count.** The seeds that at least half of the rows have run (`simnav.leaderboard.ranking.evidence`).
+
+**Figures.** The logarithm of the error of a run, divided by the error of an oracle on the same run. Seeds differ in how
+hard they are, for a row and the oracle alike, so the ratio to the same run says more than the ratio to a mean over
+other runs. Where the oracle has not run all seeds that count, the scenario's stored reference figure is the divisor.
+Recorded voyages have no oracle; there the plain row on the same runs is the divisor.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Container, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.leaderboard.ranking.board import Reference
+from simnav.leaderboard.ranking.evidence import common_seeds, notes_by_seed
+from simnav.leaderboard.ranking.plain_row import plain_row
+from simnav.leaderboard.ranking.plausibility import beats, too_good
+from simnav.leaderboard.ranking.reference import ORACLES, reference_of
+from simnav.leaderboard.ranking.runs import Runs
+from simnav.leaderboard.ranking.statistics import FAILURE
+from simnav.leaderboard.ranking.tracks import RECORDED, SMOOTHED, Track
+
+__all__ = ["CAP", "Cell", "ScenarioRuns"]
+
+Array = NDArray[np.float64]
+
+#: Logarithm of the ratio that a failed run has, and that no run exceeds.
+CAP = math.log(FAILURE)
+_LEAST = math.log(1e-9)  # of an error of zero
+_RECORDING = re.compile(r"recording '([^']*)'")
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """The runs of one row on one scenario that count.
+
+    Attributes
+    ----------
+    runs : Runs
+        Those runs.
+    asked : int
+        How many seeds the scenario asks; a row with fewer is incomplete.
+    units : list
+        The seed or the recording of each run.
+    logs : (n,) array
+        Logarithms of the ratios to the reference; infinite where a run failed.
+    """
+
+    runs: Runs
+    asked: int
+    units: list[Any]
+    logs: Array
+
+    @property
+    def complete(self) -> bool:
+        """Whether the row has run all seeds that the scenario asks."""
+        return len(self.logs) == self.asked
+
+    @property
+    def capped(self) -> Array:
+        """The logarithms as they count."""
+        return np.minimum(self.logs, CAP)
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which runs failed."""
+        return np.isinf(self.logs)
+
+    @cached_property
+    def by_unit(self) -> tuple[list[Any], Array]:
+        """The units, each once, and the mean of what counts."""
+        if len(set(self.units)) == len(self.units):
+            return self.units, self.capped
+        units = list(dict.fromkeys(self.units))
+        index = np.array([units.index(u) for u in self.units])
+        return units, np.bincount(index, self.capped) / np.bincount(index)
+
+
+class ScenarioRuns:
+    """One scenario with its rows: those that have runs, and those that it does not suit.
+
+    Parameters
+    ----------
+    name : str
+        Versioned id.
+    by : mapping of str to Runs
+        All runs by estimator.
+    track : Track
+        The track that is ranked, with its score.
+    recorded : bool or None
+        Whether the scenario is of recorded voyages, as the catalogue says; None for one that is not in it.
+    apart : container of str
+        Rows that have no say in which seeds count.
+
+    Attributes
+    ----------
+    cells : dict of str to Cell
+        By estimator, of those that the scenario suits.
+    unsuitable : dict of str to str
+        Estimators that the scenario does not suit, and why.
+    reference : Reference
+        What the errors are divided by.
+    plain : str
+        The plain row; empty where none has all seeds.
+    seeds : list of int
+        Seeds that count.
+    """
+
+    def __init__(
+        self, name: str, by: Mapping[str, Runs], track: Track, recorded: bool | None = None, apart: Container[str] = ()
+    ):
+        self.name, self.track = name, track
+        self.unsuitable = {n: why for n in sorted(by) if (why := by[n].unsuitable())}
+        entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
+        if track.score == SMOOTHED and track.name == "post-processing":  # whoever never smooths is not in it
+            entries = {n: r for n, r in entries.items() if np.isfinite(r.scores(track.score)).any()}
+        self.notes = notes_by_seed([r for runs in entries.values() for r in runs.tried])
+        self.recorded = track.name == RECORDED or (self._said_to_be_recorded() if recorded is None else recorded)
+        voters = [r for n, r in entries.items() if not r.reference and n not in apart]
+        voters = voters or [r for r in entries.values() if not r.reference] or list(entries.values())
+        self.seeds = common_seeds([{r.seed for r in runs.tried} for runs in voters])
+        self.errors = {n: self._errors(r) for n, r in entries.items()}
+        self._stored = reference_of(name, track.score, entries, self.recorded)
+        self.divisor, self.reference = self._reference()
+        self.plain = plain_row(track.score, {n for n in entries if self._whole(n)})
+        self.cells = {n: self._cell(r) for n, r in entries.items()}
+
+    def _said_to_be_recorded(self) -> bool:
+        return bool(self.notes) and all(_RECORDING.match(note) for note in self.notes.values())
+
+    def _errors(self, runs: Runs) -> dict[int, float]:
+        """The error by seed; infinite where a run failed or has no position."""
+        values = runs.column(self.track.score).tolist()
+        pairs = zip(runs.results, values, strict=True)
+        return {r.seed: v if r.status == "ok" and math.isfinite(v) else math.inf for r, v in pairs if r.tried}
+
+    def _whole(self, name: str) -> bool:
+        """Whether a row has a finite error above zero on every seed that counts."""
+        mine = self.errors.get(name, {})
+        return bool(self.seeds) and all(0.0 < mine.get(seed, math.inf) < math.inf for seed in self.seeds)
+
+    def _reference(self) -> tuple[Mapping[int, float], Reference]:
+        """What is divided by, by seed, and in words: an oracle on the same runs, or else a fixed figure."""
+        name = ORACLES.get(self.track.score, "oracle")
+        if self.recorded:
+            name = plain_row(self.track.score, {n for n in self.errors if self._whole(n)})
+        if not name or not self._whole(name):
+            return dict.fromkeys(self.seeds, self._stored.value), self._stored
+        mine = {seed: self.errors[name][seed] for seed in self.seeds}
+        logs = np.log(list(mine.values()))
+        spread = float(logs.std(ddof=1)) if len(logs) > 1 else math.nan
+        return mine, Reference(math.exp(float(logs.mean())), name, len(logs), spread, paired=True)
+
+    def _cell(self, runs: Runs) -> Cell:
+        counts = set(self.seeds)
+        there = [r for r in runs.tried if r.seed in counts]
+        logs = [self.log(runs.estimator, r.seed) for r in there]
+        same = len(there) == len(runs.results)
+        counted = runs if same else Runs(there) if there else runs
+        return Cell(counted, len(counts), [self.unit(r.seed) for r in there], np.array(logs, dtype=np.float64))
+
+    def log(self, name: str, seed: int) -> float:
+        """Logarithm of the ratio of a row's error to the reference in one run; infinite where the run failed."""
+        return _ratio(self.errors[name][seed], self.divisor[seed])
+
+    def unit(self, seed: int) -> Any:
+        """The independent unit of a run: its seed, or its recording."""
+        if not self.recorded:
+            return seed
+        note = self.notes[seed]
+        found = _RECORDING.match(note)
+        return found.group(1) if found else note
+
+    def implausible(self, name: str, scenarios: int = 1) -> bool:
+        """Whether a row is better here than what is possible: than an oracle on the same runs, or its stored figure."""
+        cell = self.cells[name]
+        if cell.runs.reference or self.recorded:
+            return False
+        oracle = self.errors.get(ORACLES.get(self.track.score, "oracle"), {})
+        mine = {seed: error for seed, error in self.errors[name].items() if math.isfinite(error)}
+        pairs = [_ratio(error, oracle[seed]) for seed, error in mine.items() if 0.0 < oracle.get(seed, 0.0) < math.inf]
+        if beats(pairs, scenarios):
+            return True
+        logs = [_ratio(error, self._stored.value) for seed, error in mine.items() if seed in self.divisor]
+        return self._stored.bounds and too_good(logs, self._stored, scenarios)
+
+
+def _ratio(error: float, divisor: float) -> float:
+    return max(math.log(error / divisor), _LEAST) if error > 0.0 else _LEAST

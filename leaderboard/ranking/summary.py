@@ -1,0 +1,116 @@
+"""What can be quoted of a track: which rows may be the best, and what they gain, in one sentence with its intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.ranking import tables
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.ranking.board import Row, TrackRanking
+
+__all__ = ["best_rows", "gain_text", "less", "sentence", "spread"]
+
+_NAMED = 4  # rows that a sentence names
+
+
+def best_rows(track: TrackRanking) -> list[Row]:
+    """The rows that may be the best, in order of score; none where the rows cannot be ordered."""
+    return [r for r in track.rows if r.ranked and r.may_be_best]
+
+
+def less(ratio: float) -> float:
+    """By how many per cent an error is less, given its ratio to another.
+
+    >>> less(0.75)
+    25.0
+    """
+    return 100.0 * (1.0 - ratio)
+
+
+def spread(values: Iterable[float], write: str = "{:.0f}") -> str:
+    """The least and the largest of some numbers, as text; one of them where they are written the same.
+
+    >>> spread([24.1, 25.3]), spread([24.1, 23.9])
+    ('24 to 25', '24')
+    """
+    known = sorted(v for v in values if math.isfinite(v))
+    texts = list(dict.fromkeys(write.format(v + 0.0) for v in known))
+    return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}" if texts else tables.MISSING
+
+
+def gain_text(rows: Sequence[Row], part: str = "value") -> str:
+    """The errors of rows beside those of the plain row, in words: ``24 to 25 % less``, ``3 % more to 20 % less``.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Rows that have a gain; those without one are left out.
+    part : str
+        ``value``, ``seeds`` (the interval over seeds) or ``scenarios`` (over seeds and scenarios).
+
+    Returns
+    -------
+    str
+        Empty where nothing is known.
+    """
+    gains = [r.gain for r in rows if r.gain is not None]
+    if part == "value":
+        return _less(g.value for g in gains)
+    ends = [(g.low, g.high) if part == "seeds" else (g.scenarios_low, g.scenarios_high) for g in gains]
+    return _less(v for pair in ends for v in pair)
+
+
+def _less(ratios: Iterable[float]) -> str:
+    """The range of some ratios of errors, as percentages less or more than 1.
+
+    >>> _less([0.76, 0.75]), _less([1.03, 0.8]), _less([1.1]), _less([float("nan")])
+    ('24 to 25 % less', '3 % more to 20 % less', '10 % more', '')
+    """
+    known = [less(r) for r in ratios if math.isfinite(r)]
+    if not known:
+        return ""
+    low, high = min(known), max(known)
+    if low < -0.5 and high > 0.5:
+        return f"{spread([-low])} % more to {spread([high])} % less"
+    return f"{spread([low, high])} % less" if high > 0.5 or low > -0.5 else f"{spread([-high, -low])} % more"
+
+
+def sentence(track: TrackRanking) -> str:
+    """One sentence that can be quoted, made from the results.
+
+    Returns
+    -------
+    str
+        Where the rows cannot be ordered, it says so.
+    """
+    ranked = [r for r in track.rows if r.ranked]
+    scenarios = f"{len(track.scenarios)} scenario{'s' if len(track.scenarios) != 1 else ''}"
+    runs = f"{track.units} {track.unit}{'s' if track.units != 1 else ''}"
+    where = f"On {scenarios} of the track {track.title} ({runs})"
+    if not ranked:
+        return f"{where}, no row is complete."
+    if track.insufficient:
+        return f"{where}, there are not enough data to order the rows: {track.insufficient}."
+    best = best_rows(track)
+    names = [f"`{r.estimator}`" for r in best]
+    listed = f" ({', '.join(names)})" if len(names) <= _NAMED else ""
+    one = len(best) == 1
+    words = f"the row {names[0]}" if one else f"the {len(best)} of {len(ranked)} rows that may be the best{listed}"
+    said = f"{where}, {words}"
+    gained = [r for r in best if r.gain is not None and r.estimator != track.plain]
+    if track.plain and gained:
+        said += f" {'has' if one else 'have'} {gain_text(gained)} horizontal error than `{track.plain}`"
+        over = [
+            f"{text} over {what}"
+            for part, what in (("seeds", f"{track.unit}s"), ("scenarios", "scenarios"))
+            if (text := gain_text(gained, part))
+        ]
+        said += f" (95 %: {'; '.join(over)})" if over else ""
+        said += ", and" if track.reference == "oracle" else ""
+    if track.reference == "oracle":
+        said += f" {'has' if one else 'have'} {spread((r.score for r in best), '{:.2f}')} times the error of an oracle "
+        said += "on the same runs"
+    return f"{said}."
