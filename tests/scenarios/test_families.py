@@ -55,5 +55,24 @@ def test_the_same_voyage_under_another_root_is_another_run():
 
 
 def test_a_track_is_asked_for_by_its_name():
-    assert {s.name for s in scenarios_of("generalisation")} == {"random-voyages", "clean-voyages"}
+    assert {s.name for s in scenarios_of("generalisation")} == {"random-voyages", "clean-voyages", "several-faults"}
     assert all(s.training for s in scenarios_of("training"))
+
+
+@pytest.mark.parametrize("name", ["several-faults", "several-faults-ships"])
+def test_faults_meet_and_come_again(name: str):
+    """Some measurement is touched by two faults, in some voyage more than two faults act, and some comes again."""
+    family = load(name)
+    overlap, most, episodes = False, 0, 0
+    for seed in range(10):
+        recording = record(family, seed)
+        most = max(most, len(recording.faults))
+        for aid in recording.data.aids.values():
+            overlap |= any(int(bits).bit_count() > 1 for bits in aid.faults)
+        for j, fault in enumerate(family.drawn(seed).faults):
+            if fault.mean_gap is not None:
+                touched = recording.data.aids[fault.instruments[0]].faults >> np.uint32(j) & np.uint32(1)
+                episodes = max(episodes, int(np.count_nonzero(np.diff(touched.astype(int)) > 0)))
+    assert overlap
+    assert most >= 3
+    assert episodes >= 3
