@@ -58,6 +58,7 @@ from simnav.leaderboard.ranking.statistics import (
     score,
     separate,
     share,
+    unlucky_excess,
     unorderable,
     weighted_quantile,
 )
@@ -324,9 +325,11 @@ def _rows(
 ) -> tuple[list[dict[str, Any]], Separation | None, str]:
     """The fields that all rows have, in the order of a table; which are told apart; why they cannot be ordered."""
     figures = {n: _figures(tables, c) for n, c in cells.items()}
-    scores = {n: score(f.logs, f.strata, f.clusters, f.failed) for n, f in figures.items()}
-    ranked = sorted((n for n in cells if standing[n][0] == "ranked"), key=lambda n: (scores[n].value, n))
-    separation, places, why = _places(ranked, figures)
+    board = _board({n: f for n, f in figures.items() if standing[n][0] == "ranked"})
+    excess = unlucky_excess(board.values, board.strata, board.clusters) if board.names else 0.0
+    scores = {n: score(f.logs, f.strata, f.clusters, f.failed, excess) for n, f in figures.items()}
+    ranked = sorted(board.names, key=lambda n: (scores[n].value, n))
+    separation, places, why = _places(ranked, board)
     rest = sorted((n for n in cells if n not in ranked), key=lambda n: (_ORDER[standing[n][0]], scores[n].value, n))
     oracle = any(t.reference.bounds and t.reference.paired for t in tables)
     rows = []
@@ -338,7 +341,7 @@ def _rows(
         every = np.concatenate([c.capped for c in mine])
         lost = share(failed, runs)
         units = _count(tables, cells[n])
-        over = scenario_interval(f.logs, f.strata, f.clusters) if standing[n][0] != "incomplete" else Interval(math.nan)
+        over = scenario_interval(f.logs, f.strata) if standing[n][0] != "incomplete" else Interval(math.nan)
         rows.append({
             "estimator": n,
             "standing": standing[n][0],
@@ -350,7 +353,7 @@ def _rows(
             "high": scores[n].high,
             "scenarios_low": over.low,
             "scenarios_high": over.high,
-            "gain": _gain(n, tables, cells[n]),
+            "gain": _gain(n, tables, cells[n], excess),
             "far": float(np.mean(every > math.log(FAR))) if oracle else math.nan,
             "worst": math.exp(float(every.max())),
             "p95": math.exp(weighted_quantile(every, weights, 0.95)),
@@ -366,7 +369,7 @@ def _rows(
     return rows, separation, why
 
 
-def _gain(name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> Gain | None:
+def _gain(name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell], excess: float) -> Gain | None:
     """A row beside the plain row of each scenario, over the seeds that both have; None where there is no plain row."""
     if any(t.plain not in t.cells for t in tables) or any(t.name not in cells for t in tables):
         return None
@@ -378,30 +381,42 @@ def _gain(name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) 
             theirs.append(plain[seed])
             strata.append(t.name)
             clusters.append((t.name, t.unit(seed)) if t.recorded else seed)
-    return gain(np.array(mine), np.array(theirs), strata, clusters)
+    return gain(mine, theirs, strata, clusters, excess)
 
 
 def _by_seed(cell: Cell) -> tuple[list[int], list[float]]:
     return [r.seed for r in cell.runs.tried], cell.capped.tolist()
 
 
-def _places(
-    ranked: Sequence[str], figures: Mapping[str, _Figures]
-) -> tuple[Separation | None, dict[str, dict[str, Any]], str]:
+@dataclass(frozen=True, eq=False)
+class _Board:
+    """Figures of all rows that are ranked, side by side: ``values`` is (runs, rows), NaN where a row has no run."""
+
+    names: list[str]
+    values: Array
+    strata: list[str]
+    clusters: list[Any]
+
+
+def _board(figures: Mapping[str, _Figures]) -> _Board:
+    keys = sorted({k for f in figures.values() for k in f.keys}, key=repr)
+    index = {k: i for i, k in enumerate(keys)}
+    values = np.full((len(keys), len(figures)), np.nan)
+    for j, f in enumerate(figures.values()):
+        values[[index[k] for k in f.keys], j] = f.logs
+    return _Board(list(figures), values, [k[0] for k in keys], [k[1] for k in keys])
+
+
+def _places(ranked: Sequence[str], board: _Board) -> tuple[Separation | None, dict[str, dict[str, Any]], str]:
     """Ranks and what is told apart, of the rows that are ranked, which are given in order of score.
 
     Where they cannot be ordered, they have no ranks, and the reason is the last that is returned.
     """
     if not ranked:
         return None, {}, ""
-    keys = sorted({k for n in ranked for k in figures[n].keys}, key=repr)
-    index = {k: i for i, k in enumerate(keys)}
-    values = np.full((len(keys), len(ranked)), np.nan)
-    for j, n in enumerate(ranked):
-        values[[index[k] for k in figures[n].keys], j] = figures[n].logs
-    strata, clusters = [k[0] for k in keys], [k[1] for k in keys]
-    found = separate(values, strata, clusters)
-    why = unorderable(values, strata, clusters)
+    values = board.values[:, [board.names.index(n) for n in ranked]]
+    found = separate(values, board.strata, board.clusters)
+    why = unorderable(values, board.strata, board.clusters)
     places: dict[str, dict[str, Any]] = {}
     for j, n in enumerate(ranked):
         places[n] = {

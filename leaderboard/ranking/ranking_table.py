@@ -93,7 +93,8 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
             between(r.scenarios_low, r.scenarios_high, ratio), gain_cell(r), _won(r), tables.percent(_worse(r)),
             tables.percent(r.far), ratio(r.p95), ratio(r.worst), failed, f"{r.covered} of {r.scenarios}",
             consistency(r.clean), consistency(r.faulty), tables.percent(r.clean.coverage),
-            tables.percent(r.clean.worst_coverage), tables.duration(r.update_median), tables.size(r.peak_memory or None),
+            tables.percent(r.clean.worst_coverage), tables.duration(r.update_median),
+            tables.size(r.peak_memory or None),
         ])  # fmt: skip
     gained = f"× {track.plain}" if track.plain else "× plain row"
     columns = ["rank", "estimator", title, "95 % interval", "over scenarios", gained, "scenarios won", "above 1.5 ×",

@@ -5,13 +5,17 @@ Intervals are of 95 % and come as `Interval`. ``docs/statistics.md`` has what wa
 - `intervals`: of one row. `score` is what is ranked: a geometric mean in which failures count. `median` is what tables
   show beside it, `mean` and `mean_ratio` are compared with figures of papers, `share` is of failed runs.
 - `pairs`: two rows on the same runs, `compare`.
-- `separation`: all rows of a board at once, `separate`: which can be told apart, rank intervals, tiers, and the set of
-  rows that may be the best.
+- `separation`: all rows of a board at once, `separate`: which can be told apart, rank intervals, and the set of rows
+  that may be the best.
+- `gains`: a row beside the plain row, `gain`, with intervals over seeds and over scenarios.
+- `reliability`: whether the rows can be ordered at all, `unorderable`.
 """
 
+from simnav.leaderboard.ranking.statistics.gains import Gain, gain, scenario_interval
 from simnav.leaderboard.ranking.statistics.intervals import (
     FAILURE,
     FEWEST,
+    FEWEST_SEEDS,
     Interval,
     mean,
     mean_ratio,
@@ -21,23 +25,29 @@ from simnav.leaderboard.ranking.statistics.intervals import (
     weighted_quantile,
 )
 from simnav.leaderboard.ranking.statistics.pairs import Comparison, compare
-from simnav.leaderboard.ranking.statistics.separation import Separation, separate, smallest_p_value, tiers
-from simnav.leaderboard.ranking.statistics.temp_ import Gain, gain, scenario_interval, unorderable
+from simnav.leaderboard.ranking.statistics.reliability import reliability, unorderable
+from simnav.leaderboard.ranking.statistics.separation import Separation, separate, smallest_p_value, unlucky_excess
 
 __all__ = [
     "FAILURE",
     "FEWEST",
+    "FEWEST_SEEDS",
     "Comparison",
+    "Gain",
     "Interval",
     "Separation",
     "compare",
+    "gain",
     "mean",
     "mean_ratio",
     "median",
+    "reliability",
+    "scenario_interval",
     "score",
     "separate",
     "share",
     "smallest_p_value",
-    "tiers",
+    "unlucky_excess",
+    "unorderable",
     "weighted_quantile",
 ]

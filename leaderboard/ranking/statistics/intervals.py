@@ -12,9 +12,10 @@ Its interval
     random streams. So the seed is the independent unit: the contributions of a seed are added before they are compared
     with those of the other seeds (a cluster-robust variance: Cameron and Miller, *A practitioner's guide to
     cluster-robust inference*, Journal of Human Resources 2015), and the degrees of freedom are those of Welch and
-    Satterthwaite, at most the number of seeds less one.
+    Satterthwaite, at most the number of seeds less one. Errors are skewed, and a rare bad run may not have happened
+    yet. So the upper end is at least that of Student's interval with one more run that is unlucky (``excess``).
 
-There are no intervals of fewer than `FEWEST` runs.
+There are no intervals of fewer than `FEWEST` runs, and none of a score of fewer than `FEWEST_SEEDS`.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "FAILURE",
     "FEWEST",
+    "FEWEST_SEEDS",
     "Interval",
     "codes",
     "mean",
@@ -45,6 +47,8 @@ Array = NDArray[np.float64]
 LEVEL = 0.95
 #: Fewest runs of which an interval is given. Of five, the smallest and the largest hold the median in 93.75 % only.
 FEWEST = 6
+#: Fewest seeds of which the interval of a score is given: with fewer it would hold the truth in less than 93 %.
+FEWEST_SEEDS = 10
 #: Ratio to the reference figure that stands for a failed run, and that no run exceeds.
 FAILURE = 1000.0
 
@@ -72,6 +76,7 @@ def score(
     strata: Sequence[Hashable] | None = None,
     clusters: Sequence[Hashable] | None = None,
     failed: ArrayLike | None = None,
+    excess: float = 0.0,
 ) -> Interval:
     """Geometric mean of ratios, in which each stratum counts the same, with its interval.
 
@@ -85,11 +90,14 @@ def score(
         The independent unit of each run, its seed or recording. Default: each run is one.
     failed : (n,) bool array_like, optional
         The runs that count as `FAILURE`. Default: none.
+    excess : float
+        By how much an unlucky seed is worse than others, as a logarithm: from
+        `simnav.leaderboard.ranking.statistics.separation.unlucky_excess` for all rows of a board.
 
     Returns
     -------
     Interval
-        As ratios. Without an interval where a stratum has fewer than `FEWEST` runs, or one run that did not fail.
+        As ratios. Without an interval where a stratum has fewer than `FEWEST_SEEDS` runs, or one run that did not fail.
 
     Examples
     --------
@@ -111,7 +119,7 @@ def score(
     value = float(np.mean(np.bincount(stratum, x) / runs))
     good = np.bincount(stratum[~bad], minlength=len(runs)).astype(np.float64)
     result = Interval(math.exp(value), runs=n)
-    if runs.min() < FEWEST or (good == 1.0).any():
+    if runs.min() < FEWEST_SEEDS or (good == 1.0).any():
         return result
     centre = np.bincount(stratum[~bad], x[~bad], len(runs)) / np.maximum(good, 1.0)
     inside, seeds = stratum[~bad], cluster[~bad]
@@ -126,8 +134,14 @@ def score(
     freedom = parts.sum() ** 2 / np.sum(parts[known] ** 2 / (good[known] - 1.0))
     from scipy.special import stdtrit
 
-    reach = float(stdtrit(min(freedom, len(np.unique(seeds)) - 1.0), 0.5 * (1.0 + LEVEL))) * math.sqrt(variance)
-    return Interval(math.exp(value), math.exp(value - reach), math.exp(min(value + reach, 700.0)), n)
+    count = len(np.unique(seeds))
+    student = float(stdtrit(min(freedom, count - 1.0), 0.5 * (1.0 + LEVEL)))
+    reach = student * math.sqrt(variance)
+    # One more seed, with the figure of the others and the excess: the mean, and its variance.
+    shift = excess / (count + 1)
+    wider = (variance * (count - 1) + excess**2 / (count + 1)) / (count + 1)
+    high = max(value + reach, value + shift + student * math.sqrt(wider))
+    return Interval(math.exp(value), math.exp(value - reach), math.exp(min(high, 700.0)), n)
 
 
 def codes(items: Iterable[Hashable]) -> NDArray[np.int64]:

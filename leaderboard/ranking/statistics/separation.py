@@ -1,22 +1,28 @@
-"""Which rows of a board can be told apart: one simultaneous test of all pairs, with sign flips.
+"""Which rows of a board can be told apart: one simultaneous test of all pairs, by a studentised bootstrap.
 
-Given are figures (logarithms of errors) of n rows in the same runs. If two rows are equally good, the sign of their
-difference in a run is as likely plus as minus. So the signs are flipped at random, and it is seen how large the
-differences between rows become by chance alone.
+Given are figures (logarithms of errors) of n rows in the same runs. Two rows are equally good if the mean of their
+difference is zero, whatever the distribution of the difference is. Real differences are skewed: a row is slightly
+better in most runs, and much worse in a few. A test that takes the distribution for symmetric, such as sign flips,
+separates such equal rows far too often.
 
-- **One sign a cluster.** Runs of one seed in several scenarios share random streams, and runs over one recording share
-  the recording. They are one *cluster*: all its differences are flipped together, in all pairs of rows.
-- **Statistic of a pair.** The mean over the scenarios of the mean difference, over the root of the sum of squares of
-  the clusters' contributions. Flips do not change the denominator, so that this is as good as Student's t.
-- **All pairs at once.** The p-value of a pair is the share of the flips in which the largest statistic of any pair
-  that is not more extreme reaches the pair's own: the free step-down procedure with maxima of Westfall and Young
-  (*Resampling-based multiple testing*, Wiley 1993). The probability that any two equal rows are separated is at most
-  5 %, whatever the other rows are, if differences are distributed symmetrically.
+- **Bootstrap.** Clusters are drawn with replacement, and the difference of each pair, less its mean, is divided by its
+  standard error in each draw: the studentised bootstrap (Hall, *The bootstrap and Edgeworth expansion*, Springer 1992).
+- **One cluster a seed.** Runs of one seed in several scenarios share random streams, and runs over one recording share
+  the recording. They are one cluster: all of them are drawn together, in all pairs of rows.
+- **All pairs at once.** The p-value of a pair is the share of the draws in which the largest statistic of any pair
+  that is not more extreme reaches the pair's own: the step-down procedure with maxima (Romano and Wolf, *Exact and
+  approximate stepdown methods for multiple hypothesis testing*, Journal of the American Statistical Association 2005).
+- **One more unlucky run.** No test of a few runs can see a rare bad run that has not happened yet. But the other rows
+  of the board show how bad such a run is. So a difference has to hold also if the better row has one more run with the
+  excess that occurs once in four times as many runs as it has, in all rows of the board together (`unlucky_excess`).
+- **Relevance.** A difference of less than `RELEVANT` is none, so that rounding does not rank rows.
 - **Rank intervals** follow from the pairs: a row's best possible rank is 1 plus the number of rows that are separated
   from it and better (Mogstad, Romano, Shaikh and Wilhelm, *Inference for ranks with applications to mobility across
   neighborhoods and academic achievement across countries*, Review of Economic Studies 2024).
 - **The set that may be best** is found by elimination: as long as the rows that are left are not equally good, the one
   that is the worst of any pair goes (Hansen, Lunde and Nason, *The model confidence set*, Econometrica 2011).
+
+``docs/statistics.md`` has what was measured: how often equal rows are separated, with the differences of real rows.
 """
 
 from __future__ import annotations
@@ -28,18 +34,24 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simnav.leaderboard.ranking.statistics.intervals import codes
+from simnav.leaderboard.ranking.statistics.intervals import FEWEST, codes
 
-__all__ = ["Separation", "separate", "smallest_p_value", "tiers"]
+__all__ = ["RELEVANT", "Separation", "separate", "smallest_p_value", "unlucky_excess"]
 
 Array = NDArray[np.float64]
 
 #: Family-wise error rate: probability that any two equal rows of a board are separated.
 ALPHA = 0.05
-#: Flips of a test; of up to `_FEW` clusters all are tried.
-FLIPS, _FEW = 2000, 11
+#: Draws of the bootstrap.
+DRAWS = 2000
+#: Differences of a smaller share are none.
+RELEVANT = 0.001
 
+_UNLUCKY = 0.25  # how many runs of a row, in all its runs, are as bad as the one that is added
 _TINY = 1e-12  # of the largest difference: what is smaller is rounding
+_LEAST_VARIANCE = 0.01  # of a draw, as a share of the variance of the sample
+_FEWEST_VISIBLE = 2.0  # clusters that the scatter of a pair has to come from, to count for the others
+_CLEAR = np.float32(1e9)  # statistic of a difference without any scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +91,7 @@ def smallest_p_value(clusters: int) -> float:
     >>> smallest_p_value(5), smallest_p_value(6)
     (0.0625, 0.03125)
     """
-    return 1.0 if clusters < 1 else 0.5 ** (clusters - 1) if clusters <= _FEW else 1.0 / FLIPS
+    return 1.0 if clusters < 1 else max(0.5 ** (clusters - 1), 1.0 / (DRAWS + 1))
 
 
 def separate(
@@ -105,10 +117,10 @@ def separate(
 
     Examples
     --------
-    >>> values = np.array([[0.0, 0.01, 2.0 + 0.1 * k] for k in range(10)])
+    >>> values = np.array([[0.0, 0.01 * (k % 3 - 1), 2.0 + 0.1 * (k % 4)] for k in range(12)])
     >>> found = separate(values)
     >>> found.rank_low.tolist(), found.rank_high.tolist(), found.may_be_best.tolist()
-    ([1, 2, 3], [1, 2, 3], [True, False, False])
+    ([1, 1, 3], [2, 2, 3], [True, True, False])
     """
     x: Array = np.asarray(values, dtype=np.float64)
     u, n = x.shape
@@ -116,75 +128,150 @@ def separate(
     cluster = codes(range(u) if clusters is None else clusters)
     count = int(cluster.max()) + 1 if u else 0
     first, second = np.triu_indices(n, 1)
-    if not count or not len(first):
+    if count < FEWEST or not len(first):
         return _conclude(np.ones((n, n)), np.zeros((n, n)), np.ones(n, dtype=bool), count)
-    signs = _signs(count)
-    observed, drawn = _statistics(x, stratum, cluster, count, signs, first, second)
+    observed, drawn = _statistics(x, stratum, cluster, count, first, second)
 
     p = np.ones((n, n))
     p[first, second] = p[second, first] = _step_down(observed, drawn)
     sign = np.zeros((n, n))
     sign[first, second], sign[second, first] = np.sign(observed), -np.sign(observed)
     best = _confidence_set(n, observed, drawn, first, second)
-    return _conclude(p, sign, best, count)
+    return _conclude(np.maximum(p, smallest_p_value(count)), sign, best, count)
 
 
 @lru_cache(maxsize=8)
-def _signs(clusters: int) -> NDArray[np.float32]:
-    """(B, clusters) signs; the first row changes nothing. One sign is free, for only sizes count."""
-    if clusters <= _FEW:
-        bits = np.arange(2 ** (clusters - 1))[:, None] >> np.arange(clusters) & 1
-    else:
-        bits = np.random.default_rng(clusters).integers(0, 2, (FLIPS, clusters), dtype=np.int8)
-        bits[0] = 0
-    return np.asarray(1 - 2 * bits, dtype=np.float32)
+def _weights(clusters: int) -> NDArray[np.float32]:
+    """(B, K) how often each cluster is in each draw, divided by their number."""
+    drawn = np.random.default_rng(clusters).multinomial(clusters, np.full(clusters, 1.0 / clusters), DRAWS)
+    return np.asarray(drawn / clusters, dtype=np.float32)
+
+
+def unlucky_excess(
+    values: ArrayLike, strata: Sequence[Hashable] | None = None, clusters: Sequence[Hashable] | None = None
+) -> float:
+    """By how much a run is worse than others, once in four times as many runs as a row has.
+
+    Parameters
+    ----------
+    values : (u, n) array_like
+        Figures of n rows in u runs, which all rows have.
+    strata, clusters : sequence of u, optional
+        As for `separate`.
+
+    Returns
+    -------
+    float
+        The largest excesses of all rows are pooled: the figure of a cluster less the mean of its row, and less the
+        median of all rows, because a hard run is hard for all. The one that n / 4 of these reach.
+
+    Examples
+    --------
+    >>> unlucky_excess([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 4.0], [0.0, 0.0, 2.0, 0.0], [0.0] * 4])
+    3.0
+    """
+    x: Array = np.asarray(values, dtype=np.float64)
+    runs = len(x)
+    found = _shares(
+        x, codes([0] * runs if strata is None else strata), codes(range(runs) if clusters is None else clusters)
+    )
+    return _excess(found)
+
+
+def _excess(shares: Array) -> float:
+    """`unlucky_excess`, given the figures of the clusters (K, n)."""
+    if shares.size < 2:
+        return 0.0
+    excess = shares - shares.mean(axis=0)
+    excess -= np.median(excess, axis=1, keepdims=True)
+    reached = min(max(round(_UNLUCKY * shares.shape[1]), 1), shares.size - 1)
+    return max(float(np.sort(excess, axis=None)[-reached]), 0.0)
 
 
 def _statistics(
-    x: Array, stratum: NDArray[np.int64], cluster: NDArray[np.int64], count: int, signs: NDArray[np.float32],
-    first: NDArray[np.int64], second: NDArray[np.int64],
+    x: Array, stratum: NDArray[np.int64], cluster: NDArray[np.int64], count: int, first: NDArray[np.int64],
+    second: NDArray[np.int64],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:  # fmt: skip
-    """Signed statistics (P,) of the pairs as they are, and their sizes (P, B) in each flip.
+    """Signed statistics (P,) of the pairs as they are, and their sizes (P, B) in each draw.
 
-    Rows that have the same runs are treated together, so that the flips are one product of matrices.
+    Rows that have the same runs are treated together, so that the draws are one product of matrices.
     """
     present = np.isfinite(x)
     patterns, pattern = np.unique(present, axis=1, return_inverse=True)
     pattern = pattern.ravel()
     observed = np.zeros(len(first), dtype=np.float32)
-    sizes = np.zeros((len(first), len(signs)), dtype=np.float32)
+    sizes = np.zeros((len(first), DRAWS), dtype=np.float32)
     low, high = np.minimum(pattern[first], pattern[second]), np.maximum(pattern[first], pattern[second])
     for g, h in sorted(set(zip(low.tolist(), high.tolist(), strict=True))):
         here = np.flatnonzero((low == g) & (high == h))
         rows = np.flatnonzero((pattern == g) | (pattern == h))
         common = patterns[:, g] & patterns[:, h]
-        if not common.any():
+        shares = _shares(x[np.ix_(common, rows)], stratum[common], cluster[common])
+        if len(shares) < FEWEST:
             continue
-        shares = _shares(x[np.ix_(common, rows)], stratum[common], cluster[common], count)
         i, j = np.searchsorted(rows, first[here]), np.searchsorted(rows, second[here])
-        difference = shares[:, i] - shares[:, j]  # (K, pairs)
-        norm = np.sqrt(np.sum(difference**2, axis=0))
-        flat = norm <= _TINY * max(float(np.abs(shares).max()), 1e-300)
-        norm[flat] = np.inf
-        drawn = shares.T.astype(np.float32) @ signs.T  # (rows, B)
-        statistic = (drawn[i] - drawn[j]) * (1.0 / norm).astype(np.float32)[:, None]
-        observed[here] = statistic[:, 0]
-        sizes[here] = np.abs(statistic, out=statistic)
+        observed[here], sizes[here] = _studentised(shares[:, i] - shares[:, j], _excess(shares))
     return observed, sizes
 
 
-def _shares(x: Array, stratum: NDArray[np.int64], cluster: NDArray[np.int64], count: int) -> Array:
-    """(K, n) what each cluster contributes to the mean over the strata of each row's mean, up to a constant for all."""
+def _studentised(difference: Array, excess: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Statistics (P,) of differences (K, P) of pairs in K clusters, and their sizes (P, B) in each draw.
+
+    A pair whose scatter comes from one cluster alone says nothing of the distribution: it is not in the draws of the
+    others, and its own unlucky run is at least as bad as that cluster.
+    """
+    count = len(difference)
+    mean = difference.mean(axis=0)
+    residual = difference - mean
+    square = np.sum(residual**2, axis=0)
+    still = square <= (_TINY * max(float(np.abs(difference).max()), 1e-300)) ** 2 * count
+    with np.errstate(invalid="ignore", divide="ignore"):
+        visible = np.where(still, 0.0, square**2 / np.sum(residual**4, axis=0)) >= _FEWEST_VISIBLE
+    unlucky = np.where(visible, excess, np.maximum(excess, np.abs(residual).max(axis=0)))
+    # How far a mean is from zero, less what is not relevant; with and without the unlucky run of the better row.
+    distance = np.maximum(np.abs(mean) - np.log1p(RELEVANT), 0.0)
+    statistic = np.minimum(
+        _ratio(distance, square, count),
+        _ratio(
+            np.maximum((count * distance - unlucky) / (count + 1), 0.0),
+            square + (distance + unlucky) ** 2 * count / (count + 1),
+            count + 1,
+        ),
+    )
+    observed = np.asarray(np.sign(mean) * statistic, dtype=np.float32)
+    sizes = np.zeros((difference.shape[1], DRAWS), dtype=np.float32)
+    used = residual[:, visible].astype(np.float32)
+    weights = _weights(count)
+    means = weights @ used
+    variance = np.maximum(weights @ used**2 - means**2, _LEAST_VARIANCE * used.var(axis=0))
+    sizes[visible] = (np.abs(means) * np.sqrt((count - 1) / variance)).T
+    return observed, sizes
+
+
+def _ratio(distance: Array, square: Array, count: int) -> Array:
+    """A mean over its standard error, given the sum of squares of the residuals."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = distance * np.sqrt(count * (count - 1) / square)
+    return np.where(distance > 0.0, np.minimum(found, _CLEAR), 0.0)
+
+
+def _shares(x: Array, stratum: NDArray[np.int64], cluster: NDArray[np.int64]) -> Array:
+    """(K, n) figures of the clusters whose mean is the mean over the strata of each row's mean.
+
+    What all rows have in common is left out.
+    """
+    found, cluster = np.unique(cluster, return_inverse=True)
     runs = np.bincount(stratum)
-    weight = 1.0 / (np.count_nonzero(runs) * runs[stratum])
-    shares = np.zeros((count, x.shape[1]))
-    np.add.at(shares, cluster, weight[:, None] * (x - x.mean(axis=1, keepdims=True)))
+    weight = len(found) / (np.count_nonzero(runs) * runs[stratum])
+    shares = np.zeros((len(found), x.shape[1]))
+    if len(found):
+        np.add.at(shares, cluster.ravel(), weight[:, None] * (x - x.mean(axis=1, keepdims=True)))
     return shares
 
 
 def _reached(drawn: NDArray[np.float32], size: np.float32) -> float:
-    """Share of the flips (B,) that reach a size."""
-    return float(np.count_nonzero(drawn >= size * np.float32(1.0 - 1e-5)) / len(drawn))
+    """Share of the draws (B,), and of what was observed, that reach a size."""
+    return float((1 + np.count_nonzero(drawn >= size * np.float32(1.0 - 1e-5))) / (len(drawn) + 1))
 
 
 def _step_down(observed: NDArray[np.float32], drawn: NDArray[np.float32]) -> Array:
@@ -237,37 +324,3 @@ def _conclude(p: Array, sign: Array, best: NDArray[np.bool_], clusters: int) -> 
     better = (p <= ALPHA) & (sign < 0.0)  # lower is better
     n = len(p)
     return Separation(p, better, 1 + better.sum(axis=0), n - better.sum(axis=1), best, clusters)
-
-
-def tiers(order: Sequence[int], better: NDArray[np.bool_]) -> list[int]:
-    """Bands of rows, in order of score, that hold together what is not separated.
-
-    A tier ends before the first row that is separated from, and worse than, any row of the tier.
-
-    Parameters
-    ----------
-    order : sequence of int
-        The rows, the best score first.
-    better : (n, n) bool array
-        Significant differences, as in `Separation`.
-
-    Returns
-    -------
-    list of int
-        The tier of each row, from 1, in the order given.
-
-    Examples
-    --------
-    >>> tiers([1, 0], np.array([[False, False], [True, False]]))
-    [1, 2]
-    """
-    found: list[int] = []
-    members: list[int] = []
-    tier = 1
-    for row in order:
-        if any(better[other, row] for other in members):
-            tier += 1
-            members = []
-        members.append(row)
-        found.append(tier)
-    return found

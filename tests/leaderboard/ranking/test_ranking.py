@@ -286,8 +286,12 @@ def test_many_variants_of_a_row_cost_the_others_nothing():
     results = campaign(SIMPLE)
     rng = np.random.default_rng(1)
     own = [r for r in results if r.estimator == "fair"]
-    near = [replace(r, estimator=f"fair-{k:02d}", scores=r.scores | {"horizontal_rmse": r.scores["horizontal_rmse"] * f})
-            for k in range(30) for r in own for f in [1.0 + 0.004 * rng.normal()]]  # fmt: skip
+    near = [
+        replace(r, estimator=f"fair-{k:02d}", scores=r.scores | {"horizontal_rmse": r.scores["horizontal_rmse"] * f})
+        for k in range(30)
+        for r in own
+        for f in [1.0 + 0.004 * rng.normal()]
+    ]
     named = [replace(r, estimator=f"fair(window={k})") for k in range(30) for r in own]
     for copies in (near, named):
         found = ranked([*results, *copies]).track("sea")
