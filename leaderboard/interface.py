@@ -161,7 +161,7 @@ def bench(
     scenario: ScenarioLike | None = None,
     seed: int = 0,
     epochs: int = 120,
-    rounds: int = 15,
+    rounds: int = 21,
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[..., None] | None = None,
 ) -> CostReport:
@@ -220,7 +220,7 @@ def costs(
     scenario: ScenarioLike | None = None,
     seed: int = 0,
     epochs: int = 120,
-    rounds: int = 15,
+    rounds: int = 21,
     parameters: Mapping[str, Any] | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[..., None] | None = None,

@@ -31,7 +31,7 @@ def command(
     epochs: Annotated[int, typer.Option(min=2, help="Epochs that are run.")] = 120,
     rounds: Annotated[
         int, typer.Option(min=1, help="Runs; the smallest time of an epoch counts, and the median of the multiples.")
-    ] = 15,
+    ] = 21,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File for the multiples, as boards read it; with --all.")
     ] = None,

@@ -50,7 +50,7 @@ def multiples_of(
     seas: Sequence[tuple[str, Recording]],
     *,
     epochs: int = 120,
-    rounds: int = 15,
+    rounds: int = 21,
     progress: Callable[..., None] | None = None,
 ) -> tuple[list[CostMultiple], list[Unmeasured]]:
     """Measure the multiples of estimators.

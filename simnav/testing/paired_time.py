@@ -3,8 +3,9 @@
 An absolute time says as much about the machine, and about what else runs on it, as about the estimator. So two
 estimators run over the same epochs of one recording in turns of a few milliseconds. Other work slows both alike, and
 the ratio of their times hardly changes. The processor time is that of the process, with all its threads; waiting does
-not count. Each round gives one ratio. The multiple is the median of the rounds, so that a disturbance of some rounds
-does not move it; the quartiles say how much the rounds differ.
+not count. Each turn is run in many rounds, and the median of its ratios counts, so that disturbances, which hit some of
+the rounds, do not move it. The multiple is the mean of these medians over the turns, weighted by the time of the plain
+estimator; so a turn in which both have much to do counts for more. Its 95 % interval is a bootstrap over the rounds.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ import numpy as np
 from simnav.estimator import Estimator
 from simnav.recording import Recording
 from simnav.testing.cost import TURN, Factory, started
-from simnav.types import Measurements
+from simnav.types import Array, Measurements
 
 __all__ = ["Multiple", "multiple"]
 
 #: Rounds are repeated no more after this processor time [s], if there are at least `FEWEST`.
 BUDGET = 3.0
 FEWEST = 5
+#: Resamples of the bootstrap.
+RESAMPLES = 1000
 #: Share of the epochs that are run before those that are timed: a window is filled, and libraries are loaded.
 SETTLING = 1.0 / 3.0
 
@@ -40,9 +43,9 @@ class Multiple:
     Attributes
     ----------
     value : float
-        Median of the rounds.
+        The multiple.
     low, high : float
-        Quartiles of the rounds.
+        95 % interval over the rounds.
     rounds : int
         Number of rounds.
     """
@@ -59,7 +62,7 @@ def multiple(
     recording: Recording,
     *,
     epochs: int = 120,
-    rounds: int = 15,
+    rounds: int = 21,
     smooth: bool = False,
     clock: Callable[[], float] = process_time,
 ) -> Multiple:
@@ -106,51 +109,63 @@ def multiple(
     turns = math.ceil(len(steps) / TURN)
     timed_from = 0 if smooth else TURN * int(SETTLING * turns)
     packets = pickle.dumps(steps)  # each round has its own: an estimator may write into them
-    ratios: list[float] = []
-    spent = 0.0
+    times: list[Array] = []
     for k in range(rounds + 1):
-        mine, theirs = _round((estimator, plain), recording, packets, timed_from, smooth, clock, turned=bool(k % 2))
-        if k == 0:
-            continue
-        spent += mine + theirs
-        ratios.append(mine / max(theirs, 1e-9))
-        if spent > BUDGET and len(ratios) >= FEWEST:
+        taken = _round((estimator, plain), recording, packets, timed_from, smooth, clock, turned=bool(k % 2))
+        if k > 0:
+            times.append(taken)
+        if len(times) >= FEWEST and sum(float(t.sum()) for t in times) > BUDGET:
             break
-    low, value, high = np.percentile(ratios, [25.0, 50.0, 75.0]).tolist()
-    return Multiple(value, low, high, len(ratios))
+    return _estimate(np.stack(times))
+
+
+def _estimate(times: Array) -> Multiple:
+    """The multiple from times [s] of shape (rounds, turns, 2), of which the last is the plain estimator's."""
+    mine, theirs = times[..., 0], np.maximum(times[..., 1], 1e-9)
+    ratios = mine / theirs
+    weights = np.median(theirs, axis=0)
+    rounds = len(ratios)
+    drawn = np.random.default_rng(0).integers(rounds, size=(RESAMPLES, rounds))
+    value = float(np.average(np.median(ratios, axis=0), weights=weights))
+    means = np.average(np.median(ratios[drawn], axis=1), weights=weights, axis=1)
+    low, high = np.percentile(means, [2.5, 97.5]).tolist()
+    return Multiple(value, min(low, value), max(high, value), rounds)
 
 
 def _round(
     pair: tuple[Factory, Factory], recording: Recording, packets: bytes, timed_from: int, smooth: bool,
     clock: Callable[[], float], *, turned: bool,
-) -> tuple[float, float]:  # fmt: skip
-    """Run both once over the steps in turns; the processor time [s] of each.
+) -> Array:  # fmt: skip
+    """Run both once over the steps in turns; the processor times [s], shape (turns, 2). The smoothers are one turn.
 
     ``turned``: the second begins. Who begins changes from turn to turn, because the caches hold the data of the other.
     """
     running: list[tuple[Estimator, list[Measurements]]] = [
         (started(factory(), recording), pickle.loads(packets)) for factory in pair
     ]
-    seconds = [0.0, 0.0]
+    seconds: list[list[float]] = []
     collects = gc.isenabled()
     gc.disable()  # a collection would charge one of them with the objects of both
     try:
         for number, first in enumerate(range(0, len(running[0][1]), TURN)):
+            spent = [0.0, 0.0]
             for i in (1, 0) if turned ^ bool(number % 2) else (0, 1):
                 estimator, own = running[i]
                 turn = own[first : first + TURN]
                 before = clock()
                 for packet in turn:
                     estimator.update(packet)
-                spent = clock() - before
-                if first >= timed_from:
-                    seconds[i] += spent
+                spent[i] = clock() - before
+            if first >= timed_from:
+                seconds.append(spent)
         if smooth:
+            spent = [0.0, 0.0]
             for i in (1, 0) if turned else (0, 1):
                 before = clock()
                 running[i][0].smooth()
-                seconds[i] += clock() - before
+                spent[i] = clock() - before
+            seconds.append(spent)
     finally:
         if collects:
             gc.enable()
-    return seconds[0], seconds[1]
+    return np.array(seconds)
