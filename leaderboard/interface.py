@@ -258,17 +258,19 @@ def costs(
     from simnav.estimator import find, names
     from simnav.leaderboard.campaign.request import comes_with_simnav
     from simnav.leaderboard.ranking.stored_costs import save
+    from simnav.leaderboard.results.provenance import here
 
     if estimators is None:
         estimators = [name for name in names() if comes_with_simnav(find(name))]
     if output is not None and not absolute(output).parent.is_dir():
         raise RequestError(f"output = {os.fspath(output)!r}: there is no folder {absolute(output).parent}")
     counts = whole("epochs", epochs), whole("rounds", rounds, 1)
+    measured = here()  # before, for the code may be edited meanwhile
     found, _ = _multiples(requests(estimators, parameters), scenario, seed, *counts, progress)
     if output is None:
         return found
     with mistakes(OSError):
-        return replace(found, file=str(save(found.rows, absolute(output))))
+        return replace(found, file=str(save(found.rows, absolute(output), measured)))
 
 
 def _multiples(

@@ -36,7 +36,7 @@ class MultipleReport:
     Attributes
     ----------
     rows : tuple of CostMultiple
-        The multiples, with their quartiles over the rounds. An estimator may have several: beside ``ekf``, beside
+        The multiples, with their 95 % intervals over the rounds. An estimator may have several: beside ``ekf``, beside
         ``ship-ekf``, and one that smooths also beside their smoothers.
     unmeasured : tuple of Unmeasured
         The estimators without a multiple, and why.
@@ -144,8 +144,8 @@ def multiple_table(report: MultipleReport) -> Table:
          m.scenario]
         for m in report.rows
     ]  # fmt: skip
-    heads = ["estimator", "plain row", "processor time ×", "quartiles", "rounds", "scenario"]
+    heads = ["estimator", "plain row", "processor time ×", "95 % interval", "rounds", "scenario"]
     return tables.table(
         "Processor time as a multiple of that of the plain row", heads, rows, numeric=("processor time ×", "rounds"),
-        caption="Median and quartiles of the rounds. Beside a smoother: the time of all epochs and of smooth().",
+        caption="95 % interval: over the rounds. Beside a smoother: the time of all epochs and of smooth().",
     )  # fmt: skip

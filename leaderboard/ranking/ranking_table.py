@@ -125,8 +125,8 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
         if r.why and r.standing != "unsuitable"
     ]
     explained = (
-        f"{cost_title.capitalize()}: processor time over that of {track.plain or 'the plain row'}, with quartiles, "
-        "measured in turns and not in these runs."
+        f"{cost_title.capitalize()}: processor time over that of {track.plain or 'the plain row'}, with the 95 % "
+        "interval over rounds, measured in turns and not in these runs."
     )
     missing = not_measured(r.estimator for r in track.rows if r.runs and costs[r.estimator] is None)
     scenarios = f"{len(track.scenarios)} scenario{'s' if len(track.scenarios) != 1 else ''}"

@@ -43,7 +43,7 @@ class CostMultiple:
     scenario : str
         Versioned id of the scenario that both ran.
     value, low, high : float
-        Median and quartiles of the rounds.
+        The multiple, with its 95 % interval over the rounds.
     rounds : int
         Number of rounds.
     """
@@ -78,8 +78,17 @@ class Costs:
         return next((mine[p] for p in plains if p in mine), None)
 
 
-def save(rows: Iterable[CostMultiple], path: Path) -> Path:
-    """Write multiples that this machine measured today; an older file is replaced.
+def save(rows: Iterable[CostMultiple], path: Path, measured: Provenance | None = None) -> Path:
+    """Write multiples; an older file is replaced.
+
+    Parameters
+    ----------
+    rows : iterable of CostMultiple
+        The multiples.
+    path : Path
+        The file.
+    measured : Provenance, optional
+        Machine, versions and day of the measurement; default: those of now.
 
     Raises
     ------
@@ -90,7 +99,7 @@ def save(rows: Iterable[CostMultiple], path: Path) -> Path:
     for row in rows:
         values = {k: float(f"{v:.{_DIGITS}g}") if isinstance(v, float) else v for k, v in asdict(row).items()}
         lines.append("  " + json.dumps(values))
-    known = {k: v for k, v in here().to_dict().items() if v not in ("", None) and k != "id"}
+    known = {k: v for k, v in (measured or here()).to_dict().items() if v not in ("", None) and k != "id"}
     head = json.dumps({"format": FORMAT, "measured": known}, indent=1)
     return write_whole(path, head[: head.rindex("}")].rstrip() + ',\n "rows": [\n' + ",\n".join(lines) + "\n ]\n}\n")
 

@@ -292,7 +292,7 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
     plain : str
         The row that processor times are multiples of.
     data : mapping
-        ``rows``: columns ``row``, ``cost`` (multiple), ``low``, ``high`` (its quartiles), ``error``, ``family``,
+        ``rows``: columns ``row``, ``cost`` (multiple), ``low``, ``high`` (its 95 % interval), ``error``, ``family``,
         ``front`` (bool).
     missing : str
         A sentence on the rows whose cost was not measured, for the caption.
@@ -331,8 +331,8 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
                     row="Estimator",
                     family="Family",
                     cost=cost,
-                    low="lower quartile",
-                    high="upper quartile",
+                    low="95 % interval, from",
+                    high="to",
                     error=y_title,
                 ),
             },
@@ -341,7 +341,7 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
     ]
     caption = (
         "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more "
-        "accurate and quicker. Lines: quartiles of the processor time, which is a multiple of that of "
+        "accurate and quicker. Lines: 95 % interval of the processor time, which is a multiple of that of "
         f"{plain}, measured in turns with it.{' ' * bool(missing)}{missing} {_ZOOM_HELP}"
     )
     return Chart(name, "Accuracy against cost", caption, {"height": 340, "layer": layers}, data)

@@ -106,8 +106,8 @@ _AFTER = (
     ),
     Column(
         "cost_spread",
-        "Cost × plain row, quartiles",
-        "Half of the rounds are within.",
+        "Cost × plain row, 95 %",
+        "Interval over the rounds in which it was measured.",
         "interval",
         wide=True,
         hidden=True,
@@ -211,7 +211,7 @@ def _cost(label: str, cost: CostMultiple | None) -> dict[str, Any]:
     return {
         "cost": {
             "value": short(cost.value),
-            "help": f"Median of {measured}; quartiles {cost.low:.3g} to {cost.high:.3g}",
+            "help": f"{measured}; 95 % interval {cost.low:.3g} to {cost.high:.3g}",
         },
         "cost_spread": _ends(cost.low, cost.high),
     }

@@ -11,7 +11,6 @@ from simnav.leaderboard.site.library import VEGA_LITE
 from simnav.leaderboard.site.print_figures import filled
 
 FONT = 11
-SPREAD = {"low": [1.0, 1.0], "high": [2.4, 2.4]}  # of the multiples
 
 
 def names_of(chart: charts.Chart, width: int) -> dict[str, tuple[str, float, float]]:
@@ -31,7 +30,10 @@ def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
         "cost",
         "Score",
         "ekf",
-        {"rows": front | SPREAD | {"cost": [1.5, 2.3], "error": [12.4, 9.7], "family": ["a", "b"]}},
+        {
+            "rows": front
+            | {"low": [1.4, 2.2], "high": [1.6, 2.4], "cost": [1.5, 2.3], "error": [12.4, 9.7], "family": ["a", "b"]}
+        },
     )
     detection = charts.detection("detection", {"rows": front | {"false": [1.0, 9.0], "found": [50.0, 90.0]}})
     for chart in (cost, detection):
@@ -46,6 +48,9 @@ def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
 def test_a_long_name_in_the_middle_is_not_cut() -> None:
     front = {"row": ["first-row", "last-" + "x" * 40], "front": [True, True], "family": ["a", "b"]}
     chart = charts.accuracy_and_cost(
-        "cost", "Score", "ekf", {"rows": front | SPREAD | {"cost": [1.0, 1.01], "error": [3.0, 2.0]}}
+        "cost",
+        "Score",
+        "ekf",
+        {"rows": front | {"low": [0.99, 1.0], "high": [1.01, 1.02], "cost": [1.0, 1.01], "error": [3.0, 2.0]}},
     )
     assert names_of(chart, 620)["last-" + "x" * 40][0] == "end"
