@@ -55,7 +55,7 @@ def test_the_table_that_comes_with_simnav_has_all_its_rows():
     assert {r.estimator for r in costs.rows} == mine
     assert costs.measured.date
     assert costs.measured.cpu
-    ship = record(load("fishing-vessel").model_copy(update={"duration": 20.0}))
+    ship = record(load("fishing-vessel").model_copy(update={"duration": 20.0}), 0)
     for name in mine:
         with_imu, without = (costs.find(name, [plain]) for plain in ("ekf", "ship-ekf"))
         assert with_imu is not None

@@ -32,7 +32,7 @@ def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
         "ekf",
         {
             "rows": front
-            | {"low": [1.4, 2.2], "high": [1.6, 2.4], "cost": [1.5, 2.3], "error": [12.4, 9.7], "family": ["a", "b"]}
+            | {"low": [1.5, 2.3], "high": [1.5, 2.3], "cost": [1.5, 2.3], "error": [12.4, 9.7], "family": ["a", "b"]}
         },
     )
     detection = charts.detection("detection", {"rows": front | {"false": [1.0, 9.0], "found": [50.0, 90.0]}})
