@@ -195,6 +195,7 @@ OF_THE_RESULT = {
     "run": {"plot", "stanford", "alert_limit"},
     "simulate": {"output", "csv"},
     "sweep": {"plot", "workers", "time_limit", "memory_limit"},  # limits are **options of the call
+    "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
     "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
     "cite": {"text"},
