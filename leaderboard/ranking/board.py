@@ -181,7 +181,8 @@ class Row:
     clean, faulty : Consistency
         Before the first fault of a run, and from then on.
     update_median : float
-        Median time per epoch [s].
+        Median wall-clock time per epoch of the runs [s]. What an estimator costs is measured apart from them
+        (`simnav.leaderboard.ranking.stored_costs`).
     peak_memory : int
         Largest of all runs [bytes].
     """
@@ -419,17 +420,30 @@ class Ranking:
         return next((s for s in self.scenarios if s.scenario == identity), None) or _missing("scenario", identity)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain dicts and lists for JSON; numbers that are not finite become None."""
+        """Plain dicts and lists for JSON; numbers that are not finite become None. Each row has its stored cost."""
+        from simnav.leaderboard.ranking.stored_costs import cost_of
+
         found: dict[str, Any] = plain(vars(self))
+        for board in (*found["tracks"], *found["scenarios"]):
+            for row in board["rows"]:
+                row["cost"] = plain(cost_of(row["estimator"], board["plain"], board["score"]))
         return found
 
     def to_frame(self) -> Any:
         """A row an estimator and track, with its ratios; see `simnav.leaderboard.results.frame.frame`."""
+        from simnav.leaderboard.ranking.stored_costs import cost_of
+
         scenarios = [s.scenario for s in self.scenarios]
+        costs = {(t.track, r.estimator): cost_of(r.estimator, t.plain, t.score) for t in self.tracks for r in t.rows}
         return frame([
             {"track": t.track}
             | {k: v for k, v in vars(row).items() if k != "gain" and not isinstance(v, (Mapping, tuple, Consistency))}
             | {f"gain_{k}": getattr(row.gain, k, math.nan) for k in _GAIN}
+            | {"cost_plain": getattr(costs[t.track, row.estimator], "plain", "")}
+            | {
+                f"cost_{k}".removesuffix("_value"): getattr(costs[t.track, row.estimator], k, math.nan)
+                for k in ("value", "low", "high")
+            }
             | {f"{part}_{k}": v for part in ("clean", "faulty") for k, v in vars(getattr(row, part)).items()}
             | {s: row.ratios.get(s, math.nan) for s in scenarios}
             for t in self.tracks

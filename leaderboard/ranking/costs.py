@@ -1,4 +1,4 @@
-"""What an epoch of several estimators costs, on one scenario: time and memory side by side."""
+"""What an epoch of estimators costs: time and memory of several on one scenario, and multiples of the plain row."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.panels import Bar, bars
 from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.cost_measurement import Unmeasured
+from simnav.leaderboard.ranking.stored_costs import CostMultiple
 from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.results.frame import frame
 from simnav.testing.cost import Cost, measure
@@ -21,10 +23,38 @@ if TYPE_CHECKING:
 
     from simnav.recording import Recording
 
-__all__ = ["BESIDE", "CostReport", "cost_table", "costs_of"]
+__all__ = ["BESIDE", "CostReport", "MultipleReport", "cost_table", "costs_of", "multiple_table"]
 
 #: The rows that an estimator is measured beside, if no others are asked for: one of each family.
 BESIDE = ("dead-reckoning", "gnss-only", "ship-ekf", "ekf", "ukf", "sw-fgo", "ekf-rts")
+
+
+@dataclass(frozen=True)
+class MultipleReport:
+    """Processor times as multiples of those of the plain row.
+
+    Attributes
+    ----------
+    rows : tuple of CostMultiple
+        The multiples, with their 95 % intervals over the rounds. An estimator may have several: beside ``ekf``, beside
+        ``ship-ekf``, and one that smooths also beside their smoothers.
+    unmeasured : tuple of Unmeasured
+        The estimators without a multiple, and why.
+    file : str
+        File that they were written to; empty if they were not.
+    """
+
+    rows: tuple[CostMultiple, ...]
+    unmeasured: tuple[Unmeasured, ...]
+    file: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav bench --all --json`` prints."""
+        return asdict(self)
+
+    def to_frame(self) -> Any:
+        """A row a multiple; see `simnav.leaderboard.results.frame.frame`."""
+        return frame([asdict(row) for row in self.rows])
 
 
 @dataclass(frozen=True)
@@ -43,6 +73,8 @@ class CostReport:
         Labels of those in question; the other rows are what they are measured beside.
     costs : tuple of simnav.testing.Cost
         One for each estimator: those in question first.
+    multiples : MultipleReport
+        Those in question, as multiples of the plain row.
     """
 
     scenario: str
@@ -51,6 +83,7 @@ class CostReport:
     rounds: int
     estimators: tuple[str, ...]
     costs: tuple[Cost, ...]
+    multiples: MultipleReport
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav bench --json`` prints."""
@@ -73,7 +106,7 @@ class CostReport:
 
 def costs_of(
     mine: Sequence[EstimatorRequest], beside: Sequence[EstimatorRequest], scenario: str, recording: Recording,
-    epochs: int, rounds: int, progress: Callable[..., None] | None = None,
+    epochs: int, rounds: int, multiples: MultipleReport, progress: Callable[..., None] | None = None,
 ) -> CostReport:  # fmt: skip
     """Measure the costs; see `simnav.leaderboard.interface.bench`."""
     everyone = {r.label: r.make for r in [*mine, *beside]}
@@ -81,7 +114,7 @@ def costs_of(
         costs = measure(everyone, recording, epochs=epochs, rounds=rounds, progress=progress)
         run = min(epochs, sum(1 for _ in recording.steps()))
     labels = tuple(r.label for r in mine)
-    return CostReport(scenario, recording.seed, run, rounds, labels, tuple(costs))
+    return CostReport(scenario, recording.seed, run, rounds, labels, tuple(costs), multiples)
 
 
 def cost_table(report: CostReport) -> Table:
@@ -102,3 +135,17 @@ def cost_table(report: CostReport) -> Table:
     return tables.table(
         title, heads, rows, strong=[i for i, c in enumerate(report.costs) if c.estimator in report.estimators]
     )
+
+
+def multiple_table(report: MultipleReport) -> Table:
+    """The multiples for people."""
+    rows = [
+        [m.estimator, m.plain, tables.number(m.value), f"{tables.number(m.low)} – {tables.number(m.high)}", m.rounds,
+         m.scenario]
+        for m in report.rows
+    ]  # fmt: skip
+    heads = ["estimator", "plain row", "processor time ×", "95 % interval", "rounds", "scenario"]
+    return tables.table(
+        "Processor time as a multiple of that of the plain row", heads, rows, numeric=("processor time ×", "rounds"),
+        caption="95 % interval: over the rounds. Beside a smoother: the time of all epochs and of smooth().",
+    )  # fmt: skip

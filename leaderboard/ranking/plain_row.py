@@ -10,7 +10,7 @@ from collections.abc import Container, Mapping
 
 from simnav.leaderboard.ranking.tracks import SMOOTHED
 
-__all__ = ["PLAIN", "plain_row"]
+__all__ = ["PLAIN", "plain_row", "plain_rows"]
 
 _REAL_TIME = ("ekf", "ship-ekf")
 
@@ -27,3 +27,8 @@ def plain_row(score: str, there: Container[str]) -> str:
     'ship-ekf'
     """
     return next((name for name in PLAIN.get(score, _REAL_TIME) if name in there), "")
+
+
+def plain_rows(score: str) -> tuple[str, ...]:
+    """The plain rows for a score, whether they are there or not, the one for vessels with an IMU first."""
+    return PLAIN.get(score, _REAL_TIME)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.statistics import FAILURE
+from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, cost_of, not_measured
 from simnav.leaderboard.ranking.summary import sentence
 from simnav.scoring import SCORES
 
@@ -85,7 +86,9 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
     """The table of a track for the terminal; the columns of least value go first where it is narrow."""
     title = score_title(track)
     cells = []
+    costs = {r.estimator: cost_of(r.estimator, track.plain, track.score) for r in track.rows}
     for r in track.rows:
+        cost = costs[r.estimator]
         name = r.estimator + (" *" if r.reference else "")
         failed = f"{r.failed} of {r.runs}" if r.runs else ""
         cells.append([
@@ -93,17 +96,19 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
             between(r.scenarios_low, r.scenarios_high, ratio), gain_cell(r), _won(r), tables.percent(_worse(r)),
             tables.percent(r.far), ratio(r.p95), ratio(r.worst), failed, f"{r.covered} of {r.scenarios}",
             consistency(r.clean), consistency(r.faulty), tables.percent(r.clean.coverage),
-            tables.percent(r.clean.worst_coverage), tables.duration(r.update_median),
-            tables.size(r.peak_memory or None),
+            tables.percent(r.clean.worst_coverage),
+            NOT_MEASURED if cost is None else tables.interval(cost.value, cost.low, cost.high),
+            tables.duration(r.update_median), tables.size(r.peak_memory or None),
         ])  # fmt: skip
     gained = f"× {track.plain}" if track.plain else "× plain row"
+    cost_title = f"cost × {track.plain}" if track.plain else "cost × plain row"
     columns = ["rank", "estimator", title, "95 % interval", "over scenarios", gained, "scenarios won", "above 1.5 ×",
                "above 10 ×", "95th perc.", "worst run", "failed", "scenarios", "NEES, no fault", "NEES, faults",
-               "95 % coverage, no fault", "worst coverage, no fault", "per epoch", "memory"]  # fmt: skip
+               "95 % coverage, no fault", "worst coverage, no fault", cost_title, "wall clock", "memory"]  # fmt: skip
     value = ["estimator", title, "rank", "95 % interval", gained, "failed", "scenarios won", "above 1.5 ×",
-             "over scenarios", "above 10 ×", "per epoch", "NEES, no fault", "scenarios", "NEES, faults", "worst run",
-             "95th perc.", "95 % coverage, no fault", "memory", "worst coverage, no fault"]  # fmt: skip
-    texts = ("estimator", "95 % interval", "over scenarios", gained, "NEES, no fault", "NEES, faults")
+             "over scenarios", "above 10 ×", cost_title, "NEES, no fault", "scenarios", "NEES, faults", "worst run",
+             "95th perc.", "95 % coverage, no fault", "memory", "worst coverage, no fault", "wall clock"]  # fmt: skip
+    texts = ("estimator", "95 % interval", "over scenarios", gained, "NEES, no fault", "NEES, faults", cost_title)
     numeric = [c for c in columns if c not in texts]
     notes = [sentence(track), score_caption(track), *track.remarks]
     best = [r.estimator for r in track.rows if r.may_be_best]
@@ -119,6 +124,11 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
         for r in track.rows
         if r.why and r.standing != "unsuitable"
     ]
+    explained = (
+        f"{cost_title.capitalize()}: processor time over that of {track.plain or 'the plain row'}, with the 95 % "
+        "interval over rounds, measured in turns and not in these runs."
+    )
+    missing = not_measured(r.estimator for r in track.rows if r.runs and costs[r.estimator] is None)
     scenarios = f"{len(track.scenarios)} scenario{'s' if len(track.scenarios) != 1 else ''}"
     units = f"{track.units} {track.unit}{'s' if track.units != 1 else ''}"
     return tables.Fitted(
@@ -137,6 +147,8 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
             "interval over seeds.",
             "scenarios won": "Scenarios won: those with a smaller error than the plain row's.",
             "above 1.5 ×": "Above 1.5 ×: share of runs with more than 1.5 times the error of the plain row.",
+            cost_title: f"{explained} {missing}".rstrip(),
+            "wall clock": "Wall clock: median time of an epoch in these runs, whatever else the machine did.",
             "above 10 ×": "Above 10 ×: share of runs with more than ten times the error of the oracle.",
         },
     )

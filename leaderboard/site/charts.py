@@ -282,15 +282,23 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
     )
 
 
-def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart:
-    """Error against time per epoch, with the rows that no other row beats in both.
+def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, Any], missing: str = "") -> Chart:
+    """Error against processor time, with the rows that no other row beats in both.
 
     Parameters
     ----------
+    name, y_title : str
+        Name of the chart; title of the axis of errors.
+    plain : str
+        The row that processor times are multiples of.
     data : mapping
-        ``rows``: columns ``row``, ``cost`` [ms], ``error``, ``family``, ``front`` (bool).
+        ``rows``: columns ``row``, ``cost`` (multiple), ``low``, ``high`` (its 95 % interval), ``error``, ``family``,
+        ``front`` (bool).
+    missing : str
+        A sentence on the rows whose cost was not measured, for the caption.
     """
-    x = _roomy(_axis("cost", "Time per epoch [ms]", log=True))
+    cost = f"Processor time (× {plain})"
+    x = _roomy(_axis("cost", cost, log=True))
     y = _roomy(_axis("error", y_title, log=True), _NAME_ROOM)
     rows = {"data": {"name": "rows"}}
     layers: list[Spec] = [
@@ -302,6 +310,16 @@ def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart
         },
         {
             **rows,
+            "mark": {"type": "rule", "clip": True, "opacity": 0.55},
+            "encoding": {
+                "x": {**x, "field": "low"},
+                "x2": {"field": "high"},
+                "y": y,
+                "color": _front_colour(),
+            },
+        },
+        {
+            **rows,
             "params": [_ZOOM],
             "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
             "encoding": {
@@ -309,14 +327,22 @@ def accuracy_and_cost(name: str, y_title: str, data: Mapping[str, Any]) -> Chart
                 "y": y,
                 "color": _front_colour(),
                 "opacity": {"condition": {"test": "datum.front", "value": 1}, "value": 0.55},
-                "tooltip": _tip(row="Estimator", family="Family", cost="Time per epoch [ms]", error=y_title),
+                "tooltip": _tip(
+                    row="Estimator",
+                    family="Family",
+                    cost=cost,
+                    low="95 % interval, from",
+                    high="to",
+                    error=y_title,
+                ),
             },
         },
         rows | _front_names({"x": x, "y": y}),
     ]
     caption = (
         "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more "
-        f"accurate and quicker. {_ZOOM_HELP}"
+        "accurate and quicker. Lines: 95 % interval of the processor time, which is a multiple of that of "
+        f"{plain}, measured in turns with it.{' ' * bool(missing)}{missing} {_ZOOM_HELP}"
     )
     return Chart(name, "Accuracy against cost", caption, {"height": 340, "layer": layers}, data)
 

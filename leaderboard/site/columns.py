@@ -115,7 +115,13 @@ SCORES_SHOWN = (
         "Smoothed RMSE [m]",
         "Horizontal RMSE of the smoothed trajectory, which knows all measurements of the run.",
     ),
-    Column("update_median", "Time per epoch", "Median wall-clock time of one epoch.", "duration"),
+    Column(
+        "update_median",
+        "Wall clock per epoch",
+        "Median wall-clock time of one epoch in these runs. It depends on what else the machine did.",
+        "duration",
+        hidden=True,
+    ),
 )
 
 #: Terms of the pages, besides the columns.
@@ -147,7 +153,7 @@ _GLOSSARY: tuple[tuple[str, str], ...] = (
         "A run with an exception, an invalid output, a timeout, too much memory or divergence. It counts as the worst.",
     ),
     ("Cramer-Rao bound", "A lower limit of the error that no estimator with the same model can beat on average."),
-    ("Pareto front", "The estimators that no other estimator beats in both accuracy and time."),
+    ("Pareto front", "The estimators that no other estimator beats in both accuracy and processor time."),
     ("p-value", "How often a difference at least as large would be seen if the two rows did not differ."),
 )
 

@@ -10,6 +10,7 @@ from urllib.parse import quote
 import numpy as np
 
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, cost_of
 from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background
@@ -42,19 +43,27 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
     """Rank and score in each track, and cost."""
     found = []
     costs = []
+    multiples = {}
     for track in ranking.tracks:
         for row in track.rows:
             if row.estimator != label or not row.runs:
                 continue
             costs.append(row.update_median)
+            cost = cost_of(label, track.plain, track.score)
+            if cost is not None:
+                multiples[cost.plain] = cost
             place: str = row.standing
             if row.ranked:
                 place = f"rank {row.ranks.replace('-', '–')}" if row.ranks else "not enough data for a rank"
                 place += ", provisional" if row.provisional else ""
             found.append(Fact(f"{track.title}: {place}", tables.number(row.score)))
+    for plain_row, cost in multiples.items():
+        found.append(Fact(f"Processor time × {plain_row}", tables.interval(cost.value, cost.low, cost.high)))
+    if costs and not multiples:
+        found.append(Fact("Processor time", NOT_MEASURED))
     known = [c for c in costs if c > 0.0]
     if known:
-        found.append(Fact("Time per epoch", tables.duration(sum(known) / len(known))))
+        found.append(Fact("Wall clock per epoch", tables.duration(sum(known) / len(known))))
     return found
 
 

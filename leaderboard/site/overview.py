@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.ranking_table import score_caption, score_title
+from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, cost_of, not_measured
 from simnav.leaderboard.site.charts import accuracy_and_cost, columns, detection, spread, spread_data
 from simnav.leaderboard.site.columns import Column, plain
 from simnav.leaderboard.site.rounding import short
@@ -97,7 +98,27 @@ _AFTER = (
     Column("p95", "95 % of runs", "Ratio to the reference that 95 % of the runs do not exceed.", "ratio", hidden=True),
     Column("worst", "Worst run", "Largest ratio to the reference of a run.", "ratio", hidden=True),
     Column("p", "p-value", "Adjusted for all pairs of rows, against the row with the best score.", "p", hidden=True),
-    Column("cost", "Time per epoch", "Median wall-clock time of one epoch.", "duration"),
+    Column(
+        "cost",
+        "Cost × plain row",
+        "Processor time of the epochs over that of the plain row, measured in turns with it (simnav bench), not in the "
+        "runs of the board. In post-processing the time of the smoother is included.",
+    ),
+    Column(
+        "cost_spread",
+        "Cost × plain row, 95 %",
+        "Interval over the rounds in which it was measured.",
+        "interval",
+        wide=True,
+        hidden=True,
+    ),
+    Column(
+        "wall",
+        "Wall clock per epoch",
+        "Median wall-clock time of one epoch in the runs of the board. It depends on what else the machine did.",
+        "duration",
+        hidden=True,
+    ),
     Column("memory", "Memory", "Largest memory of all runs.", "size", hidden=True),
 )
 
@@ -132,12 +153,17 @@ def board_columns(
 
 
 def board_row(
-    row: Row, entry: EstimatorEntry, same: Sequence[str] = (), *, provisional: bool = False
+    row: Row,
+    entry: EstimatorEntry,
+    cost: CostMultiple | None,
+    same: Sequence[str] = (),
+    *,
+    provisional: bool = False,
 ) -> dict[str, Any]:
     """What all boards show of a row.
 
-    ``same`` are the references that have the same result; ``provisional`` says that all of the board is, so that a row
-    need not say it.
+    ``cost`` is what was measured of it; ``same`` are the references that have the same result; ``provisional`` says
+    that all of the board is, so that a row need not say it.
     """
     notes: list[str] = [] if row.ranked else [row.standing]
     if row.ranked and row.provisional and not provisional:
@@ -163,7 +189,8 @@ def board_row(
         "p95": short(row.p95),
         "worst": short(row.worst),
         "p": short(row.p_value),
-        "cost": short(row.update_median),
+        **_cost(row.estimator, cost),
+        "wall": short(row.update_median),
         "memory": row.peak_memory or None,
         "reference": row.reference,
         "mark": row.standing if not row.ranked else "",
@@ -173,6 +200,21 @@ def board_row(
 
 def _ends(low: float, high: float) -> dict[str, Any]:
     return {"value": None, "low": short(low), "high": short(high)}
+
+
+def _cost(label: str, cost: CostMultiple | None) -> dict[str, Any]:
+    """What a board shows of the cost of a row."""
+    if cost is None:
+        said = {"value": None, "text": NOT_MEASURED, "sort": None, "help": not_measured([label])}
+        return {"cost": said, "cost_spread": None}
+    measured = f"{cost.rounds} rounds beside {cost.plain} on {cost.scenario}"
+    return {
+        "cost": {
+            "value": short(cost.value),
+            "help": f"{measured}; 95 % interval {cost.low:.3g} to {cost.high:.3g}",
+        },
+        "cost_spread": _ends(cost.low, cost.high),
+    }
 
 
 def _gain(row: Row) -> dict[str, Any]:
@@ -225,7 +267,9 @@ def _track(
     ]
     every = all(r.provisional for r in track.rows if r.ranked)
     rows = [
-        board_row(row, estimators[row.estimator], others, provisional=every)
+        board_row(
+            row, estimators[row.estimator], cost_of(row.estimator, track.plain, track.score), others, provisional=every
+        )
         | {f"s:{s}": {"value": short(v), "page": scenarios[s].page} for s, v in row.ratios.items()}
         for row, others in _once(track.rows)
     ]
@@ -282,20 +326,24 @@ def _charts(
     estimators: Mapping[str, EstimatorEntry],
     runs: Mapping[str, Mapping[str, Runs]],
 ) -> list[Any]:
-    costed = [r for r in rows if r.update_median > 0.0 and r.score > 0.0]
+    measured = {r.estimator: cost_of(r.estimator, track.plain, track.score) for r in rows if r.score > 0.0}
+    costed = [(r, cost) for r in rows if (cost := measured.get(r.estimator)) is not None]
     made = []
     if len(costed) > 1:
-        front = _front([(r.update_median, r.score) for r in costed])
         data = {
             "rows": {
-                "row": [r.estimator for r in costed],
-                "cost": [short(1e3 * r.update_median) for r in costed],
-                "error": [short(r.score) for r in costed],
-                "family": [estimators[r.estimator].facts.family for r in costed],
-                "front": front,
+                "row": [r.estimator for r, _ in costed],
+                "cost": [short(c.value) for _, c in costed],
+                "low": [short(c.low) for _, c in costed],
+                "high": [short(c.high) for _, c in costed],
+                "error": [short(r.score) for r, _ in costed],
+                "family": [estimators[r.estimator].facts.family for r, _ in costed],
+                "front": _front([(c.value, r.score) for r, c in costed]),
             }
         }
-        made.append(accuracy_and_cost(f"{track.track}-cost", f"Score ({title})", data))
+        plain_name = " or ".join(dict.fromkeys(c.plain for _, c in costed))
+        missing = not_measured(name for name, cost in measured.items() if cost is None)
+        made.append(accuracy_and_cost(f"{track.track}-cost", f"Score ({title})", plain_name, data, missing))
     nees = _medians_by_scenario(track, rows, runs, "nees_horizontal")
     if nees["middles"]["row"]:
         made.append(

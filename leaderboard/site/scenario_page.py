@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background, faulty_points, fix_points, truth_of
@@ -202,7 +203,9 @@ def _table(
     same = {n: [m for m in names if m != n] for names in same_results(ranking) for n in names}
     rows = []
     for row in ranking.rows:
-        item = board_row(row, estimators[row.estimator], same.get(row.estimator, ()), provisional=ranking.provisional)
+        cost = cost_of(row.estimator, ranking.plain, ranking.score)
+        others = same.get(row.estimator, ())
+        item = board_row(row, estimators[row.estimator], cost, others, provisional=ranking.provisional)
         for column in shown:
             found = runs[row.estimator].score(column.key)
             item[column.key] = {

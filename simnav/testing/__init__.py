@@ -5,6 +5,7 @@
   switches them on.
 - `parametrize_with_rows` makes a pytest-benchmark group of an estimator and rows that come with simnav.
 - `measure` measures time and memory of an epoch of several estimators in turns; ``simnav bench`` prints it.
+- `multiple` measures the processor time of one estimator as a multiple of that of another one.
 
 pytest is imported when a decorator is used, and not before: simnav itself does not need it.
 """
@@ -13,6 +14,15 @@ from __future__ import annotations
 
 from simnav.testing.cost import Cost, measure
 from simnav.testing.given import EstimatorLike
+from simnav.testing.paired_time import Multiple, multiple
 from simnav.testing.parametrize import parametrize_with_checks, parametrize_with_rows
 
-__all__ = ["Cost", "EstimatorLike", "measure", "parametrize_with_checks", "parametrize_with_rows"]
+__all__ = [
+    "Cost",
+    "EstimatorLike",
+    "Multiple",
+    "measure",
+    "multiple",
+    "parametrize_with_checks",
+    "parametrize_with_rows",
+]

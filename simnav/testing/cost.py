@@ -29,7 +29,7 @@ from simnav.estimator import Estimator, UnsuitableScenario, lacking
 from simnav.recording import Recording
 from simnav.types import Array, Measurements
 
-__all__ = ["Cost", "measure"]
+__all__ = ["TURN", "Cost", "Factory", "measure", "started"]
 
 Factory: TypeAlias = Callable[[], Estimator]
 Progress: TypeAlias = "Callable[..., None] | None"
@@ -154,7 +154,7 @@ def _time_a_round(
     running: dict[str, tuple[Estimator, list[Measurements]]] = {}
     for label, factory in estimators.items():
         try:
-            running[label] = (_reset(factory(), recording), [copy.deepcopy(packet) for packet in steps])
+            running[label] = (started(factory(), recording), [copy.deepcopy(packet) for packet in steps])
         except Exception as error:
             failed[label] = _failure(label, error)
     for first in range(0, len(steps), TURN):
@@ -162,15 +162,22 @@ def _time_a_round(
             estimator, packets = running[label]
             try:
                 for k in range(first, min(first + TURN, len(steps))):
-                    started = process_time()
+                    before = process_time()
                     estimator.update(packets[k])
-                    least[label][k] = min(least[label][k], process_time() - started)
+                    least[label][k] = min(least[label][k], process_time() - before)
             except Exception as error:
                 failed[label] = _failure(label, error)
                 del running[label]
 
 
-def _reset(estimator: Estimator, recording: Recording) -> Estimator:
+def started(estimator: Estimator, recording: Recording) -> Estimator:
+    """An estimator at the start of a recording.
+
+    Raises
+    ------
+    simnav.estimator.UnsuitableScenario
+        If it needs other instruments.
+    """
     lack = lacking(estimator.needs, recording.instruments)
     if lack:
         raise UnsuitableScenario(lack)

@@ -58,7 +58,8 @@ _TIMES = {"seconds", "simulation_seconds", "update_median", "update_mean", "upda
 
 def timeless(value: Any) -> Any:
     if isinstance(value, dict):
-        return {k: timeless(v) for k, v in value.items() if k not in _TIMES}
+        multiple = {"value", "low", "high"} if {"plain", "rounds", "scenario"} <= value.keys() else set()
+        return {k: timeless(v) for k, v in value.items() if k not in _TIMES | multiple}
     return [timeless(v) for v in value] if isinstance(value, list) else value
 
 
@@ -194,6 +195,7 @@ OF_THE_RESULT = {
     "run": {"plot", "stanford", "alert_limit"},
     "simulate": {"output", "csv"},
     "sweep": {"plot", "workers", "time_limit", "memory_limit"},  # limits are **options of the call
+    "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
     "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
     "cite": {"text"},

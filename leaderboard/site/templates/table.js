@@ -7,7 +7,7 @@
   const key = (column, row) => {
     const value = row[column.key];
     if (value === null || value === undefined || value === "") return null;
-    if (typeof value === "object") return value.sort ?? value.value ?? value.text ?? null;
+    if (typeof value === "object") return "sort" in value ? value.sort : value.value ?? value.text ?? null;
     return value;
   };
 

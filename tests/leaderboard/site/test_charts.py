@@ -27,7 +27,13 @@ def names_of(chart: charts.Chart, width: int) -> dict[str, tuple[str, float, flo
 def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
     front = {"row": ["first-row", "last-row"], "front": [True, True]}
     cost = charts.accuracy_and_cost(
-        "cost", "Score", {"rows": front | {"cost": [0.15, 0.23], "error": [12.4, 9.7], "family": ["a", "b"]}}
+        "cost",
+        "Score",
+        "ekf",
+        {
+            "rows": front
+            | {"low": [1.5, 2.3], "high": [1.5, 2.3], "cost": [1.5, 2.3], "error": [12.4, 9.7], "family": ["a", "b"]}
+        },
     )
     detection = charts.detection("detection", {"rows": front | {"false": [1.0, 9.0], "found": [50.0, 90.0]}})
     for chart in (cost, detection):
@@ -41,5 +47,10 @@ def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
 
 def test_a_long_name_in_the_middle_is_not_cut() -> None:
     front = {"row": ["first-row", "last-" + "x" * 40], "front": [True, True], "family": ["a", "b"]}
-    chart = charts.accuracy_and_cost("cost", "Score", {"rows": front | {"cost": [0.1, 0.101], "error": [3.0, 2.0]}})
+    chart = charts.accuracy_and_cost(
+        "cost",
+        "Score",
+        "ekf",
+        {"rows": front | {"low": [0.99, 1.0], "high": [1.01, 1.02], "cost": [1.0, 1.01], "error": [3.0, 2.0]}},
+    )
     assert names_of(chart, 620)["last-" + "x" * 40][0] == "end"

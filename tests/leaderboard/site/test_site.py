@@ -18,6 +18,7 @@ from simnav.estimator import find, names
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.ranking.board import TrackRow
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
 from simnav.leaderboard.site import charts, site
@@ -161,6 +162,23 @@ def test_the_board_has_a_table_a_track_and_shows_identical_oracles_once(folder, 
     shown = Page(folder / "index.html").text
     assert f"--scenario PATH/TO/made-up-one.toml,PATH/TO/made-up-two.toml,{catalogued}" in shown
     assert "ekf:gate=3.5" in shown
+
+
+def test_costs_are_multiples_of_the_plain_row_and_what_is_not_measured_is_named(folder, hostile):
+    track = tracks_of(folder)[0]
+    rows = {r["name"]["text"]: r for r in track["table"]["rows"]}
+    measured = cost_of("sw-fgo", "ekf", "horizontal_rmse")
+    assert rows["sw-fgo"]["cost"]["value"] == pytest.approx(measured.value, rel=1e-2)
+    assert rows["sw-fgo"]["cost_spread"]["low"] == pytest.approx(measured.low, rel=1e-2)
+    assert rows["sw-fgo"]["wall"] == pytest.approx(6e-4)  # as the runs say
+    assert rows[hostile]["cost"]["text"] == "not measured"
+    assert "simnav bench NAME" in rows[hostile]["cost"]["help"]
+    chart = next(c for c in track["charts"] if c["name"].endswith("-cost"))
+    points = chart["data"]["rows"]
+    assert points["cost"][points["row"].index("sw-fgo")] == rows["sw-fgo"]["cost"]["value"]
+    assert hostile not in points["row"]
+    assert "Cost not measured: " in chart["caption"]
+    assert "Processor time (× ekf)" in json.dumps(chart["spec"], ensure_ascii=False)
 
 
 def test_one_row_far_behind_does_not_decide_the_scale_of_the_bars():

@@ -1,0 +1,180 @@
+"""What estimators cost, as multiples of the plain row: the table that comes with simnav, and how boards show it.
+
+The wall clock of a campaign's runs depends on what else the machine did. So boards show processor time as a multiple of
+that of the plain row, measured in turns (`simnav.testing.paired_time`). The multiples of all rows that come with simnav
+are in ``costs.json`` beside this module, which ``simnav bench --all --output FILE`` writes. A board joins them to its
+rows when it is shown; the ranking does not use them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.ranking.plain_row import plain_rows
+from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.provenance import Provenance, here
+
+__all__ = ["FILE", "NOT_MEASURED", "CostMultiple", "Costs", "cost_of", "not_measured", "read", "save", "stored"]
+
+FILE = Path(__file__).with_name("costs.json")
+FORMAT = 1
+NOT_MEASURED = "not measured"
+
+_DIGITS = 4
+_WANTED = "'simnav bench --all --output FILE' writes such a file"
+
+
+@dataclass(frozen=True)
+class CostMultiple:
+    """Processor time of an estimator as a multiple of that of a plain row.
+
+    Attributes
+    ----------
+    estimator, plain : str
+        Labels of both. Beside ``ekf`` and ``ship-ekf`` the time is that of ``update``; beside a smoother it is that of
+        all epochs and of ``smooth``.
+    scenario : str
+        Versioned id of the scenario that both ran.
+    value, low, high : float
+        The multiple, with its 95 % interval over the rounds.
+    rounds : int
+        Number of rounds.
+    """
+
+    estimator: str
+    plain: str
+    scenario: str
+    value: float
+    low: float
+    high: float
+    rounds: int
+
+
+@dataclass(frozen=True)
+class Costs:
+    """A table of costs.
+
+    Attributes
+    ----------
+    measured : Provenance
+        Machine, versions and day.
+    rows : tuple of CostMultiple
+        In the order of the file.
+    """
+
+    measured: Provenance
+    rows: tuple[CostMultiple, ...]
+
+    def find(self, estimator: str, plains: Iterable[str]) -> CostMultiple | None:
+        """The multiple of an estimator beside the first of the plain rows beside which it was measured."""
+        mine = {r.plain: r for r in self.rows if r.estimator == estimator}
+        return next((mine[p] for p in plains if p in mine), None)
+
+
+def save(rows: Iterable[CostMultiple], path: Path, measured: Provenance | None = None) -> Path:
+    """Write multiples; an older file is replaced.
+
+    Parameters
+    ----------
+    rows : iterable of CostMultiple
+        The multiples.
+    path : Path
+        The file.
+    measured : Provenance, optional
+        Machine, versions and day of the measurement; default: those of now.
+
+    Raises
+    ------
+    OSError
+        If writing fails.
+    """
+    lines = []
+    for row in rows:
+        values = {k: float(f"{v:.{_DIGITS}g}") if isinstance(v, float) else v for k, v in asdict(row).items()}
+        lines.append("  " + json.dumps(values))
+    known = {k: v for k, v in (measured or here()).to_dict().items() if v not in ("", None) and k != "id"}
+    head = json.dumps({"format": FORMAT, "measured": known}, indent=1)
+    return write_whole(path, head[: head.rindex("}")].rstrip() + ',\n "rows": [\n' + ",\n".join(lines) + "\n ]\n}\n")
+
+
+def read(path: Path) -> Costs:
+    """Read a table of costs.
+
+    Raises
+    ------
+    RequestError
+        If the file is missing or is no table of costs: one sentence with the file, the field and the value.
+    """
+    try:
+        content = json.loads(path.read_bytes())
+        if not isinstance(content, Mapping) or content.get("format") != FORMAT:
+            found = content.get("format") if isinstance(content, Mapping) else content
+            raise ValueError(f"format is {found!r}, and this version reads {FORMAT}")
+        if not isinstance(content.get("rows"), list) or not isinstance(content.get("measured"), Mapping):
+            raise ValueError("'rows' should be a list, and 'measured' an object with machine, versions and day")
+        known = {f.name for f in fields(Provenance)}
+        measured = Provenance(**{k: v for k, v in content["measured"].items() if k in known})
+        rows = tuple(_row(k, entry) for k, entry in enumerate(content["rows"]))
+        pairs = set[tuple[str, str]]()
+        for k, row in enumerate(rows):
+            if (row.estimator, row.plain) in pairs:
+                raise ValueError(f"rows[{k}]: there are two multiples of {row.estimator} beside {row.plain}")
+            pairs.add((row.estimator, row.plain))
+        return Costs(measured, rows)
+    except (OSError, ValueError, TypeError) as error:
+        raise RequestError(f"{path} is no table of costs: {sentence(error)}; {_WANTED}") from error
+
+
+def _row(number: int, entry: Any) -> CostMultiple:
+    """A row of the file; ValueError with the field that is wrong."""
+    where = f"rows[{number}]"
+    if not isinstance(entry, Mapping):
+        raise ValueError(f"{where} is {entry!r}, and should be an object")
+    for name in ("estimator", "plain", "scenario"):
+        if not isinstance(entry.get(name), str) or not entry[name]:
+            raise ValueError(f"{where}.{name} is {entry.get(name)!r}, and should be a text")
+    for name in ("value", "low", "high", "rounds"):
+        x = entry.get(name)
+        if isinstance(x, bool) or not isinstance(x, (int, float)) or not 0.0 < x < math.inf:
+            raise ValueError(f"{where}.{name} is {x!r}, and should be a finite number above 0")
+    if not entry["low"] <= entry["value"] <= entry["high"]:
+        raise ValueError(f"{where}.value is {entry['value']!r}, and should be between low and high")
+    return CostMultiple(
+        entry["estimator"], entry["plain"], entry["scenario"], float(entry["value"]), float(entry["low"]),
+        float(entry["high"]), int(entry["rounds"]),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=4)
+def stored(path: Path = FILE) -> Costs:
+    """The table that comes with simnav; see `read`."""
+    return read(path)
+
+
+def cost_of(estimator: str, plain: str, score: str) -> CostMultiple | None:
+    """What a board shows of a row: the stored multiple, or None where it was not measured.
+
+    Parameters
+    ----------
+    estimator : str
+        Label of the row.
+    plain : str
+        The plain row of the board; of several, as ``ekf or ship-ekf``, the first that the row was measured beside;
+        without one (empty), those of the score.
+    score : str
+        Key of `simnav.scoring.SCORES` that the board ranks.
+    """
+    return stored().find(estimator, plain.split(" or ") if plain else plain_rows(score))
+
+
+def not_measured(estimators: Iterable[str]) -> str:
+    """The sentence on rows whose cost was not measured; empty where there is none."""
+    names = ", ".join(estimators)
+    return f"Cost not measured: {names}; 'simnav bench NAME' measures it." if names else ""
