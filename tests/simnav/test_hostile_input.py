@@ -19,10 +19,19 @@ from simnav.spec import SpecError
 from tests.cases import ship
 
 TEXT = ship("a", 20.0)
+INSTRUMENTS = "[instruments.gnss]\n"
+ERRORS = "[initial_error]\n{}\n" + INSTRUMENTS
 
 CASES = {
     "speed": ("speed_m_s = 5.0", "speed_m_s = 1e11", "start.speed_m_s = 1e+11: should be at most 1000"),
     "subnormal": ("[3.0, 3.0, 5.0]", "[1e-310, 3.0, 5.0]", "instruments.gnss.sigma = 1e-310"),
+    "start": ("heading_deg = 45.0", "heading_deg = 1e-310", "start.heading = "),
+    "underflow": (INSTRUMENTS, ERRORS.format("velocity_m_s = [1e-170, 1, 1]"), "initial_error.velocity_m_s = [1e-170"),
+    "position": (INSTRUMENTS, ERRORS.format("position_m = [1, 1e-310, 1]"), "initial_error.position_m = [1, 1e-310"),
+    "factor": (INSTRUMENTS, ERRORS.format("times_told.velocity = inf"), "initial_error.times_told.velocity = inf"),
+    "large factor": (INSTRUMENTS, ERRORS.format("times_told.velocity = 1e300"), "should be at most 1e+06"),
+    "truth value": (INSTRUMENTS, ERRORS.format("times_told.velocity = true"), "times_told.velocity = True should be a"),
+    "number as text": (INSTRUMENTS, ERRORS.format("times_told.velocity = '3'"), "times_told.velocity = '3' should be a"),
     "nested": ("speed_m_s = 5.0", f"speed_m_s = {'[' * 500}{']' * 500}", "speed_m_s"),
     "very nested": ("speed_m_s = 5.0", f"speed_m_s = {'[' * 5000}{']' * 5000}", "line 11, speed_m_s: lists or tables"),
     "digits": ("speed_m_s = 5.0", f"speed_m_s = {'9' * 5000}", "line 11, speed_m_s: a number has more digits"),
