@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import subprocess
 import sys
 import tracemalloc
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -75,18 +78,38 @@ def loaded_anew() -> Kernel[[float], float]:
     return Kernel(twice, "f8(f8)", False)
 
 
-@pytest.mark.parametrize("damage", ["empty index", "truncated data"])
-def test_a_damaged_cache_is_compiled_again(damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def flipped(content: bytes, at: float) -> bytes:
+    """The content with one bit wrong, at a part of its length."""
+    place = int(at * (len(content) - 1))
+    return content[:place] + bytes([content[place] ^ 0x10]) + content[place + 1 :]
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda content: b"",
+    "truncated": lambda content: content[:100],
+    "longer": lambda content: content + b"0",
+    "zeros": lambda content: bytes(len(content)),
+    **{f"bit at {at:.0%}": functools.partial(flipped, at=at) for at in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)},
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_a_damaged_cache_is_compiled_again(
+    damage: str, suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
     first = loaded_anew()
     assert first(2.0) == 4.0
     directory = first.directory()
     assert directory is not None
-    (path,) = directory.glob("*/*.nbi" if damage == "empty index" else "*/*.nbc")
-    path.write_bytes(b"" if damage == "empty index" else path.read_bytes()[:100])
+    (path,) = directory.glob(f"*/*.{suffix}")
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
     with pytest.warns(UserWarning, match="the compiled kernel twice in .* is damaged .*; it is compiled again"):
         assert loaded_anew()(2.0) == 4.0
-    assert loaded_anew()(3.0) == 6.0  # and the cache is whole again
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert loaded_anew()(3.0) == 6.0  # and the cache is whole again
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell closes the stream")
