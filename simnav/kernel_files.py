@@ -26,7 +26,10 @@ __all__ = ["WithDigests", "compile_with"]
 _DIGEST = hashlib.sha256().digest_size
 
 
-class WithDigests(IndexDataCacheFile):  # type: ignore[misc]
+_Files: Any = IndexDataCacheFile  # Numba has no annotations
+
+
+class WithDigests(_Files):  # type: ignore[misc]
     """Index and data file of a kernel, with their digests at the end. Pickle does not read what follows an object."""
 
     @contextlib.contextmanager

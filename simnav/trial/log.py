@@ -423,7 +423,10 @@ def _first_bad_covariance(p: Array, estimated: NDArray[np.bool_]) -> tuple[int |
         return k, f"has a negative variance of {COMPONENTS[j]}: {variance[k, j]:g}"
     if tiny[k].any():
         j = int(np.flatnonzero(tiny[k])[0])
-        return k, f"has a variance of {COMPONENTS[j]} of {float(variance[k, j])!r}: it should be 0 or at least {_LEAST:g}"
+        return (
+            k,
+            f"has a variance of {COMPONENTS[j]} of {float(variance[k, j])!r}: it should be 0 or at least {_LEAST:g}",
+        )
     if beyond[k]:
         return k, f"has an entry beyond {_MOST:g}"
     return k, "is not symmetric" if asymmetric[k] else "is not positive semi-definite"

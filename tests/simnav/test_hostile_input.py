@@ -34,7 +34,11 @@ CASES = {
     "factor": (INSTRUMENTS, ERRORS.format("times_told.velocity = inf"), "initial_error.times_told.velocity = inf"),
     "large factor": (INSTRUMENTS, ERRORS.format("times_told.velocity = 1e300"), "should be at most 1e+06"),
     "truth value": (INSTRUMENTS, ERRORS.format("times_told.velocity = true"), "times_told.velocity = True should be a"),
-    "number as text": (INSTRUMENTS, ERRORS.format("times_told.velocity = '3'"), "times_told.velocity = '3' should be a"),
+    "number as text": (
+        INSTRUMENTS,
+        ERRORS.format("times_told.velocity = '3'"),
+        "times_told.velocity = '3' should be a",
+    ),
     "nested": ("speed_m_s = 5.0", f"speed_m_s = {'[' * 500}{']' * 500}", "speed_m_s"),
     "very nested": ("speed_m_s = 5.0", f"speed_m_s = {'[' * 5000}{']' * 5000}", "line 11, speed_m_s: lists or tables"),
     "digits": ("speed_m_s = 5.0", f"speed_m_s = {'9' * 5000}", "line 11, speed_m_s: a number has more digits"),
