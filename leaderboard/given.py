@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes, sentence
+from simnav.leaderboard.results.errors import MOST_RUNS, RequestError, StoreError, mistakes, sentence
 from simnav.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -168,5 +168,7 @@ def positive(name: str, value: Any, least: float = 0.0) -> float:
 
 def seeds_of(seed: Any, runs: Any) -> range:
     """The seeds of some runs: the first, and those that count up from it."""
-    first = whole("seed", seed)
-    return range(first, first + whole("runs", runs, 1))
+    first, count = whole("seed", seed), whole("runs", runs, 1)
+    if count > MOST_RUNS:
+        raise RequestError(f"runs = {count}: at most {MOST_RUNS} are possible")
+    return range(first, first + count)

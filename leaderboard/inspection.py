@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from simnav.leaderboard.campaign.request import Estimators, requests
 from simnav.leaderboard.given import ScenarioLike, Scenarios, absolute, results_of, scenario_of, scenarios_of, whole
 from simnav.leaderboard.results import requested
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
+from simnav.leaderboard.results.scratch import scratch
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
@@ -144,14 +144,11 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
     from simnav.leaderboard.results.gathering import gather
     from simnav.leaderboard.submission.bundle import open_bundle
 
-    with tempfile.TemporaryDirectory(prefix="simnav-merge-") as scratch, mistakes(StoreError):
+    with scratch("merge") as home, mistakes(StoreError):
         paths = [absolute(folder) for folder in ([folders] if isinstance(folders, (str, os.PathLike)) else folders)]
         if not paths:
             raise RequestError("no folder was named whose results should be merged")
-        places = [
-            open_bundle(path, Path(scratch) / str(k)).results if path.is_file() else path
-            for k, path in enumerate(paths)
-        ]
+        places = [open_bundle(path, home / str(k)).results if path.is_file() else path for k, path in enumerate(paths)]
         target = gather(absolute(output), places)
     return results_of(target)
 

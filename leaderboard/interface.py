@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -35,6 +34,7 @@ from simnav.leaderboard.given import (
 )
 from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, verify
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
+from simnav.leaderboard.results.scratch import scratch
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -632,8 +632,8 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
     if keep is not None:
         yield absolute(keep)
         return
-    with tempfile.TemporaryDirectory(prefix="simnav-evaluate-") as name:
-        yield Path(name) / "results"
+    with scratch("evaluate") as home:
+        yield home / "results"
 
 
 def _run(

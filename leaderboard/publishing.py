@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from simnav.leaderboard.given import absolute, results_of, whole
 from simnav.leaderboard.inspection import rank
 from simnav.leaderboard.interface import CampaignProgress, campaign
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
+from simnav.leaderboard.results.scratch import scratch
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
@@ -190,8 +190,8 @@ def submit(
     name = load(profile).name
     with mistakes(ValueError):
         confinement = chosen_confinement("auto")
-    with tempfile.TemporaryDirectory(prefix="simnav-submit-") as scratch:
-        source = source_of(str(estimator), dict(parameters or {}), Path(scratch), tuple(requires))
+    with scratch("submit") as home:
+        source = source_of(str(estimator), dict(parameters or {}), home, tuple(requires))
         folder = absolute(results or Path("results") / f"submit-{source.title}")
         target = absolute(output or f"{source.title}{SUFFIX}")
         if not target.parent.is_dir():
@@ -206,13 +206,13 @@ def submit(
                 "command continues"
             )
         with mistakes(StoreError):
-            found = pack(folder, Path(scratch) / "results", [r.label for r in source.requests])
+            found = pack(folder, home / "results", [r.label for r in source.requests])
         ran = {r.scenario for r in found}
         runs = {s: n for s, n in runs_of(str(profile)).items() if s in ran}
         rows = [_row(r) for r in source.requests]
         digest = write_bundle(
             target, title=source.title, benchmark=BENCHMARK, profile=name, runs=runs, main=source.main, estimators=rows,
-            requires=source.requires, source=source.files, results=Path(scratch) / "results",
+            requires=source.requires, source=source.files, results=home / "results",
         )  # fmt: skip
     remarks = []
     if any(r.provenance.dirty for r in found):

@@ -4,7 +4,7 @@ The import of a module with kernels is quick: Numba is imported, and a kernel is
 only when the kernel is first called. Numba's own cache detects an edit of the file that holds a kernel, but not an edit
 of a kernel in another file that it calls. Therefore the cache directory of a kernel is named after a hash of its code,
 of all kernels and constants that it uses, directly or indirectly, and of the versions of Python, Numba and NumPy. An
-edit of any of these gives a new directory.
+edit of any of these gives a new directory. Each file has a checksum (`simnav.kernel_files`).
 """
 
 from __future__ import annotations
@@ -13,15 +13,12 @@ import contextlib
 import functools
 import hashlib
 import os
-import pickle
 import shutil
-import struct
 import sys
 import tempfile
 import threading
 import time
 import types
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
@@ -41,9 +38,6 @@ Returned = TypeVar("Returned")
 
 #: Cache directories that were not used for this long are deleted by `prune` [s].
 KEEP = 60 * 86400.0
-
-#: The exceptions that the loading of a truncated or empty cache file may raise.
-_DAMAGED = (EOFError, pickle.UnpicklingError, UnicodeDecodeError, IndexError, KeyError, struct.error)
 
 _kernels: list[Kernel[..., Any]] = []
 _compiling = threading.RLock()  # Numba takes the cache directory from a global setting
@@ -170,33 +164,18 @@ class Kernel(Generic[Parameters, Returned]):
                     try:
                         directory.mkdir(mode=0o700, exist_ok=True)
                         os.utime(directory)  # in use: see `prune`
-                        self._dispatcher = self._from_cache(str(directory))
+                        self._dispatcher = self._jit(str(directory))
                     except OSError:  # a full disk must not stop a run
                         self._dispatcher = None
                 if self._dispatcher is None:
                     self._dispatcher = self._jit(None)
             return self._dispatcher
 
-    def _from_cache(self, directory: str) -> Callable[..., Any]:
-        """Compile or load the kernel. Damaged files of the cache are deleted, and the kernel is compiled."""
-        try:
-            return self._jit(directory)
-        except _DAMAGED as error:
-            root = Path(directory).parent
-            warnings.warn(
-                f"the compiled kernel {self.__name__} in {directory} is damaged ({type(error).__name__}); it is "
-                "compiled again",
-                stacklevel=2,
-            )
-            for part in self.tree():
-                part._dispatcher = None
-                shutil.rmtree(root / part.fingerprint(), ignore_errors=True)
-            Path(directory).mkdir(mode=0o700, exist_ok=True)
-            return self._jit(directory)
-
     def _jit(self, directory: str | None) -> Callable[..., Any]:
         import numba
         from numba.core import config as numba_config
+
+        from simnav.kernel_files import compile_with
 
         config: Any = numba_config
         original = self.function
@@ -223,11 +202,11 @@ class Kernel(Generic[Parameters, Returned]):
             # differently, and the linker uses the copy that is loaded first. With fast arithmetic a result would then
             # depend on whether its kernels came from the cache.
             options["forceinline"] = True
-        decorate = numba.jit(**options) if self.signature is None else numba.jit(self.signature, **options)
         previous = config.CACHE_DIR
         config.CACHE_DIR = directory or previous
         try:
-            compiled: Callable[..., Any] = decorate(function)
+            compiled: Callable[..., Any] = numba.jit(**options)(function)
+            compile_with(compiled, self.signature)
         finally:
             config.CACHE_DIR = previous
         return compiled

@@ -354,11 +354,7 @@ def _containers(annotation: Any) -> set[Any]:
 def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
     specs, top = spec_types(info.annotation), _containers(info.annotation)
     if not specs:
-        # pydantic would read the text "3" as a number, and true as 1.
-        if isinstance(raw, float) and (math.isnan(raw) or (math.isinf(raw) and not _may_be_infinite(info))):
-            raise SpecError(f"{source}: {where} = {raw!r} should be a finite number")
-        if isinstance(raw, (str, bool)) and top & {int, float} and not top & {str, bool}:
-            raise SpecError(f"{source}: {where} = {raw!r} should be a number")
+        _check_plain(raw, _leaves(info.annotation), _may_be_infinite(info), source, where)
         return raw
     if top & {list, tuple}:
         if not isinstance(raw, list):
@@ -370,6 +366,33 @@ def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
         # Without the key "kind", the name of the table is its kind.
         return {k: _one(v, specs, source, f"{where}.{k}", default_kind=k) for k, v in raw.items()}
     return _one(raw, specs, source, where)
+
+
+def _leaves(annotation: Any) -> set[Any]:
+    """The types of the values that the annotation allows, also inside arrays and tables; of a table not its keys."""
+    origin, inside = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is typing.Literal:
+        return {type(value) for value in inside}
+    if origin is Annotated:
+        return _leaves(inside[0])
+    if origin in (dict, Mapping):
+        return _leaves(inside[1])
+    return {leaf for part in inside for leaf in _leaves(part)} if inside else {annotation}
+
+
+def _check_plain(raw: Any, leaves: set[Any], infinite: bool, source: str, where: str) -> None:
+    """Refuse NaN, infinity, and text or truth values in the place of numbers, also inside arrays and tables."""
+    if isinstance(raw, Mapping):
+        for key, inner in raw.items():
+            _check_plain(inner, leaves, infinite, source, f"{where}.{key}")
+    elif isinstance(raw, (list, tuple)):
+        for inner in raw:
+            _check_plain(inner, leaves, infinite, source, where)
+    elif isinstance(raw, float) and (math.isnan(raw) or (math.isinf(raw) and not infinite)):
+        raise SpecError(f"{source}: {where} = {raw!r} should be a finite number")
+    elif isinstance(raw, (str, bool)) and leaves & {int, float} and not leaves & {str, bool}:
+        # pydantic would read the text "3" as a number, and true as 1.
+        raise SpecError(f"{source}: {where} = {raw!r} should be a number")
 
 
 def _kind(spec: type[Spec]) -> str | None:

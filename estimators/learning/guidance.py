@@ -6,7 +6,8 @@ vessel goes where the agent steers it, so that an error of the estimate becomes 
 
 Action: two numbers in [-1, 1], clipped. The first is the heading that is steered, as the navigator believes it, less
 the planned one (ahead by the time that the vessel needs to answer), over `LARGEST_TURN`. The second, a, is the speed
-through the water: ``1 + a / 2`` times the planned one. 0, 0 is the planned heading and speed.
+through the water: ``1 + a / 2`` times the planned one. 0, 0 is the planned heading and speed. An agent does not steer
+the depth: the vessel dives and surfaces by itself, as planned for the point of the track nearest to the estimate.
 
 Observation, float32, clipped to +-`LIMIT`, all as estimated:
 
@@ -215,6 +216,9 @@ class GuidedVoyages:
             (self._planned, self._wrong, self._heading, self._speed),
         )  # fmt: skip
         motion.command(active, runs.x, self._wrong, self._heading, self._speed)
+        dive = self._routes.dive(self._at)
+        for j, place in enumerate(motion.DIVE):
+            runs.x[active, place] = dive[active, j]
         runs.advance(active)
         self.navigators.update(active)
         last = runs.step >= self._steps

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections import OrderedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.estimators.learning.environment import TaskOptions
+from simnav.estimators.learning.features import CONTEXT
 from simnav.estimators.learning.reference import Linear
 from simnav.estimators.learning.voyage import Prepared, prepare
 from simnav.types import Array, InitialState, Instruments
 
-__all__ = ["Pool"]
+__all__ = ["Pool", "capacity_within"]
 
 
 class Pool:
@@ -23,7 +26,7 @@ class Pool:
     options : TaskOptions
         Scenario and task of the voyages.
     capacity : int
-        Largest number of voyages.
+        Largest number of voyages; `capacity_within` finds one.
 
     Attributes
     ----------
@@ -44,6 +47,14 @@ class Pool:
     n : int
         States of the filter.
     """
+
+    @staticmethod
+    def cost(options: TaskOptions) -> int:
+        """Most memory of one prepared voyage [bytes], from the scenario and the task; nothing is prepared for it."""
+        steps, events = _most(options)
+        layout = options.layout
+        a_step = 8 * (1 + 1 + CONTEXT - 1 + 9 + 3)  # edges, end, context, error, oracle
+        return events * (Linear.bytes_each(layout.states) + 1) + steps * a_step
 
     def __init__(self, options: TaskOptions, capacity: int):
         self.options, self.capacity = options, capacity
@@ -73,10 +84,8 @@ class Pool:
     def _allocate(self, voyage: Prepared) -> None:
         """Room for the voyages; memory that is not used yet costs nothing."""
         o = self.options
-        longest = o.scenario.epochs + 1 if o.steps is None else o.steps
-        # A measurement is an event, and so is the end of a step; a log may deliver some late.
-        self._room = int(longest * (2.0 + o.layout.events)) + 64
-        self._room = max(self._room, int(1.5 * len(voyage.faulty)))
+        longest, room = _most(o)
+        self._room = max(room, int(1.5 * len(voyage.faulty)))
         self._steps = max(longest, len(voyage.end)) + 1
         c, s = self.capacity, self._steps
         self.linear = Linear.empty(c * self._room, self.n)
@@ -116,3 +125,61 @@ class Pool:
     def rows(self, array: Array, slots: NDArray[np.int64], steps: NDArray[np.int64]) -> Array:
         """Of each of b filters: the numbers of its voyage at its step."""
         return np.ascontiguousarray(array[slots, steps])
+
+
+def _most(options: TaskOptions) -> tuple[int, int]:
+    """Largest numbers of steps and of events of a voyage."""
+    longest = options.scenario.epochs + 1 if options.steps is None else options.steps
+    # A measurement is an event, and so is the end of a step; a log may deliver some late.
+    return longest, int(longest * (2.0 + options.layout.events)) + 64
+
+
+def capacity_within(options: TaskOptions, least: int, wanted: int, given: bool, memory_gb: float) -> int:
+    """The number of prepared voyages that are kept, so that they take no more memory than is allowed.
+
+    Parameters
+    ----------
+    options : TaskOptions
+        Scenario and task.
+    least, wanted : int
+        Number of voyages without which the vector form cannot work, and that would be kept if there were room.
+    given : bool
+        Whether the user asked for the wanted number: it is then not lowered.
+    memory_gb : float
+        Most memory of all of them [GB].
+
+    Raises
+    ------
+    ValueError
+        If they do not fit.
+
+    Warns
+    -----
+    UserWarning
+        If fewer than wanted are kept.
+    """
+    if not memory_gb > 0.0:
+        raise ValueError(f"memory_gb = {memory_gb!r} should be positive")
+    each = Pool.cost(options)
+    needed = wanted if given else least
+    making = 2  # the voyage that is being prepared is there twice
+    fit = int(memory_gb * 1e9 / each) - making
+    what = f"{options.scenario.id}: a prepared voyage takes up to {each / 1e6:.0f} MB"
+    if fit < needed:
+        raise ValueError(
+            f"{what}, and {needed} of them do not fit into memory_gb = {memory_gb:g}; ask for fewer voyages side by "
+            f"side (num_envs), shorter ones (steps) or a smaller cache, or say "
+            f"memory_gb = {_rounded(needed + making, each):g}"
+        )
+    if fit < wanted:
+        warnings.warn(
+            f"{what}, so {fit} of {wanted} are kept in memory_gb = {memory_gb:g}, and the others are prepared again "
+            f"each time that they are sailed; memory_gb = {_rounded(wanted + making, each):g} keeps all of them",
+            stacklevel=3,
+        )
+    return min(fit, wanted)
+
+
+def _rounded(voyages: int, each: int) -> float:
+    """The memory of so many voyages [GB], rounded up to a tenth."""
+    return math.ceil(voyages * each / 1e8) / 10.0

@@ -83,6 +83,11 @@ class Linear(NamedTuple):
             np.zeros((events, m, n)), np.zeros((events, m, m)), np.zeros((events, n)),
         )  # fmt: skip
 
+    @staticmethod
+    def bytes_each(n: int) -> int:
+        """Bytes of one event of a filter with n states."""
+        return sum(array.nbytes for array in Linear.empty(1, n))
+
     def put(self, at: int, other: Linear, count: int) -> None:
         """Copy the first events of another here."""
         for mine, theirs in zip(self, other, strict=True):

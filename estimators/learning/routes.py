@@ -35,6 +35,8 @@ class Routes:
         Latitude, longitude [rad], and metres per radian of both.
     course, along : (r, p) array
         Course of the track [rad], and the distance from its start [m].
+    dives : (r, p, 2) array
+        Depth that is steered for [m], and largest path angle [rad].
     """
 
     def __init__(self, n: int):
@@ -42,11 +44,17 @@ class Routes:
         self.of, self.length = np.zeros(n, np.int64), np.zeros(0, np.int64)
         self.points, self.geodetic = np.zeros((0, 0, 4)), np.zeros((0, 0, 4))
         self.course, self.along = np.zeros((0, 0)), np.zeros((0, 0))
+        self.dives = np.zeros((0, 0, 2))
 
     @property
     def tracks(self) -> Tracks:
         """All of them, as the kernels take them."""
         return self.of, self.length, self.points, self.geodetic, self.course, self.along
+
+    def dive(self, at: NDArray[np.int64]) -> Array:
+        """(n, 2) array: the values of `dives` at a point of each voyage's track."""
+        dive: Array = self.dives[self.of, at]
+        return dive
 
     def put(self, b: int, template: Scenario, drawn: Scenario) -> None:
         """Plan the track of a voyage, from its scenario before and after what is drawn."""
@@ -68,8 +76,10 @@ class Routes:
             p = max(k, self.points.shape[1])
             self.length = np.pad(self.length, (0, rows - len(self.length)))
             self.points, self.geodetic = (_room(a, rows, p) for a in (self.points, self.geodetic))
+            self.dives = _room(self.dives, rows, p)
             self.course, self.along = (_room(a, rows, p) for a in (self.course, self.along))
         self.length[r], self.points[r, :k], self.course[r, :k] = k, points, course
+        self.dives[r, :k] = track.dives[keep]
         self.geodetic[r, :k] = np.stack([position[:, 0], position[:, 1], north, east], axis=1)
         self.along[r, :k] = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 

@@ -16,10 +16,10 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from simnav.estimators.learning.batch import Flags, VoyagesVectorEnv
-from simnav.estimators.learning.environment import TaskOptions
+from simnav.estimators.learning.environment import TaskOptions, check_counts
 from simnav.estimators.learning.features import Numbers
 from simnav.estimators.learning.filters import Filters
-from simnav.estimators.learning.pool import Pool
+from simnav.estimators.learning.pool import Pool, capacity_within
 from simnav.scenario import Scenario
 
 __all__ = ["FilterTaskVectorEnv"]
@@ -35,7 +35,20 @@ class FilterTaskVectorEnv(VoyagesVectorEnv):
     num_envs, autoreset_mode, independent_seeds, render_mode
         The options of a vector form, see `simnav.estimators.learning.batch.VoyagesVectorEnv`.
     cache : int, optional
-        Number of prepared voyages that are kept; by default twice n, or all ``voyages`` if these are more.
+        Number of prepared voyages that are kept; by default twice n, or all ``voyages`` if these are more, as far as
+        they fit into ``memory_gb``.
+    memory_gb : float
+        Most memory of the prepared voyages [GB]. It is estimated before it is taken.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not valid, or n voyages do not fit into ``memory_gb``.
+
+    Warns
+    -----
+    UserWarning
+        If fewer voyages are kept than by default, because of ``memory_gb``.
     """
 
     def __init__(
@@ -52,13 +65,17 @@ class FilterTaskVectorEnv(VoyagesVectorEnv):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         independent_seeds: bool = False,
         cache: int | None = None,
+        memory_gb: float = 4.0,
         render_mode: str | None = None,
     ):
         self.options = o = TaskOptions(scenario, task, reward, instruments, steps, voyages, reveal_truth)
         super().__init__(
             task, num_envs, o.observation_space, o.action_space, autoreset_mode, independent_seeds, voyages, render_mode
         )
-        self._pool = Pool(o, max(num_envs + 1, cache or max(2 * num_envs, voyages or 0)))
+        check_counts(cache=cache)
+        least = num_envs + 1
+        wanted = max(least, cache or max(2 * num_envs, voyages or 0))
+        self._pool = Pool(o, capacity_within(o, least, wanted, cache is not None, memory_gb))
         self._slots, self._k = np.zeros(num_envs, np.int64), np.zeros(num_envs, np.int64)
         self._filters: Filters | None = None
 

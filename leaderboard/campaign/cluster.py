@@ -10,7 +10,6 @@ from __future__ import annotations
 import atexit
 import importlib
 import shutil
-import tempfile
 import threading
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -23,6 +22,7 @@ from typing import Any
 from simnav.leaderboard.campaign.fingerprint import simulator_version
 from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.scratch import scratch
 
 __all__ = ["ClusterError", "run_on_cluster"]
 
@@ -66,9 +66,10 @@ def _run_remotely(index: int, unit: Unit) -> tuple[int, Counter[str], dict[str, 
 @lru_cache(maxsize=1)
 def _workspace() -> Path:
     """Folder of this worker's results: one for all units, because its estimators' processes are made for one."""
-    home = tempfile.mkdtemp(prefix="simnav-worker-")
-    atexit.register(shutil.rmtree, home, ignore_errors=True)
-    return store.create(Path(home) / "results")
+    stack = ExitStack()
+    home = stack.enter_context(scratch("worker"))
+    atexit.register(stack.close)
+    return store.create(home / "results")
 
 
 def _keep(folder: Path, files: Mapping[str, bytes]) -> None:

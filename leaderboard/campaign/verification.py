@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.leaderboard.results.scratch import scratch
 from simnav.scenario import load
 
 if TYPE_CHECKING:
@@ -96,12 +96,12 @@ def verify_results(
     requests = {e.label: e for e in estimators}
     report = progress or (lambda *_, **__: None)
     close, different, without, unknown = [], [], [], dict[str, None]()
-    with tempfile.TemporaryDirectory(prefix="simnav-verify-") as name:
+    with scratch("verify") as home:
         for k, result in enumerate(chosen):
             what = f"{result.estimator} on {result.scenario}, run {result.seed}"
             report(k, len(chosen), note=what)
             try:
-                again = _repeat(result, Path(name) / "runs", seal, known, requests)  # one folder: one process
+                again = _repeat(result, home / "runs", seal, known, requests)  # one folder: one process
             except (RequestError, ValueError) as error:
                 without.append(f"{what}: {sentence(error)}")
                 continue

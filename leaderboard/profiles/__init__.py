@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.estimator import describe, names
-from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.scenario.catalogue import headers
 from simnav.spec import closest
 
@@ -127,15 +127,15 @@ def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Pa
         if key not in KEYS:
             raise RequestError(f"{where}: {key!r} is no key of a part{closest(key, list(KEYS))}")
     runs = table.get("runs")
-    if not isinstance(runs, int) or isinstance(runs, bool) or runs < 1:
-        raise RequestError(f"{where}: runs = {runs!r} should be a number of seeds, 1 or more")
+    if not isinstance(runs, int) or isinstance(runs, bool) or not 1 <= runs <= MOST_RUNS:
+        raise RequestError(f"{where}: runs = {runs!r:.40} should be a number of seeds, from 1 to {MOST_RUNS}")
     if ("scenarios" in table) == ("tracks" in table):
         raise RequestError(f"{where}: it should name scenarios or tracks")
     if "scenarios" in table:
         scenarios = _texts(where, table, "scenarios")
     else:
         tracks = _texts(where, table, "tracks")
-        low, high = float(table.get("shortest_s", 0.0)), float(table.get("longest_s", math.inf))
+        low, high = _seconds(where, table, "shortest_s", 0.0), _seconds(where, table, "longest_s", math.inf)
         scenarios = tuple(h.name for h in headers() if h.track in tracks and low < h.duration <= high)
     asked = table.get("estimators")
     if isinstance(asked, str):
@@ -144,6 +144,13 @@ def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Pa
         table = table | {"estimators": groups[asked]}
     everyone = tuple(n for n in names() if not describe(n).slow)
     return Part(scenarios, _texts(where, table, "estimators") if "estimators" in table else everyone, runs)
+
+
+def _seconds(where: str, table: dict[str, Any], key: str, default: float) -> float:
+    value = table.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value >= 0.0:
+        raise RequestError(f"{where}: {key} = {value!r:.40} should be a number of seconds, 0 or more")
+    return float(min(value, math.inf))
 
 
 def _texts(where: str, table: dict[str, Any], key: str) -> tuple[str, ...]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-__all__ = ["RequestError", "StoreError", "mistakes", "named", "printable", "sentence", "shortened"]
+__all__ = ["MOST_RUNS", "RequestError", "StoreError", "mistakes", "named", "printable", "sentence", "shortened"]
 
+#: Most runs of an estimator on a scenario: a larger number is a mistake, and lists of so many seeds fill the memory.
+MOST_RUNS = 1_000_000
 _MOST = 1000  # characters of a message
 
 

@@ -10,7 +10,6 @@ import hashlib
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.result import Result, to_table, write_tables
+from simnav.leaderboard.results.scratch import scratch
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -85,8 +85,8 @@ def write_packed(found: Iterable[Result], place: Path) -> None:
     if place.exists():
         store.create(place)  # refuses a folder of something else
     place.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{place.name}.", dir=place.parent))
-    try:
+    # Where the place is empty, an older draft may hold what was there: its process was killed between the two moves.
+    with scratch("draft", place.parent, sweeping=place.exists()) as draft:
         made = store.create(draft / "results")
         by: dict[str, list[Result]] = {}
         current: dict[str, tuple[str, dict[str, str]]] = {}
@@ -103,8 +103,6 @@ def write_packed(found: Iterable[Result], place: Path) -> None:
         if place.exists():
             os.replace(place, old)
         os.replace(made, place)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
 def shortened(results: Iterable[Result]) -> list[Result]:

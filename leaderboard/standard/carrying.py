@@ -12,7 +12,6 @@ that computed it. What was repeated is recorded in a CSV file, one line for each
 from __future__ import annotations
 
 import random
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -28,6 +27,7 @@ from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.results.scratch import scratch
 from simnav.leaderboard.standard.currency import changes
 from simnav.scenario import Scenario, load
 
@@ -102,11 +102,11 @@ def carry(
     scored = {_row(r): "scores" for r in found if scoring_differs(r.scoring, now)}
     stale, left = _repeatable(of, scored | changes(found))
     today, different, repeated = dict[_Row, Result](), list[str](), 0
-    with tempfile.TemporaryDirectory(prefix="simnav-carry-") as name:
+    with scratch("carry") as home:
         for k, (rows, seeds) in enumerate(_campaigns(stale, runs)):
             scenarios = list({s: stale[s, label][0] for s, label in rows}.values())
             requests = list({label: request_of(of[s, label][0]) for s, label in rows}.values())
-            place = Path(name) / str(k)
+            place = home / str(k)
             run_campaign(scenarios, requests, seeds, place, workers=workers, progress=progress)
             again = {(r.scenario, r.estimator, r.seed): r for r in store.load(place, series=False)}
             for row in rows:

@@ -15,12 +15,12 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
-from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.leaderboard.results.files import whole
 from simnav.leaderboard.submission.archive import digest_of, opened, unpack, write_archive
 
@@ -100,7 +100,7 @@ class Contents(_Part):
     title: str = Field(min_length=1, max_length=200)
     benchmark: str = Field(max_length=200)
     profile: str = Field(max_length=200)
-    runs: dict[str, int]
+    runs: dict[str, Annotated[int, Field(ge=1, le=MOST_RUNS)]] = Field(max_length=1000)
     main: str = Field(min_length=1, max_length=200)
     estimators: tuple[Row, ...] = Field(min_length=1, max_length=100)
     requires: tuple[str, ...] = ()

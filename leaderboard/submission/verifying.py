@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import random
 import subprocess
 import sys
-import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -23,6 +23,7 @@ from simnav.leaderboard.profiles import profiles
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance, benchmark_of, distinct
+from simnav.leaderboard.results.scratch import scratch
 from simnav.leaderboard.submission.bundle import Bundle, open_bundle
 from simnav.leaderboard.submission.environment import clean_python, install_requirements, search_variables
 from simnav.leaderboard.submission.repetition import Again, Asked, Wanted
@@ -148,8 +149,7 @@ def verify_bundle(
         confinement = chosen_confinement("auto")
     if confinement == "none":
         raise RequestError("the estimator of a submission cannot be confined on this system, so it is not run")
-    with tempfile.TemporaryDirectory(prefix="simnav-verify-") as name:
-        home = Path(name)
+    with scratch("verify") as home:
         bundle = open_bundle(path, home / "bundle")
         results = _results(bundle)
         findings = [*_incomplete(bundle, results), *_strange(bundle, results)]
@@ -227,14 +227,16 @@ def _incomplete(bundle: Bundle, results: Sequence[Result]) -> list[str]:
             absent = said == 0 and load_scenario(scenario).log is not None  # not everybody has the logs
             if want != said and not absent:
                 findings.append(f"the profile {contents.profile} has {want} seeds of {scenario}, the bundle {said}")
-    there = {(r.scenario, r.estimator, r.seed) for r in results}
+    there: dict[tuple[str, str], set[int]] = {}
+    for r in results:
+        there.setdefault((r.scenario, r.estimator), set()).add(r.seed)
     for row in contents.estimators:
         for scenario, count in contents.runs.items():
-            lacking = [k for k in range(count) if (scenario, row.label, k) not in there]
+            seeds = there.get((scenario, row.label), set())
+            lacking = count - sum(0 <= k < count for k in seeds)
             if lacking:
-                findings.append(
-                    f"{row.label} on {scenario}: {len(lacking)} runs are missing, such as seed {lacking[0]}"
-                )
+                first = next(k for k in itertools.count() if k not in seeds)
+                findings.append(f"{row.label} on {scenario}: {lacking} runs are missing, such as seed {first}")
     return findings
 
 

@@ -112,22 +112,30 @@ class LiveStretch(Stretch):
         names = [name for name in most if name != "imu"]
         room = max((most[name] for name in names), default=0)
         time, values = np.zeros((s, len(names), room)), np.zeros((s, len(names), room, 3))
-        valid = np.zeros((s, len(names), room), np.int8)
+        self._arrays = (time, np.zeros((s, len(names), room), np.int8), values)
+        self._aids = [(name, most[name], widths[name]) for name in names]
         columns: dict[str, dict[str, NDArray[Any]]] = {}
         if imu:
             columns["imu"] = {
                 "time": np.zeros((s, imu)), "valid": np.zeros((s, imu), np.int8), "length": np.zeros((s, imu)),
                 "angular_rate": np.zeros((s, imu, 3)), "specific_force": np.zeros((s, imu, 3)),
             }  # fmt: skip
-        for a, name in enumerate(names):
-            k, d = most[name], widths[name]
-            columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
         super().__init__(np.zeros((s, 2)), columns, np.zeros((s, 3, 3)), [], {}, {})
+        self._share_columns()
         own = runs.names[0]
         self._runs = runs
-        self._arrays = (time, valid, values)
         self._place = np.array([names.index(name) for name in own], np.int64)
         self._most = np.array([most[name] for name in own], np.int64)
+
+    def _share_columns(self) -> None:
+        """The columns of the aiding instruments are views of the arrays that `advance` fills."""
+        time, valid, values = self._arrays
+        for a, (name, k, d) in enumerate(self._aids):
+            self.columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._share_columns()  # in a copy they are arrays of their own
 
     def advance(self) -> None:
         """Simulate the next step.

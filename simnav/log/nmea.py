@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ __all__ = ["SENTENCES", "NmeaFile", "read_nmea", "utc_seconds"]
 
 _DEG = math.pi / 180.0
 _KNOT = 1852.0 / 3600.0
+#: The numbers of the standard. Python would also read ``inf``, ``1e9``, ``1_0`` and digits of other scripts.
+_DECIMAL = re.compile(r"[+-]?(\d{1,15}(\.\d*)?|\.\d+)", re.ASCII)
 
 Fields = list[str]
 Row = dict[str, float]
@@ -45,10 +48,13 @@ class _InvalidError(Exception):
 
 
 def _number(text: str) -> float:
-    value = float(text) if text else math.nan
-    if math.isinf(value):
+    """A field as a number, NaN where it is empty; ValueError where it is no decimal number."""
+    text = text.strip()
+    if not text:
+        return math.nan
+    if not _DECIMAL.fullmatch(text):
         raise ValueError(f"number {text!r}")
-    return value
+    return float(text)
 
 
 def _angle(text: str, hemisphere: str, positive: str, negative: str, largest: float) -> float:
@@ -57,7 +63,7 @@ def _angle(text: str, hemisphere: str, positive: str, negative: str, largest: fl
         return math.nan
     if hemisphere not in (positive, negative):
         raise ValueError(f"hemisphere {hemisphere!r}")
-    value = float(text)
+    value = _number(text)
     degrees = math.floor(value / 100.0)
     minutes = value - 100.0 * degrees
     if not 0.0 <= minutes < 60.0 or not 0.0 <= degrees + minutes / 60.0 <= largest:
@@ -84,9 +90,10 @@ def _mode(f: Fields, at: int) -> str:
 
 
 def _time_of_day(text: str) -> float:
+    text = text.strip()
     if not text:
         return math.nan
-    if len(text) < 6 or not text[:6].isdigit():
+    if len(text) < 6 or not text[:6].isdecimal() or not _DECIMAL.fullmatch(text):
         raise ValueError(f"time of day {text!r}")
     hours, minutes, seconds = int(text[:2]), int(text[2:4]), float(text[4:])
     if hours > 23 or minutes > 59 or not seconds < 61.0:  # a leap second is the 60th
@@ -115,7 +122,7 @@ def _gga(f: Fields) -> Row:
     return {
         "time_of_day": time_of_day,
         **_place(f[1:5]),
-        "quality": float(f[5]),
+        "quality": _number(f[5]),
         "satellites": _number(f[6]),
         "hdop": _number(f[7]),
         "altitude": altitude,

@@ -15,15 +15,17 @@ from simnav.world import Vessel
 if TYPE_CHECKING:
     from simnav.scenario.scenario import Scenario
 
-__all__ = ["LONGEST", "check"]
+__all__ = ["LONGEST", "SMALLEST", "check"]
 
 #: Largest number of intervals of faults: the labels of a measurement have 32 bits, one for each interval.
 _MOST_BITS = 32
 
 #: Longest run [s] and highest rate of an instrument [Hz]. The limits catch mistakes that would fill the memory.
 LONGEST, _FASTEST = 1e7, 1e5
-#: Highest speed of a vessel and of a current [m/s], and smallest magnitude of a number other than 0.
-_HIGHEST_SPEED, _SMALLEST = 1e3, 1e-200
+#: Highest speed of a vessel and of a current [m/s].
+_HIGHEST_SPEED = 1e3
+#: Smallest magnitude of a number other than 0: its square and the inverse of its square are numbers, too.
+SMALLEST = 1e-150
 
 _INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -38,6 +40,12 @@ def check(s: Scenario) -> None:
     """
     _check_head(s)
     _check_instruments(s)
+    for name in ("start", "vessel", "sea", "current"):
+        part = getattr(s, name)
+        _check_no_subnormal(name, {} if part is None else part.model_dump())
+    for key, parts in (("manoeuvre", s.manoeuvres), ("fault", s.faults)):
+        for k, part in enumerate(parts):
+            _check_no_subnormal(f"{key}[{k}]", part.model_dump())
     if s.log is None:
         _check_world(s)
     else:
@@ -84,8 +92,8 @@ def _check_no_subnormal(where: str, value: Any) -> None:
     elif isinstance(value, (list, tuple)):
         for inner in value:
             _check_no_subnormal(where, inner)
-    elif isinstance(value, float) and 0.0 < abs(value) < _SMALLEST:
-        raise ValueError(f"{where} = {value:g} (in SI units): should be 0, or at least {_SMALLEST:g}")
+    elif isinstance(value, float) and 0.0 < abs(value) < SMALLEST:
+        raise ValueError(f"{where} = {value:g} (in SI units): should be 0, or at least {SMALLEST:g}")
 
 
 def _check_speeds(s: Scenario) -> None:

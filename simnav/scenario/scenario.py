@@ -17,7 +17,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from simnav.log.spec import RecordedSpec
 from simnav.plugins import is_file_module, load_plugin, source_digest
 from simnav.scenario.catalogue import NAME, gym_id
-from simnav.scenario.consistency import LONGEST, check
+from simnav.scenario.consistency import LONGEST, SMALLEST, check
 from simnav.scenario.draws import Distribution, Draws, Template, has_draws, with_values
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
 from simnav.spec import Positive, Spec, SpecError, entries, quantity
@@ -34,6 +34,7 @@ TRAINING_ROOT = 1 << 63
 _CHECKED: set[str] = set()
 
 Sigmas = tuple[float, float, float]
+Factor = Annotated[float, Field(ge=1e-6, le=1e6)]
 
 
 class InitialError(Spec):
@@ -49,15 +50,17 @@ class InitialError(Spec):
         tuple(math.radians(d) for d in (0.05, 0.05, 0.5)),
         description="attitude error about north, east, down (the last is heading)",
     )
-    times_told: dict[Literal["position", "velocity", "attitude"], Positive] = Field(
+    times_told: dict[Literal["position", "velocity", "attitude"], Factor] = Field(
         {}, description="errors that really are so many times what an estimator is told, like `attitude = 10`"
     )
 
     @field_validator("position", "velocity", "attitude")
     @classmethod
     def _positive(cls, value: Sigmas) -> Sigmas:
-        if not all(v > 0.0 for v in value):
-            raise ValueError("the initial covariance must be positive definite: every sigma should be greater than 0")
+        # The square of a smaller one may be 0, and that of an infinite one is no variance.
+        if not all(SMALLEST <= v < math.inf for v in value):
+            least = "greater than 0" if min(value) <= 0.0 else f"finite and at least {SMALLEST:g} in SI units"
+            raise ValueError(f"the initial covariance must be positive definite: every sigma should be {least}")
         return value
 
     def covariance(self) -> Array:

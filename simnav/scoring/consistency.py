@@ -93,7 +93,7 @@ def nees(error: Array, covariance: Array, components: tuple[int, ...]) -> tuple[
     values, vectors = np.linalg.eigh(0.5 * (correlation + correlation.swapaxes(1, 2)))
     flat |= values[:, 0] <= 1e-12
     principal = np.einsum("tij,ti->tj", vectors, e / sigma)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         result = np.sum(principal**2 / values, axis=1)
     result = np.where(flat, np.inf, result)
     degrees = known.sum(axis=1)

@@ -36,6 +36,7 @@ DIVERGENCE_LIMIT = 100e3
 
 _TIME_TOLERANCE = 1e-6  # s; steps are multiples of the sample interval up to rounding
 _ROUNDING = 1e-6  # of a correlation coefficient: asymmetry, and negative eigenvalues, up to this are rounding
+_LEAST, _MOST = 1e-100, 1e100  # of a variance other than 0, and of any entry: what follows from others may overflow
 _CHUNK = 1024  # covariances checked together
 _EARTH_RADIUS = 6371e3
 _ALL = 0b111111111
@@ -399,16 +400,19 @@ def _first_bad_covariance(p: Array, estimated: NDArray[np.bool_]) -> tuple[int |
     unknown = ~(estimated[:, :, None] & estimated[:, None, :])
     infinite: NDArray[np.bool_] = ~np.all(np.isfinite(p) | unknown, axis=(1, 2))
     negative: NDArray[np.bool_] = np.any(variance < 0.0, axis=1)
-    sigma = np.sqrt(np.where(variance > 0.0, variance, 1.0))
-    p = np.where(unknown | infinite[:, None, None], 0.0, p) / sigma[:, :, None] / sigma[:, None, :]
+    tiny = (variance > 0.0) & (variance < _LEAST)
+    beyond: NDArray[np.bool_] = tiny.any(axis=1) | np.any(np.abs(p) > _MOST, axis=(1, 2))
+    sigma = np.sqrt(np.where(variance >= _LEAST, variance, 1.0))
+    p = np.where(unknown | (infinite | beyond)[:, None, None], 0.0, p) / sigma[:, :, None] / sigma[:, None, :]
     asymmetric: NDArray[np.bool_] = np.any(np.abs(p - p.swapaxes(1, 2)) > _ROUNDING, axis=(1, 2))
     p = 0.5 * (p + p.swapaxes(1, 2))
+    indefinite: NDArray[np.bool_] = np.any(np.abs(p) > 1.0 + _ROUNDING, axis=(1, 2))  # a correlation above 1
+    p[indefinite] = 0.0  # LAPACK need not converge for numbers of any size
     try:  # much faster than eigenvalues, and enough where all is well
         np.linalg.cholesky(p + _ROUNDING * np.eye(9))
-        indefinite = np.zeros(len(p), dtype=bool)
     except np.linalg.LinAlgError:
-        indefinite = np.linalg.eigvalsh(p)[:, 0] < -_ROUNDING
-    bad: NDArray[np.intp] = np.flatnonzero(infinite | negative | asymmetric | indefinite)
+        indefinite |= np.linalg.eigvalsh(p)[:, 0] < -_ROUNDING
+    bad: NDArray[np.intp] = np.flatnonzero(infinite | negative | beyond | asymmetric | indefinite)
     if len(bad) == 0:
         return None, ""
     k = int(bad[0])
@@ -417,4 +421,12 @@ def _first_bad_covariance(p: Array, estimated: NDArray[np.bool_]) -> tuple[int |
     if negative[k]:
         j = int(np.nanargmin(variance[k]))
         return k, f"has a negative variance of {COMPONENTS[j]}: {variance[k, j]:g}"
+    if tiny[k].any():
+        j = int(np.flatnonzero(tiny[k])[0])
+        return (
+            k,
+            f"has a variance of {COMPONENTS[j]} of {float(variance[k, j])!r}: it should be 0 or at least {_LEAST:g}",
+        )
+    if beyond[k]:
+        return k, f"has an entry beyond {_MOST:g}"
     return k, "is not symmetric" if asymmetric[k] else "is not positive semi-definite"

@@ -6,7 +6,8 @@ status              meaning
 ``ok``              every step gave a valid estimate
 ``error``           the estimator raised an exception
 ``invalid-output``  not an `Estimate`, wrong shape or time, NaN or infinity in an estimated component, a covariance that
-                    is not symmetric or not positive semi-definite
+                    is not symmetric or not positive semi-definite, or holds numbers of such a size (a variance below
+                    1e-100 that is not 0, an entry above 1e100) that what follows from them overflows
 ``diverged``        finite, but horizontally more than `DIVERGENCE_LIMIT` from the truth
 ``out-of-memory``   the estimator raised MemoryError
 ``unsuitable``      an instrument is lacking that `Estimator.needs` names: no failure. To refuse a scenario that has all

@@ -18,7 +18,7 @@ from simnav.strapdown import sample_from_motion
 from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
 from simnav.world.sea import ROWS
 
-__all__ = ["PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "command", "initialise"]
+__all__ = ["DIVE", "PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "command", "initialise"]
 
 # Indices in the state vector.
 U, DU, R, DR, PSI, GAMMA, DGAMMA, DEPTH_CALM, NORTH, EAST = range(10)
@@ -37,6 +37,8 @@ WATER_NORTH, WATER_EAST = 54, 55
 # In a turn for a given time, where the rate is commanded and not the heading: the parts of both already turned.
 ERROR_HEADING, TO_TRACK, TURNED = 56, 57, 58
 STATE = 59
+#: Where the state holds the depth that is steered for, and the largest path angle.
+DIVE = np.array([DEPTH_REFERENCE, GAMMA_LIMIT])
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
 # ... and in the parameters.
 DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)

@@ -38,7 +38,10 @@ class _Mover(Protocol):
     @property
     def track(self) -> Array: ...
 
-    def trace(self, seconds: int) -> tuple[Array, Array]: ...
+    @property
+    def dive(self) -> Array: ...
+
+    def trace(self, seconds: int) -> tuple[Array, Array, Array]: ...
 
     def state(self) -> NavigationStates: ...
 
@@ -57,6 +60,8 @@ class PlannedTrack:
         Distances north and east of the start [m], heading [rad], speed through the water [m/s].
     position : (k, 3) array
         Latitude, longitude [rad] and height [m].
+    dives : (k, 2) array
+        Depth that is steered for [m], and largest path angle [rad].
     """
 
     #: Samples per second [Hz]: the lags of a vessel are exact at any rate.
@@ -68,15 +73,17 @@ class PlannedTrack:
         self._world = world
         self.points = world.track[None]
         self.position = world.state().position.copy()
+        self.dives = world.dive[None]
         self._at = 0
 
     def reach(self, time: float) -> None:
         """Extend the track up to a time [s]."""
         more = int(time) + 2 - len(self.points)
         if more > 0:
-            track, position = self._world.trace(more)
+            track, position, dives = self._world.trace(more)
             self.points = np.concatenate([self.points, track])
             self.position = np.concatenate([self.position, position])
+            self.dives = np.concatenate([self.dives, dives])
 
     def aside(self, north: float, east: float, time: float) -> tuple[float, float]:
         """The distance of a position to starboard of the track [m], and the planned speed there [m/s].

@@ -176,7 +176,7 @@ class World:
         state = self._x[None], self._index[None]
         return _ON, state, self._p[None], self.sizes[None], (rows, points), (phase, waves, eddies)
 
-    def trace(self, seconds: int) -> tuple[Array, Array]:
+    def trace(self, seconds: int) -> tuple[Array, Array, Array]:
         """Advance second by second, without the samples of instruments.
 
         Parameters
@@ -190,18 +190,21 @@ class World:
             The values of `track` at the end of each second.
         position : (seconds, 3) array
             Latitude, longitude [rad], height [m].
+        dive : (seconds, 2) array
+            The values of `dive`.
         """
         n = round(self.rate)
         room = np.empty((1, n, 3))
         none, states = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS))
         nowhere, imu = (np.empty((1, 0)), none, none, states), (np.array([n]), room, room.copy())
         arguments: Any = (*self._one(), nowhere, imu)
-        track, position = np.empty((seconds, 4)), np.empty((seconds, 3))
+        track, position, dive = np.empty((seconds, 4)), np.empty((seconds, 3)), np.empty((seconds, 2))
         for i in range(seconds):
             motion.advance(*arguments)
             track[i] = self._x[_TRACK]
             position[i] = self._x[motion.LATITUDE : motion.HEIGHT + 1]
-        return track, position
+            dive[i] = self._x[motion.DIVE]
+        return track, position, dive
 
     def share_state(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of this world, by the names of the arguments of `simnav.world.motion.advance`.
@@ -223,6 +226,12 @@ class World:
         """(4,) array: north and east of the start [m], heading [rad], speed through the water [m/s]."""
         track: Array = self._x[_TRACK]
         return track
+
+    @property
+    def dive(self) -> Array:
+        """(2,) array: depth that is steered for [m], and largest path angle [rad]."""
+        dive: Array = self._x[motion.DIVE]
+        return dive
 
     def advance(self, until: float, taps: Mapping[str, Array]) -> WorldBlock:
         """Advance to a time.

@@ -59,6 +59,12 @@ def test_a_profile_of_ones_own(tmp_path: Path):
     for text, says in (
         ("", r"tables \[\[part\]\]"),
         ('[[part]]\nscenarios = ["a"]\nruns = 0', "runs = 0 should be a number of seeds"),
+        (
+            '[[part]]\nscenarios = ["a"]\nruns = 1000000000000',
+            "runs = 1000000000000 should be a number of seeds, from 1",
+        ),
+        ('[[part]]\ntracks = ["a"]\nruns = 1\nlongest_s = "x"', "longest_s = 'x' should be a number of seconds"),
+        ('[[part]]\ntracks = ["a"]\nruns = 1\nshortest_s = nan', "shortest_s = nan should be a number of seconds"),
         ("[[part]]\nruns = 1", "name scenarios or tracks"),
         ('[[part]]\nscenario = ["a"]\nruns = 1', "'scenario' is no key of a part; did you mean 'scenarios'"),
         ('[[part]]\nscenarios = "a"\nruns = 1', "should be a list of names"),

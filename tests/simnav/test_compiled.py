@@ -158,6 +158,24 @@ def test_a_full_disk_does_not_stop_a_kernel(tmp_path: Path, monkeypatch: pytest.
     assert compiled.Kernel(thrice, "f8(f8)", False)(4.0) == 12.0
 
 
+def test_damaged_files_of_a_kernel_and_of_its_helper_end_no_process(tmp_path: Path) -> None:
+    """A bit that is wrong in the machine code, in each file in turn."""
+    source, cache = tmp_path / "source", tmp_path / "cache"
+    write(source)
+    assert run(source, cache) == (2.0, False)
+    files = [p.relative_to(cache) for p in cache.rglob("*.nb?")]
+    assert len(files) == 4  # index and code of both
+    for file in files:
+        content = bytearray((cache / file).read_bytes())
+        content[len(content) // 2] ^= 0xFF
+        (cache / file).write_bytes(content)
+        for other in files:
+            if other.parent != file.parent:  # a helper is read only where its caller is not in the cache
+                (cache / other).unlink()
+        assert run(source, cache)[0] == 2.0
+        assert (cache / file).read_bytes() != content
+
+
 def test_prune_keeps_what_is_in_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
     root = compiled.cache_directory()

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import subprocess
 import sys
 import tracemalloc
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -19,10 +22,23 @@ from simnav.spec import SpecError
 from tests.cases import ship
 
 TEXT = ship("a", 20.0)
+INSTRUMENTS = "[instruments.gnss]\n"
+ERRORS = "[initial_error]\n{}\n" + INSTRUMENTS
 
 CASES = {
     "speed": ("speed_m_s = 5.0", "speed_m_s = 1e11", "start.speed_m_s = 1e+11: should be at most 1000"),
     "subnormal": ("[3.0, 3.0, 5.0]", "[1e-310, 3.0, 5.0]", "instruments.gnss.sigma = 1e-310"),
+    "start": ("heading_deg = 45.0", "heading_deg = 1e-310", "start.heading = "),
+    "underflow": (INSTRUMENTS, ERRORS.format("velocity_m_s = [1e-170, 1, 1]"), "initial_error.velocity_m_s = [1e-170"),
+    "position": (INSTRUMENTS, ERRORS.format("position_m = [1, 1e-310, 1]"), "initial_error.position_m = [1, 1e-310"),
+    "factor": (INSTRUMENTS, ERRORS.format("times_told.velocity = inf"), "initial_error.times_told.velocity = inf"),
+    "large factor": (INSTRUMENTS, ERRORS.format("times_told.velocity = 1e300"), "should be at most 1e+06"),
+    "truth value": (INSTRUMENTS, ERRORS.format("times_told.velocity = true"), "times_told.velocity = True should be a"),
+    "number as text": (
+        INSTRUMENTS,
+        ERRORS.format("times_told.velocity = '3'"),
+        "times_told.velocity = '3' should be a",
+    ),
     "nested": ("speed_m_s = 5.0", f"speed_m_s = {'[' * 500}{']' * 500}", "speed_m_s"),
     "very nested": ("speed_m_s = 5.0", f"speed_m_s = {'[' * 5000}{']' * 5000}", "line 11, speed_m_s: lists or tables"),
     "digits": ("speed_m_s = 5.0", f"speed_m_s = {'9' * 5000}", "line 11, speed_m_s: a number has more digits"),
@@ -66,18 +82,38 @@ def loaded_anew() -> Kernel[[float], float]:
     return Kernel(twice, "f8(f8)", False)
 
 
-@pytest.mark.parametrize("damage", ["empty index", "truncated data"])
-def test_a_damaged_cache_is_compiled_again(damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def flipped(content: bytes, at: float) -> bytes:
+    """The content with one bit wrong, at a part of its length."""
+    place = int(at * (len(content) - 1))
+    return content[:place] + bytes([content[place] ^ 0x10]) + content[place + 1 :]
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda content: b"",
+    "truncated": lambda content: content[:100],
+    "longer": lambda content: content + b"0",
+    "zeros": lambda content: bytes(len(content)),
+    **{f"bit at {at:.0%}": functools.partial(flipped, at=at) for at in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)},
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_a_damaged_cache_is_compiled_again(
+    damage: str, suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
     first = loaded_anew()
     assert first(2.0) == 4.0
     directory = first.directory()
     assert directory is not None
-    (path,) = directory.glob("*/*.nbi" if damage == "empty index" else "*/*.nbc")
-    path.write_bytes(b"" if damage == "empty index" else path.read_bytes()[:100])
+    (path,) = directory.glob(f"*/*.{suffix}")
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
     with pytest.warns(UserWarning, match="the compiled kernel twice in .* is damaged .*; it is compiled again"):
         assert loaded_anew()(2.0) == 4.0
-    assert loaded_anew()(3.0) == 6.0  # and the cache is whole again
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert loaded_anew()(3.0) == 6.0  # and the cache is whole again
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell closes the stream")

@@ -42,6 +42,7 @@ from simnav.leaderboard.campaign.confinement.limits import (
     resident,
     use_huge_pages,
 )
+from simnav.leaderboard.results.scratch import scratch
 
 __all__ = ["COPY_FROM", "main"]
 
@@ -59,26 +60,28 @@ def main() -> None:
     become_reaper()
     keep_freed_memory()
     _load()
-    own = Path(tempfile.mkdtemp(prefix="simnav-estimator-"))
+    with scratch("estimator") as own:
+        _serve(control, own)
+
+
+def _serve(control: socket.socket, own: Path) -> None:
+    """Do what the worker asks for, until it is gone."""
     hidden: list[str] = []
     unreadable = Unreadable(hidden)
-    try:
-        control.sendall(json.dumps({"ready": True}).encode())
-        while True:
-            request, descriptors = _receive(control)
-            if request is None:
-                return
-            if "fork" in request:
-                if hidden != request["fork"]["hidden"]:
-                    hidden = request["fork"]["hidden"]
-                    unreadable = Unreadable(hidden)
-                _fork(control, request["fork"], descriptors, own, unreadable)
-            for name in request.get("import", ()):
-                if name in LIBRARIES:
-                    with contextlib.suppress(Exception):
-                        importlib.import_module(name)
-    finally:
-        shutil.rmtree(own, ignore_errors=True)
+    control.sendall(json.dumps({"ready": True}).encode())
+    while True:
+        request, descriptors = _receive(control)
+        if request is None:
+            return
+        if "fork" in request:
+            if hidden != request["fork"]["hidden"]:
+                hidden = request["fork"]["hidden"]
+                unreadable = Unreadable(hidden)
+            _fork(control, request["fork"], descriptors, own, unreadable)
+        for name in request.get("import", ()):
+            if name in LIBRARIES:
+                with contextlib.suppress(Exception):
+                    importlib.import_module(name)
 
 
 def _load() -> None:

@@ -11,6 +11,7 @@ from simnav.estimators.learning.guidance import GuidanceEnv, LineOfSight
 from simnav.geometry.earth import displace
 from simnav.scenario import load, parse
 from simnav.types import Estimate
+from simnav.world import World
 
 TOML = """
 name = "creek"
@@ -143,3 +144,46 @@ def test_bad_actions_and_logs_are_refused(scenario):
             env.step(action)
     with pytest.raises(ValueError, match="is a recorded log: its vessel cannot be steered"):
         GuidanceEnv(load("car-kitti"))
+
+
+DIVING = """
+[vessel]
+kind = "uuv"
+[[manoeuvre]]
+kind = "dive"
+depth_m = 12.0
+angle_deg = 20.0
+[[manoeuvre]]
+kind = "hold"
+duration_s = 20.0
+[[manoeuvre]]
+kind = "surface"
+"""
+
+
+@pytest.mark.parametrize(("haste", "tolerance"), [(0.0, 1.0), (-0.8, 5.0)])
+def test_the_vessel_dives_and_surfaces_where_it_is_planned(haste, tolerance):
+    """Also where the agent is slow: the depth belongs to the place and not to the time, by which it is 12 m off."""
+    text = TOML[: TOML.index("[vessel]")] + DIVING + TOML[TOML.index("[instruments.imu]") :]
+    env = GuidanceEnv(parse(text.replace("duration_s = 120.0", "duration_s = 240.0", 1)), reveal_truth=True)
+    env.reset(seed=4)
+    track = World.plan(env.scenario.start, env.scenario.vessel, env.scenario.manoeuvres)
+    track.reach(240.0)
+    assert -track.position[:, 2].min() == pytest.approx(12.0, abs=0.5)
+    depths, truncated = [], False
+    while not truncated:
+        _, _, _, truncated, info = env.step(np.array([0.0, haste], np.float32))
+        position = info["truth"][0]
+        nearest = int(np.argmin(np.abs(track.position[:, 0] - position[0])))
+        planned = -track.position[nearest, 2]
+        assert -position[2] == pytest.approx(planned, abs=tolerance)
+        depths.append(-position[2])
+    assert max(depths) == pytest.approx(12.0, abs=0.5)
+    assert depths[-1] == pytest.approx(0.0, abs=0.5)
+
+
+def test_the_glider_dives_in_its_task():
+    env = GuidanceEnv("glider-dive", reveal_truth=True, steps=400)
+    env.reset(seed=0)
+    deepest = min(env.step(np.zeros(2, np.float32))[4]["truth"][0, 2] for _ in range(400))
+    assert deepest < -25.0

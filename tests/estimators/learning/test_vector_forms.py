@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+import warnings
 from functools import partial
 
 import gymnasium
@@ -11,6 +13,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import simnav  # noqa: F401 (it registers)
 from simnav.environment import spawn_seeds
+from simnav.estimators.learning.pool import Pool
+from simnav.estimators.learning.voyage import prepare
 
 TASKS = ("Tuning", "Detection", "Correction", "Guidance")
 N, STEPS = 2, 3
@@ -137,3 +141,50 @@ def test_actions_out_of_bounds_are_clipped(task):
     one, other = envs[0].step(most)[:2], envs[1].step(7.0 * most)[:2]
     np.testing.assert_array_equal(one[0], other[0])
     assert one[1] == other[1]
+
+
+LONG = "simnav/CoastalVoyage-Tuning-v1"
+BANK = {"vectorization_mode": "vector_entry_point"}
+
+
+def test_the_memory_of_prepared_voyages_is_said_before_it_is_taken():
+    tracemalloc.start()
+    with pytest.raises(
+        ValueError, match=r"coastal-voyage-v1: a prepared voyage takes up to \d+ MB, and 65 of them do not"
+    ):
+        gymnasium.make_vec(LONG, 64, **BANK)
+    with pytest.raises(ValueError, match=r"and 30 of them do not fit into memory_gb = 2; .* or say memory_gb = 5.*"):
+        gymnasium.make_vec(LONG, 2, cache=30, memory_gb=2, **BANK)
+    with pytest.warns(UserWarning, match=r"so \d+ of 64 are kept in memory_gb = 4, .*; memory_gb = 1\d.\d keeps all"):
+        gymnasium.make_vec(LONG, 2, voyages=64, **BANK)
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gymnasium.make_vec(LONG, 2, voyages=64, memory_gb=11, **BANK)
+        gymnasium.make_vec(LONG, 64, steps=100, **BANK)
+
+
+def test_a_bank_with_little_memory_sails_the_same_voyages():
+    """Voyages that do not fit are prepared again when their turn comes."""
+    options = {"steps": 20, "voyages": 6}
+    everything = gymnasium.make_vec("simnav/GnssNoiseStep-Tuning-v1", 2, **options, **BANK)
+    each = Pool.cost(everything.options) / 1e9
+    with pytest.warns(UserWarning, match="so 3 of 6 are kept"):
+        few = gymnasium.make_vec("simnav/GnssNoiseStep-Tuning-v1", 2, **options, memory_gb=5.5 * each, **BANK)
+    for envs in (everything, few):
+        envs.action_space.seed(1)
+    np.testing.assert_array_equal(few.reset(seed=1)[0], everything.reset(seed=1)[0])
+    for _ in range(90):
+        action = everything.action_space.sample()
+        for mine, theirs in zip(few.step(action)[:4], everything.step(action)[:4], strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+
+
+def test_the_estimate_of_the_memory_is_an_upper_bound():
+    envs = gymnasium.make_vec("simnav/GnssNoiseStep-Tuning-v1", 2, **BANK)
+    options = envs.options
+    voyage = prepare(options.scenario, 3, options.layout.watched, oracle=False)
+    arrays = [*voyage.linear, voyage.edges, voyage.end, voyage.context, voyage.error, voyage.oracle, voyage.faulty]
+    taken = sum(array.nbytes for array in arrays)
+    assert taken < Pool.cost(options) < 4.0 * taken

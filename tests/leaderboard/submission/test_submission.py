@@ -201,6 +201,12 @@ def with_scores(folder: Path, change: Callable[[Scores], Scores]) -> None:
     pq.write_table(table.set_column(at, "scores", scores), part)
 
 
+def with_runs(folder: Path, count: int) -> None:
+    manifest = folder / "bundle.json"
+    told = json.loads(manifest.read_text())
+    manifest.write_text(json.dumps(told | {"runs": {"short-v1": count}}))
+
+
 def better_result(folder: Path) -> None:
     with_scores(folder, lambda row: [(k, 0.9 * v if k == "horizontal_rmse" else v) for k, v in row])
 
@@ -233,6 +239,8 @@ def without_the_worst(folder: Path) -> None:
         (lambda f: (f / "bundle.json").write_text("{"), False, "bundle.json is no JSON"),
         (lambda f: (f / "bundle.json").write_text('{"format": 9}'), False, "has format 9"),
         (lambda f: (f / "bundle.json").write_text('{"format": 1}'), False, "bundle.json: title: Field required"),
+        (lambda f: with_runs(f, 10**12), False, "runs.short-v1: Input should be less than or equal to 1000000"),
+        (lambda f: with_runs(f, 0), False, "runs.short-v1: Input should be greater than or equal to 1"),
         (lambda f: (f / "bundle.json").unlink(), False, "bundle.json is missing; 'simnav submit' makes one"),
     ],
 )  # fmt: skip

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from simnav.log.nmea import read_nmea
+from simnav.log.nmea import SENTENCES, read_nmea
 from simnav.log.table import LogError, LogWarning
 
 
@@ -179,3 +179,48 @@ def test_midnight_a_leap_second_and_sentences_of_ais(tmp_path):
         warnings.simplefilter("error")
         file = read_nmea(write(tmp_path / "log", "!AIVDM,1,1,,A,13u?etPv2;0n:dDPwUM1U1Cb069D,0*24", *lines))
     np.testing.assert_allclose(np.diff(file.table("GGA").columns["sentence"]), [1.0, 1.0])
+
+
+#: A good sentence of each type: what follows its name, and its name is a key of `SENTENCES`.
+GOOD = {
+    "GGA": "000000.25,2230.0000,S,01745.6000,W,1,06,1.3,033.6,M,-002.6,M,,",
+    "GLL": "2230.0000,S,01745.6000,W,000000.25,A,A",
+    "RMC": "000000.25,A,2230.0000,S,01745.6000,W,10.0,210.0,010814,,,A",
+    "ZDA": "000000.25,01,08,2014,00,00",
+    "VTG": "210.0,T,,M,010.0,N,,K,A",
+    "HDT": "218.53,T",
+    "THS": "218.53,A",
+    "VHW": "90.0,T,,M,12.0,N,,K",
+    "VBW": "12.0,0.5,A,11.0,0.4,A",
+    "DPT": "20.5,1.2",
+    "PSXN,23": "0.35,-1.74,218.26,0.58",
+    "PUHAW,UVH": "-5.0,0.0,270.0",
+}
+#: What Python reads as a number, or fails on, and no instrument sends.
+STRANGE = ("inf", "-inf", "Infinity", "nan", "1e400", "1e5", "1_0", "\xb2", "0x10", "9" * 5000, "--1", ".")
+
+
+def test_there_is_a_good_sentence_of_each_type():
+    assert set(GOOD) == set(SENTENCES)
+
+
+@pytest.mark.parametrize("sentence", SENTENCES)
+def test_no_strange_number_is_taken_or_stops_the_reading(tmp_path, sentence):
+    """In each field in turn: the line is left out, or the field is one that nobody reads."""
+    name = sentence if sentence.startswith("P") else f"GP{sentence}"
+    good = GOOD[sentence].split(",")
+    path = write(tmp_path / "good", f"${name},{','.join(good)}")
+    expected = {k: v[0] for k, v in read_nmea(path).table(sentence).columns.items()}
+    refused = 0
+    for i in range(len(good)):
+        for k, strange in enumerate(STRANGE):
+            fields = [*good[:i], strange, *good[i + 1 :]]
+            path = write(tmp_path / f"{i}-{k}", f"${name},{','.join(good)}", f"${name},{','.join(fields)}")
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                table = read_nmea(path).table(sentence)
+            if len(table) == 1:
+                refused += bool(said)
+            for column, values in table.columns.items():
+                assert values[-1] == pytest.approx(expected[column], nan_ok=True), (column, strange)
+    assert refused >= len(STRANGE)  # at least one field of each type is a number

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 
+from simnav.scoring.consistency import nees
 from simnav.trial.log import DivergedError, TrialLog
 from simnav.trial.wire import EstimateEncoder, InvalidOutputError
 from simnav.types import Estimate, NavigationStates
@@ -103,6 +105,41 @@ def estimates(rng: np.random.Generator, truth: NavigationStates) -> list[Estimat
             BAD[int(rng.integers(len(BAD)))](estimate, rng)
         found.append(estimate)
     return found
+
+
+@pytest.mark.parametrize(
+    ("variances", "beside", "reason"),
+    [
+        ([5e-324, 1.0], 0.0, "has a variance of north of 5e-324: it should be 0 or at least 1e-100"),
+        ([5e-324, 5e-324], 1e-5, "has a variance of north of 5e-324: it should be 0 or at least 1e-100"),
+        ([1.0, 1e-310], 0.0, "has a variance of east of 1e-310: it should be 0 or at least 1e-100"),
+        ([1.7e308, 1.0], 0.0, "has an entry beyond 1e+100"),
+        ([1.0, 1.0], 1e300, "has an entry beyond 1e+100"),
+        ([1e-100, 1e-100], 1e100, "is not positive semi-definite"),
+        ([1.0, 0.0], 0.5, "is not positive semi-definite"),
+        ([1e-100, 0.0], 0.0, ""),
+        ([1e100, 1e-100], 0.9, ""),
+    ],
+)
+def test_no_covariance_is_beyond_what_can_be_computed_with(
+    truth: NavigationStates, variances: list[float], beside: float, reason: str
+) -> None:
+    covariance = np.eye(9)
+    covariance[[0, 1], [0, 1]] = variances
+    covariance[0, 1] = covariance[1, 0] = beside
+    log, encode = TrialLog(truth, True), EstimateEncoder()
+    estimate = Estimate(
+        time=float(truth.time[0]), position=truth.position[0], velocity=truth.velocity[0], attitude=truth.attitude[0],
+        covariance=covariance,
+    )  # fmt: skip
+    log.add(encode(estimate), 0.0)
+    if reason:
+        with pytest.raises(InvalidOutputError, match=re.escape(reason)):
+            log.check_covariances()
+    else:
+        log.check_covariances()
+        values, _ = nees(np.full((1, 9), 3.0), covariance[None], (0, 1))
+        assert values[0] > 0.0
 
 
 def outcome(log: TrialLog, answers: list[bytes], cuts: list[int] | None) -> tuple[Any, ...]:

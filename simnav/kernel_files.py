@@ -1,0 +1,88 @@
+"""The files of the cache of kernels, each with a checksum, so that a damaged file is never executed.
+
+Numba writes two files for each kernel, an index and the machine code. It reads them without a check, and damaged
+machine code may end the process. Here each file ends with its SHA-256 digest. A file whose digest is wrong is removed,
+with a warning, and the kernel is compiled again.
+
+This module imports Numba; `simnav.compiled` imports it when the first kernel is compiled.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from numba.core import typeinfer
+from numba.core.caching import IndexDataCacheFile
+
+__all__ = ["WithDigests", "compile_with"]
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+_Files: Any = IndexDataCacheFile  # Numba has no annotations
+
+
+class WithDigests(_Files):  # type: ignore[misc]
+    """Index and data file of a kernel, with their digests at the end. Pickle does not read what follows an object."""
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[BinaryIO]:
+        content = io.BytesIO()
+        yield content
+        with super()._open_for_write(filepath) as file:
+            file.write(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
+
+    def _load_index(self) -> dict[Any, str]:
+        found: dict[Any, str] = super()._load_index() if self._is_whole(self._index_path) else {}
+        return found
+
+    def _load_data(self, name: str) -> Any:
+        if not self._is_whole(self._data_path(name)):
+            raise FileNotFoundError(self._data_path(name))  # it is then compiled, as any kernel without a file
+        return super()._load_data(name)
+
+    def _is_whole(self, path: str) -> bool:
+        """Whether a file is there and has the digest that it should have; a damaged one is removed."""
+        try:
+            content = Path(path).read_bytes()
+        except FileNotFoundError:
+            return False
+        if hashlib.sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]:
+            return True
+        name = os.path.basename(path)
+        warnings.warn(
+            f"the compiled kernel {name.partition('-')[0].rpartition('.')[2]} in {os.path.dirname(path)} is damaged "
+            f"({name} does not have the digest that it was written with); it is compiled again",
+            stacklevel=2,
+        )
+        with contextlib.suppress(OSError):  # of a cache that cannot be written to
+            os.unlink(path)
+        return False
+
+
+def compile_with(dispatcher: Any, signature: str | None) -> None:
+    """Compile a dispatcher of Numba for a signature, or load it, with files that have digests if it has a cache.
+
+    Parameters
+    ----------
+    dispatcher : numba.core.dispatcher.Dispatcher
+        A function decorated by `numba.jit` without a signature.
+    signature : str or None
+        Numba signature. None: Numba compiles the function later, for each caller.
+    """
+    cache = getattr(dispatcher, "_cache", None)
+    if cache is None:  # NUMBA_DISABLE_JIT: it is the plain function
+        return
+    if hasattr(cache, "_cache_file"):
+        cache._cache_file.__class__ = WithDigests  # Numba has no public way to choose the class
+    if signature is not None:
+        with typeinfer.register_dispatcher(dispatcher):  # as `numba.jit` with a signature does
+            dispatcher.compile(signature)
+        dispatcher.disable_compile()
