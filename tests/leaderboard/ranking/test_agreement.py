@@ -7,7 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
-from simnav.leaderboard.ranking.agreement import correlation_table, rank_correlations
+from simnav.leaderboard.ranking.agreement import LEADING, correlation_table, rank_correlations
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results.result import Result
 
@@ -56,3 +56,13 @@ def test_a_few_rows_say_nothing():
 def test_tracks_of_one_board_are_compared_once():
     first = board("one-v1", {n: float(k + 1) for k, n in enumerate(NAMES)})
     assert rank_correlations(first, first) == []
+
+
+def test_the_leading_rows_have_a_correlation_of_their_own():
+    """Thirty rows; both boards agree on who is good, and are opposite within the first twenty."""
+    names = [f"row-{k:02d}" for k in range(30)]
+    first = board("one-v1", {n: float(k + 1) for k, n in enumerate(names)})
+    second = board("two-v1", {n: float(20 - k if k < 20 else k + 1) for k, n in enumerate(names)})
+    (found,) = rank_correlations(first, second)
+    assert (found.leading, found.leading_value) == (LEADING, pytest.approx(-1.0))
+    assert found.value > 0.0
