@@ -134,6 +134,6 @@ def standing_table(stand: Standing) -> tables.Fitted:
         dim=[i for i, r in enumerate(stand.rows) if r.reference],
         strong=[i for i, r in enumerate(stand.rows) if r.estimator == mine],
         caption=f"Median over the seeds{with_interval}. Ratio: geometric mean over the same seeds; below 1 "
-        "the estimator is better; a run that only one of the two failed counts 1000. p: sign-flip test. "
+        "the estimator is better; a run that only one of the two failed counts 1000. p: studentised bootstrap. "
         "Intervals need 6 seeds. * reference: told the truth.",
     )

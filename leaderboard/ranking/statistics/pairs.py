@@ -27,7 +27,7 @@ class Comparison:
     better : float
         Share of the pairs in which a is below b (ties count half).
     p_value : float
-        Two-sided, of the sign-flip test of the mean log ratio.
+        Two-sided, of the mean log ratio, as `simnav.leaderboard.ranking.statistics.separate` computes it.
     """
 
     pairs: int

@@ -29,38 +29,50 @@
     return found;
   };
 
+  /** The mean of a sample, and the sum of the squares of its residuals. */
+  const moments = (x) => {
+    const centre = mean(x);
+    return [centre, x.reduce((sum, v) => sum + (v - centre) ** 2, 0)];
+  };
+  const FEWEST = 6, RELEVANT = Math.log(1.001), LEAST_VARIANCE = 0.01, FEWEST_VISIBLE = 2;
+
   /**
-   * Two-sided p-value of the mean over the groups of the mean difference, by random flips of the signs.
-   *
-   * Where the rows do not differ, each difference is as likely as its negative. All flips are taken where there are few
-   * runs; otherwise 4999, and the flip that was observed counts too, so that the p-value is never zero.
+   * Two-sided p-value of the mean over the scenarios of the mean difference, by a studentised bootstrap of the runs of a
+   * seed together. As on the board, the difference has to hold with one more run that is unlucky for the better row, and
+   * a difference of less than 0.1 % is none. Null with fewer than six seeds, because then nothing is significant.
    */
-  simnav.signflips = (groups, weights = groups.map(() => 1), flips = 4999) => {
-    const values = [], factors = [], total = weights.reduce((a, b) => a + b, 0);
-    groups.forEach((group, k) => group.forEach((d) => { values.push(d); factors.push(weights[k] / total / group.length); }));
-    const terms = values.map((v, i) => v * factors[i]), n = terms.length;
-    if (!n) return null;
-    const observed = Math.abs(terms.reduce((a, b) => a + b, 0)) * (1 - 1e-12);
-    let beyond = 0;
-    if (n <= 13) {
-      for (let mask = 0; mask < 2 ** n; mask++) {
-        let sum = 0;
-        for (let i = 0; i < n; i++) sum += mask & (1 << i) ? terms[i] : -terms[i];
-        if (Math.abs(sum) >= observed) beyond++;
-      }
-      return beyond / 2 ** n;
+  simnav.pvalue = (scenarios, draws = 4999) => {
+    const shares = new Map();
+    for (const { runs } of scenarios) {
+      for (const { run, difference } of runs) shares.set(run, (shares.get(run) || 0) + difference / (scenarios.length * runs.length));
     }
+    const n = shares.size, values = [...shares.values()].map((v) => v * n);
+    if (n < FEWEST) return null;
+    const [centre, square] = moments(values), residuals = values.map((v) => v - centre);
+    const distance = Math.max(Math.abs(centre) - RELEVANT, 0), least = 0.5 ** (n - 1);
+    if (distance === 0) return 1;
+    const largest = Math.max(...residuals.map(Math.abs));
+    const visible = square ** 2 >= FEWEST_VISIBLE * residuals.reduce((sum, r) => sum + r ** 4, 0);
+    const unlucky = visible ? 0.5 * largest : largest; // of two rows, each has half of the difference
+    const studentised = (d, sum, count) => d * Math.sqrt((count * (count - 1)) / sum);
+    const more = Math.max((n * distance - unlucky) / (n + 1), 0);
+    const observed = Math.min(
+      studentised(distance, square, n),
+      studentised(more, square + ((distance + unlucky) ** 2 * n) / (n + 1), n + 1),
+    );
     const random = bits(20250101);
-    for (let k = 0; k < flips; k++) {
-      let sum = 0, word = 0;
+    let beyond = 1; // what was observed counts, so that the p-value is never zero
+    for (let k = 0; k < draws; k++) {
+      let sum = 0, squares = 0;
       for (let i = 0; i < n; i++) {
-        if (i % 32 === 0) word = random();
-        sum += word & 1 ? terms[i] : -terms[i];
-        word >>>= 1;
+        const r = residuals[Math.floor((random() / 2 ** 32) * n)];
+        sum += r;
+        squares += r * r;
       }
-      if (Math.abs(sum) >= observed) beyond++;
+      const variance = Math.max(squares / n - (sum / n) ** 2, (LEAST_VARIANCE * square) / n);
+      if (variance > 0 && Math.abs(sum / n) * Math.sqrt((n - 1) / variance) >= observed * (1 - 1e-9)) beyond++;
     }
-    return (beyond + 1) / (flips + 1);
+    return Math.max(beyond / (draws + 1), least);
   };
 
   /** What a comparison says, by scenario and over all. */
@@ -70,14 +82,14 @@
       const differences = runs.map((r) => r.difference);
       return {
         scenario, runs: runs.length, wins: runs.filter((r) => r.difference < 0).length / runs.length,
-        ratio: Math.exp(mean(differences)), p: simnav.signflips([differences]), differences, list: runs,
+        ratio: Math.exp(mean(differences)), p: simnav.pvalue([{ runs }]), differences, list: runs,
       };
     });
     const overall = rows.length && {
       runs: rows.reduce((s, r) => s + r.runs, 0),
       ratio: Math.exp(mean(rows.map((r) => Math.log(r.ratio)))),
       better: rows.filter((r) => r.ratio < 1).length,
-      p: simnav.signflips(rows.map((r) => r.differences)),
+      p: simnav.pvalue(pairs),
     };
     return { rows, overall };
   };

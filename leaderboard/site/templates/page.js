@@ -181,7 +181,7 @@
       { key: "name", title: "Scenario", help: "The name leads to the page of the scenario.", kind: "name", fixed: true },
       { key: "ratio", title: `Error of ${a} / ${b}`, help: `Geometric mean over the runs of the error of ${a} divided by that of ${b}. Below 1, ${a} is better.`, kind: "number" },
       { key: "wins", title: "Runs won", help: `Share of the runs in which the error of ${a} is the smaller one.`, kind: "percent", descending: true },
-      { key: "p", title: "p-value", help: "Two-sided, by sign flips of the paired differences of the log error.", kind: "p" },
+      { key: "p", title: "p-value", help: "Two-sided, by a studentised bootstrap of the paired differences of the log error. Six runs or more are needed.", kind: "p" },
       { key: "runs", title: "Runs", help: "Runs that both have.", kind: "integer" },
       { key: "verdict", title: "Verdict", help: "At the 5 % level, without correction for the number of scenarios.", kind: "badge", filter: true },
     ],

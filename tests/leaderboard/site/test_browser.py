@@ -8,13 +8,14 @@ import math
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.statistics import separate
 from simnav.leaderboard.site import site
 
 playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
@@ -167,7 +168,7 @@ def test_tabs_are_chosen_by_keyboard_and_link(visit):
 
 def test_headings_and_charts_explain_themselves_on_hover(visit, catalogued):
     page = visit.open("index.html#track=other")
-    page.hover("#track-other [data-table] th[data-key=tier] button")
+    page.hover("#track-other [data-table] th[data-key=ranks] button")
     assert "cannot be told apart" in page.inner_text("#tip")
     page.mouse.move(0, 0)
     page.focus("#track-other [data-table] th[data-key=coverage] button")
@@ -271,26 +272,26 @@ def test_two_rows_are_compared_run_by_run(visit, results):
         n = len(differences)
         assert rows[scenario][0] == pytest.approx(math.exp(sum(differences) / n), rel=1e-3)
         assert rows[scenario][2] == pytest.approx(sum(d < 0 for d in differences) / n)
-        observed = abs(sum(differences)) * (1 - 1e-4)
-        flips = [abs(sum(s * d for s, d in zip(signs, differences))) for signs in product((-1, 1), repeat=n)]
-        assert rows[scenario][1] == pytest.approx(sum(f >= observed for f in flips) / len(flips), abs=2e-3)
+        values = np.column_stack([differences, np.zeros(n)])
+        assert rows[scenario][1] == pytest.approx(separate(values).p_values[0, 1], abs=0.02)
     page.click("text=Swap")
     page.wait_for_function("document.querySelector('[data-verdict]').textContent.includes('of ekf is')")
     assert "larger" in page.inner_text("[data-verdict]")
     assert "a=ekf" in page.url
 
 
-def test_random_sign_flips_agree_with_all_of_them(visit):
-    """Where there are more runs than all flips can be taken of."""
+def test_p_values_in_the_browser_are_those_of_the_board(visit):
     page = visit.open("compare.html")
-    few, many = page.evaluate(
-        """() => {
-          const x = [0.3, -0.1, 0.25, 0.4, -0.2, 0.15, 0.05, 0.3, -0.05, 0.2, 0.1, 0.15, 0.35];
-          return [simnav.signflips([x]), simnav.signflips([[...x, 1e-9]])];
-        }"""
-    )
-    assert 0.0 < few < 0.05
-    assert many == pytest.approx(few, abs=0.008)
+    rng = np.random.default_rng(3)
+    for centre, scenarios in ((0.0, 1), (0.1, 1), (0.25, 1), (0.08, 3)):
+        x = rng.normal(centre, 0.3, (scenarios, 24))
+        given = [{"runs": [{"run": k, "difference": d} for k, d in enumerate(row.tolist())]} for row in x]
+        found = page.evaluate("(given) => simnav.pvalue(given)", given)
+        strata, seeds = np.repeat(np.arange(scenarios), 24), np.tile(np.arange(24), scenarios)
+        board = separate(np.column_stack([x.ravel(), np.zeros(x.size)]), strata, seeds)
+        assert found == pytest.approx(board.p_values[0, 1], abs=0.03)
+    few = [{"runs": [{"run": k, "difference": 1.0} for k in range(5)]}]
+    assert page.evaluate("(given) => simnav.pvalue(given)", few) is None
 
 
 def test_weights_of_scenarios_move_the_places(visit):
