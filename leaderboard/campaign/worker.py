@@ -20,6 +20,7 @@ from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store, trials
+from simnav.leaderboard.results.errors import named, printable
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 
@@ -31,6 +32,7 @@ __all__ = ["Unit", "run_unit", "start_worker"]
 
 _prepared = False
 _PATIENCE = 5.0  # for a result that is being stored when the worker must end [s]
+_REASON = 2000  # characters of a reason
 _results = threading.Lock()  # held while a result is stored, and for good by who ends the worker
 
 
@@ -94,7 +96,7 @@ class Unit:
             parameters=dict(entrant.parameters),
             reference=entrant.reference,
             status=status,
-            reason=reason,
+            reason=printable(" ".join(reason[:_REASON].split())),
             scores={},
             key=key,
             recording=self.recording,
@@ -204,13 +206,17 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
     try:
         scores = score(trial, recording) if len(trial) else {}
         curves = series(trial, recording) if len(trial) else {}
+        with np.errstate(over="ignore"):
+            kept = {_text(name): np.asarray(values, dtype=np.float32) for name, values in curves.items()}
+        if unit.keep_trials and len(trial):
+            trials.write(unit.folder, key, trial, recording, covariance_interval=unit.covariance_interval)
+    except store.StoreError:
+        raise  # of the disk
     except Exception as error:
-        return replace(blank, status="error", reason=f"it cannot be scored: {type(error).__name__}: {error}")
-    if unit.keep_trials and len(trial):
-        trials.write(unit.folder, key, trial, recording, covariance_interval=unit.covariance_interval)
-    return replace(
-        blank,
-        scores=scores,
-        scoring=unit.scoring if scores else blank.scoring,
-        series={name: np.asarray(values, dtype=np.float32) for name, values in curves.items()},
-    )
+        return replace(blank, status="error", reason=f"it cannot be scored: {printable(named(error))}")
+    return replace(blank, scores=scores, scoring=unit.scoring if scores else blank.scoring, series=kept)
+
+
+def _text(name: str) -> str:
+    """A name of a diagnostic as it can be written to a file."""
+    return name.encode(errors="backslashreplace").decode()
