@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare, try_estimator
+from simnav.leaderboard.campaign.confinement.attempt import Attempt, close_server, prepare, try_estimator
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.own_scores import OwnScores
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
 
-__all__ = ["Unit", "run_unit", "start_worker"]
+__all__ = ["Unit", "judged", "run_unit", "start_worker"]
 
 _prepared = False
 _PATIENCE = 5.0  # for a result that is being stored when the worker must end [s]
@@ -180,20 +180,39 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     if recording is not None:
         for entrant, key in unit.entrants:
             result = _try(unit, entrant, key, recording)
-            _store(unit.folder, result)
+            try:
+                _store(unit.folder, result)
+            except store.StoreError:
+                raise  # of the disk
+            except Exception as error:  # of what it answered
+                result = unit.result(entrant, key, "error", f"its result cannot be stored: {named(error)}")
+                _store(unit.folder, result)
             statuses[result.status] += 1
     return index, statuses
 
 
 def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result:
     """One estimator on one recording."""
+    hidden = unit.seal.unreadable(unit.folder)
+    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
+    return judged(unit, entrant, key, recording, made)
+
+
+def judged(unit: Unit, entrant: Entrant, key: str, recording: Recording, made: Attempt) -> Result:
+    """The result of an attempt, with its scores; the trial is kept where that is wanted.
+
+    Raises
+    ------
+    StoreError
+        If the trial cannot be kept, because of the disk. What the estimator answered raises nothing.
+    """
     import numpy as np
 
     from simnav.scoring import score, series
 
-    hidden = unit.seal.unreadable(unit.folder)
-    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
     trial = made.trial
+    if trial is not None:
+        trial = replace(trial, diagnostics={_text(name): values for name, values in trial.diagnostics.items()})
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),
         note=recording.note,
@@ -207,7 +226,7 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
         scores = score(trial, recording) if len(trial) else {}
         curves = series(trial, recording) if len(trial) else {}
         with np.errstate(over="ignore"):
-            kept = {_text(name): np.asarray(values, dtype=np.float32) for name, values in curves.items()}
+            kept = {name: np.asarray(values, dtype=np.float32) for name, values in curves.items()}
         if unit.keep_trials and len(trial):
             trials.write(unit.folder, key, trial, recording, covariance_interval=unit.covariance_interval)
     except store.StoreError:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 __all__ = ["MemoryGroup"]
 
+_PREFIX = "simnav-"
 _SLACK = 64 << 20  # for what the kernel keeps for the processes: page tables and the like [bytes]
 
 
@@ -33,7 +34,8 @@ class MemoryGroup:
         self._limit, self._kills = "", ""
         for parent, limit, kills in _candidates():
             with contextlib.suppress(OSError):
-                folder = Path(tempfile.mkdtemp(prefix="simnav-", dir=parent))
+                _sweep(parent)
+                folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))
                 self._folder, self._limit, self._kills = folder, limit, kills
                 try:
                     (folder / limit).read_text()
@@ -76,6 +78,15 @@ class MemoryGroup:
                 return
             except OSError:
                 time.sleep(0.01)
+
+
+def _sweep(parent: Path) -> None:
+    """Remove the empty groups of processes that were killed."""
+    for folder in parent.glob(f"{_PREFIX}*-*"):
+        owner = folder.name.removeprefix(_PREFIX).partition("-")[0]
+        if not Path(f"/proc/{owner}").exists():
+            with contextlib.suppress(OSError):
+                folder.rmdir()
 
 
 def _candidates() -> list[tuple[Path, str, str]]:
