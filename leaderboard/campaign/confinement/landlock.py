@@ -106,27 +106,32 @@ class Unreadable:
     def __init__(self, hidden: Iterable[str]):
         self._hidden = {os.path.realpath(path) for path in (*hidden, *_STATE)}
         self._way = {parent for path in self._hidden for parent in _parents(path)}
-        self._ruleset, self._seen = -1, dict[str, int]()
+        self._ruleset, self._seen, self._found = -1, dict[str, int](), dict[str, int]()
 
     def prepare(self) -> None:
-        """Note what can be read; done again where a folder on the way has changed, so that new files count."""
+        """Note what can be read; for a folder on the way that has changed, again, so that new files count."""
         if not available():
             return
-        seen = {folder: os.stat(folder).st_mtime_ns for folder in self._way if os.path.isdir(folder)}
-        if self._ruleset >= 0:
-            if seen == self._seen:
-                return
+        hidden = {path: os.stat(path).st_ino for path in self._hidden if os.path.exists(path)}
+        if self._ruleset >= 0 and hidden != self._found:  # one may be what could be read before, under another name
             os.close(self._ruleset)
-        self._seen, self._ruleset = seen, _ruleset(_READ_FILE)
+            self._ruleset, self._seen = -1, {}
+        if self._ruleset < 0:
+            self._found, self._ruleset = hidden, _ruleset(_READ_FILE)
+            for path in _HARMLESS:
+                _allow(self._ruleset, path, _READ_FILE)
         if self._ruleset < 0:
             return
         for folder in self._way:
-            with contextlib.suppress(OSError), os.scandir(folder) as entries:
-                for entry in entries:  # what a link leads to counts where it lies
-                    if entry.path not in self._hidden and entry.path not in self._way and not entry.is_symlink():
-                        _allow(self._ruleset, entry.path, _READ_FILE)
-        for path in _HARMLESS:
-            _allow(self._ruleset, path, _READ_FILE)
+            with contextlib.suppress(OSError):
+                changed = os.stat(folder).st_mtime_ns
+                if self._seen.get(folder) == changed:
+                    continue
+                with os.scandir(folder) as entries:
+                    for entry in entries:  # what a link leads to counts where it lies
+                        if entry.path not in self._hidden and entry.path not in self._way and not entry.is_symlink():
+                            _allow(self._ruleset, entry.path, _READ_FILE)
+                self._seen[folder] = changed
 
     def enforce(self) -> bool:
         """Give the rest up; whether that is in force."""
