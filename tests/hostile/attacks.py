@@ -156,14 +156,14 @@ VANDALS: dict[str, tuple[str, set[str]]] = {
     "takes-rights": ("_close_all({folder!r})", {"ok"}),
     "leaves-deep-folders": ("_deep(1500)", {"ok"}),
     "steals-its-answer": ("_steal()", {"timeout", "invalid-output", "error"}),
-    "children-take-memory": ("_fork_each(4, lambda: np.ones(15 << 20))", {"out-of-memory"}),
+    "children-take-memory": ("_fork_each(4, lambda: np.ones(15 << 20))", {"out-of-memory", "timeout"}),
     "many-processes": ("_fork_each(700, int)", {"error", "timeout"}),
     "large-file": (
         "file = open(os.path.join(tempfile.gettempdir(), 'x'), 'wb'); [file.write(bytes(1 << 20)) for _ in range(400)]",
-        {"error"}),
+        {"error", "out-of-memory", "timeout"}),
     "many-files": (
         "files = [tempfile.TemporaryFile() for _ in range(4)]\n            "
-        "[f.write(bytes(1 << 20)) for f in files for _ in range(120)]; time.sleep(600)", {"out-of-memory"}),
+        "[f.write(bytes(1 << 20)) for f in files for _ in range(120)]; time.sleep(600)", {"out-of-memory", "timeout"}),
     "memory-file": ("fd = os.memfd_create('x'); os.truncate(fd, 1 << 30); [os.write(fd, bytes(1 << 20)) for _ in "
                     "range(400)]", {"error"}),
     "shared-memory": ("self.m = mmap.mmap(-1, 400 << 20); [self.m.write(bytes(1 << 20)) for _ in range(400)]; "
