@@ -13,13 +13,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.campaign.confinement.attempt import close_server, prepare, try_estimator
+from simnav.leaderboard.campaign.confinement.attempt import Attempt, close_server, prepare, try_estimator
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.own_scores import OwnScores
 from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store, trials
+from simnav.leaderboard.results.errors import named, printable
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 
@@ -27,10 +28,11 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
 
-__all__ = ["Unit", "run_unit", "start_worker"]
+__all__ = ["Unit", "judged", "run_unit", "start_worker"]
 
 _prepared = False
 _PATIENCE = 5.0  # for a result that is being stored when the worker must end [s]
+_REASON = 2000  # characters of a reason
 _results = threading.Lock()  # held while a result is stored, and for good by who ends the worker
 
 
@@ -94,7 +96,7 @@ class Unit:
             parameters=dict(entrant.parameters),
             reference=entrant.reference,
             status=status,
-            reason=reason,
+            reason=printable(" ".join(reason[:_REASON].split())),
             scores={},
             key=key,
             recording=self.recording,
@@ -178,20 +180,39 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     if recording is not None:
         for entrant, key in unit.entrants:
             result = _try(unit, entrant, key, recording)
-            _store(unit.folder, result)
+            try:
+                _store(unit.folder, result)
+            except store.StoreError:
+                raise  # of the disk
+            except Exception as error:  # of what it answered
+                result = unit.result(entrant, key, "error", f"its result cannot be stored: {named(error)}")
+                _store(unit.folder, result)
             statuses[result.status] += 1
     return index, statuses
 
 
 def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result:
     """One estimator on one recording."""
+    hidden = unit.seal.unreadable(unit.folder)
+    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
+    return judged(unit, entrant, key, recording, made)
+
+
+def judged(unit: Unit, entrant: Entrant, key: str, recording: Recording, made: Attempt) -> Result:
+    """The result of an attempt, with its scores; the trial is kept where that is wanted.
+
+    Raises
+    ------
+    StoreError
+        If the trial cannot be kept, because of the disk. What the estimator answered raises nothing.
+    """
     import numpy as np
 
     from simnav.scoring import score, series
 
-    hidden = unit.seal.unreadable(unit.folder)
-    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
     trial = made.trial
+    if trial is not None:
+        trial = replace(trial, diagnostics={_text(name): values for name, values in trial.diagnostics.items()})
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),
         note=recording.note,
@@ -204,13 +225,17 @@ def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result
     try:
         scores = score(trial, recording) if len(trial) else {}
         curves = series(trial, recording) if len(trial) else {}
+        with np.errstate(over="ignore"):
+            kept = {name: np.asarray(values, dtype=np.float32) for name, values in curves.items()}
+        if unit.keep_trials and len(trial):
+            trials.write(unit.folder, key, trial, recording, covariance_interval=unit.covariance_interval)
+    except store.StoreError:
+        raise  # of the disk
     except Exception as error:
-        return replace(blank, status="error", reason=f"it cannot be scored: {type(error).__name__}: {error}")
-    if unit.keep_trials and len(trial):
-        trials.write(unit.folder, key, trial, recording, covariance_interval=unit.covariance_interval)
-    return replace(
-        blank,
-        scores=scores,
-        scoring=unit.scoring if scores else blank.scoring,
-        series={name: np.asarray(values, dtype=np.float32) for name, values in curves.items()},
-    )
+        return replace(blank, status="error", reason=f"it cannot be scored: {printable(named(error))}")
+    return replace(blank, scores=scores, scoring=unit.scoring if scores else blank.scoring, series=kept)
+
+
+def _text(name: str) -> str:
+    """A name of a diagnostic as it can be written to a file."""
+    return name.encode(errors="backslashreplace").decode()

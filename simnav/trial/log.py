@@ -45,6 +45,8 @@ _COVARIANCE = 648
 _FORM = 16  # bytes of the header of an answer that tell its form: all but the time
 _FIRST = ANSWER.size // 8  # where the numbers of an answer begin, in float64; the time is before them
 _HELD = 100  # bytes that are counted for keeping the diagnostics and flags of a step, beside what they take
+_ADDRESSABLE = 1 << 46  # bytes of all diagnostics, where there is no limit
+_DIMENSIONS = 16  # of a diagnostic, at most
 _VECTORS = [struct.Struct(f"{3 * n}d") for n in range(4)]  # numbers of so many vectors
 
 
@@ -62,7 +64,7 @@ class TrialLog:
     keep_covariance : bool
         False: covariances are checked but not kept, which saves 648 bytes an epoch.
     limit : float
-        Largest memory of diagnostics and flags together [bytes].
+        Largest memory of diagnostics and flags together, as they arrive and as arrays of the trial [bytes].
 
     Attributes
     ----------
@@ -86,7 +88,8 @@ class TrialLog:
         self._estimated = np.zeros(steps, dtype=np.uint16)
         self._shapes: list[list[tuple[str, tuple[int, ...]]]] = [[]]  # of diagnostics
         self._sizes = [0]  # of each shape [bytes]
-        self._dimensions: dict[str, int] = {}
+        self._largest: dict[str, tuple[int, ...]] = {}  # of each diagnostic, in each dimension
+        self._collected_size = 0  # bytes of the arrays of the trial, if every step had all that is known
         self._diagnostics: list[list[tuple[int, int, bytes]]] = [[]]  # by shape: first step, how many, numbers
         self._flags: list[tuple[int, str, float]] = []
         self._covariance: Array | None = None
@@ -208,7 +211,7 @@ class TrialLog:
             pending = pending[: self._room()]
         k, m = self.n, len(pending)
         held = self._held + m * (self._sizes[shape] + _HELD) if shape else self._held
-        if held > self._limit:
+        if held + self._collected_size > self._limit:
             return 0
         table = np.frombuffer(b"".join([answer for answer, _ in pending])).reshape(m, -1)
         values, rest = table[:, _FIRST : _FIRST + vectors], _FIRST + after
@@ -253,18 +256,37 @@ class TrialLog:
             raise _malformed()
         if len(numbers) != (8 * numbers_in(found) if found is not None else self._sizes[shape]):
             raise _malformed()
-        for name, sizes in found or ():
-            if self._dimensions.get(name, len(sizes)) != len(sizes):
-                raise InvalidOutputError(f"diagnostic {name!r} changes its number of dimensions")
-        self._held += len(numbers) + len(tail) + _HELD
-        if self._held > self._limit:
+        learned, size = self._learned(found) if found is not None else ({}, self._collected_size)
+        self._held += len(numbers) + len(tail) + _HELD * (1 + len(learned) + len(flagged))
+        if self._held + size > self._limit:
             raise MemoryError(f"its diagnostics take more than {self._limit / 2**20:.0f} MiB")
         if found is not None:
             self._shapes.append(list(found))
             self._sizes.append(len(numbers))
             self._diagnostics.append([])
-            self._dimensions |= {name: len(sizes) for name, sizes in found}
+            self._largest |= learned
+            self._collected_size = size
         return flagged
+
+    def _learned(self, found: Sequence[tuple[str, tuple[int, ...]]]) -> tuple[dict[str, tuple[int, ...]], int]:
+        """The largest sizes of the diagnostics of a new shape, and the bytes of all arrays of the trial with them."""
+        learned: dict[str, tuple[int, ...]] = {}
+        size = self._collected_size
+        for name, sizes in found:
+            if name in learned:
+                raise InvalidOutputError(f"diagnostic {name[:80]!r} is given twice")
+            if len(sizes) > _DIMENSIONS:
+                raise InvalidOutputError(
+                    f"diagnostic {name[:80]!r} has {len(sizes)} dimensions, more than {_DIMENSIONS}"
+                )
+            before = self._largest.get(name)
+            if before is not None and len(before) != len(sizes):
+                raise InvalidOutputError(f"diagnostic {name!r} changes its number of dimensions")
+            learned[name] = tuple(map(max, sizes, before)) if before is not None else tuple(sizes)
+            size += 8 * self._steps * (_extent(learned[name]) - (_extent(before) if before is not None else 0))
+        if size > _ADDRESSABLE:
+            raise MemoryError("its diagnostics take more than any memory")
+        return learned, size
 
     def check_covariances(self) -> None:
         """Check those since the last call; at a bad one, forget all from its epoch on and raise."""
@@ -284,6 +306,10 @@ class TrialLog:
             self._covariance[epochs] = p
         if bad is not None:
             raise InvalidOutputError(f"at {self._time[self.n]:g} s the covariance {why}")
+
+    def forget_diagnostics(self) -> None:
+        """Leave the diagnostics out of the trial."""
+        self._diagnostics = [[] for _ in self._shapes]
 
     def trial(self, estimator: str, status: str, reason: str) -> Trial:
         """The trial with all collected answers."""
@@ -315,7 +341,8 @@ class TrialLog:
             if not items:
                 continue
             epochs = np.concatenate([np.arange(k, k + m) for k, m, _ in items])
-            values = np.frombuffer(b"".join([numbers[: m * size] for _, m, numbers in items])).reshape(len(epochs), -1)
+            joined = b"".join([numbers[: m * size] for _, m, numbers in items])
+            values = (np.frombuffer(joined) if joined else np.empty(0)).reshape(len(epochs), size // 8)
             begin = 0
             for name, dimensions in shape:
                 end = begin + math.prod(dimensions)
@@ -348,6 +375,11 @@ class TrialLog:
             if not np.isfinite(vector[:, wanted]).all():
                 raise InvalidOutputError(f"{name} is not finite")
         return NavigationStates(times, **vectors)
+
+
+def _extent(sizes: Sequence[int]) -> int:
+    """Numbers of an array; an empty dimension counts as one, for the others cost something, too."""
+    return math.prod(max(size, 1) for size in sizes)
 
 
 def _bytes_of(array: Array) -> memoryview:

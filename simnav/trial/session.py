@@ -160,7 +160,11 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
             log.check_covariances()
         except InvalidOutputError as error:  # it came before the other failure
             status, reason = "invalid-output", f"update(): {error}"
-    trial = log.trial(session.name, status, reason)
+    try:
+        trial = log.trial(session.name, status, reason)
+    except MemoryError:
+        log.forget_diagnostics()
+        trial = log.trial(session.name, "out-of-memory", "the arrays of its diagnostics do not fit into memory")
     return replace(trial, smoothed=smoothed, reset_seconds=reset_seconds, smooth_seconds=smooth_seconds)
 
 

@@ -1,4 +1,4 @@
-"""What keeps estimators from the truth and from each other: cheats, vandals, SIGKILLs, broken files."""
+"""What keeps estimators from the truth and from each other: cheats, vandals, channels, answers, SIGKILLs, files."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ from typing import Any
 from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.leaderboard.results import store
 from tests.fuzz import fuzz_logs, fuzz_tomls
+from tests.hostile.answers import fuzz_answers
 from tests.hostile.attacks import CHEATS, Harm, cheats, plain, vandals
+from tests.hostile.channels import told
 
 __all__ = ["kills", "parts", "rows"]
 
-KILLS, TOMLS, LOGS = 100, 10_000, 3_000
-_KILLS, _TOMLS, _LOGS = 10, 10, 3  # parts of each
+KILLS, TOMLS, LOGS, ANSWERS = 100, 10_000, 3_000, 4_000
+_KILLS, _TOMLS, _LOGS, _ANSWERS = 10, 10, 3, 10  # parts of each
 
 _CAMPAIGN = """
 import sys
@@ -43,10 +45,12 @@ def parts() -> dict[str, Callable[[], Any]]:
     found: dict[str, Callable[[], Any]] = {}
     for kind in confinements():
         found[f"cheats-{kind}"] = partial(_in_folder, partial(cheats, confinement=kind))
+        found[f"channels-{kind}"] = partial(_in_folder, lambda folder, kind=kind: sorted(told(folder, kind)))
         found[f"vandals-{kind}"] = partial(_in_folder, lambda folder, kind=kind: asdict(vandals(folder, kind)))
     found |= {f"kills-{k}": partial(kills, KILLS // _KILLS, k) for k in range(_KILLS)}
     found |= {f"tomls-{k}": partial(_tracebacks, fuzz_tomls, TOMLS // _TOMLS, k) for k in range(_TOMLS)}
     found |= {f"logs-{k}": partial(_tracebacks, fuzz_logs, LOGS // _LOGS, k) for k in range(_LOGS)}
+    found |= {f"answers-{k}": partial(_raised, ANSWERS // _ANSWERS, k) for k in range(_ANSWERS)}
     return found
 
 
@@ -63,9 +67,13 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
         )
         what = f"hostile rows without a status of their own ({kind})"
         yield what, f"{len(harm.unnamed)} of {harm.tried}", "0", not harm.unnamed
+        passed = found[f"channels-{kind}"]
+        yield f"marks that a row of a sealed run finds of another ({kind})", f"{len(passed)}", "0", not passed
     wars = [found[f"kills-{k}"] for k in range(_KILLS)]
     killed, campaigns, differ = (sum(column) for column in zip(*wars, strict=True))
     yield f"campaigns with other results after {killed} SIGKILLs", f"{differ} of {campaigns}", "0", not differ
+    raised = sum(len(found[f"answers-{k}"]) for k in range(_ANSWERS))
+    yield "runs with random answers that end a campaign", f"{raised} of {ANSWERS}", "0", not raised
     for what, count, blocks in (("tomls", TOMLS, _TOMLS), ("logs", LOGS, _LOGS)):
         bad = sum(len(found[f"{what}-{k}"]) for k in range(blocks))
         name = what.replace("tomls", "TOMLs")
@@ -84,6 +92,10 @@ def _in_folder(measure: Callable[[Path], Any]) -> Any:
 
 def _tracebacks(fuzz: Callable[[int, int], Mapping[str, int]], number: int, seed: int) -> list[str]:
     return [name for name in fuzz(number, seed) if name.startswith("traceback")]
+
+
+def _raised(number: int, seed: int) -> list[str]:
+    return [what for what in fuzz_answers(number, seed) if what.startswith("raised")]
 
 
 def kills(count: int, seed: int = 0) -> tuple[int, int, int]:

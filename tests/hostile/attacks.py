@@ -26,7 +26,7 @@ SCENARIO = HERE / "cheats" / "scenario.toml"
 CHEATS = sorted(path.stem for path in (HERE / "cheats").glob("*.py") if path.stem != "cheating_last_fix")
 
 _VANDAL = '''
-import os, signal, subprocess, sys, time
+import json, mmap, os, resource, signal, subprocess, sys, tempfile, time
 import numpy as np
 from simnav import Estimate, Estimator
 
@@ -49,7 +49,7 @@ class Vandal(Estimator):
         return Estimate(measurements.time, position=self.position, diagnostics=diagnostics)
 '''
 
-_HELPERS = """
+_HELPERS = '''
 
 def _open(descriptor):
     import fcntl
@@ -59,10 +59,75 @@ def _open(descriptor):
         return False
 
 
+def _ancestors(campaign):
+    """Processes between this one and the campaign's, where they can be seen: no others, for they would be harmed."""
+    process = os.getppid()
+    while process not in (0, 1, campaign):
+        yield process
+        try:
+            process = int(open(f"/proc/{process}/stat").read().rpartition(")")[2].split()[1])
+        except OSError:
+            return
+
+
+def _take(what, *arguments):
+    """Do it where it is allowed."""
+    try:
+        what(*arguments)
+    except OSError:
+        pass
+
+
+def _limit_all(campaign):
+    for process in _ancestors(campaign):
+        for which, value in (("NOFILE", 6), ("DATA", 1 << 20), ("CPU", 1), ("NPROC", 1), ("FSIZE", 10)):
+            which = getattr(resource, "RLIMIT_" + which)
+            _take(resource.prlimit, process, which, (value, resource.prlimit(0, which)[1]))
+        _take(os.sched_setaffinity, process, {0})
+        _take(os.setpriority, os.PRIO_PROCESS, process, 19)
+
+
+def _close_all(folder):
+    for path, folders, files in os.walk(folder):
+        for name in files + folders:
+            _take(os.chmod, os.path.join(path, name), 0)
+    _take(os.chmod, folder, 0o555)
+
+
+def _deep(names):
+    """Folders so deep that removing them by recursion fails, and one that is closed to its owner."""
+    os.chdir(tempfile.gettempdir())
+    os.mkdir("closed", 0o300)
+    open("closed/file", "w").close()
+    for _ in range(names):
+        os.mkdir("d")
+        os.chdir("d")
+
+
+def _fork_each(count, what):
+    """Processes that take something, and wait."""
+    for _ in range(count):
+        if os.fork() == 0:
+            kept = what()
+            time.sleep(600)
+    time.sleep(600)
+
+
+def _steal():
+    """Write a part of an answer into the pipe, and take it back before it is read."""
+    up = os.open("/proc/self/fd/4", os.O_RDWR | os.O_NONBLOCK)
+    while True:
+        os.write(up, b"x")
+        try:
+            os.read(up, 1)
+        except BlockingIOError:
+            pass
+
+
 class _Endless:
     def __repr__(self):
         return repr(self)
-"""
+'''
 
 _DELETE = "import shutil; shutil.rmtree({results!r})"
 _SLEEPER = "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)  # {mark}'], start_new_session=True)"
@@ -87,6 +152,36 @@ VANDALS: dict[str, tuple[str, set[str]]] = {
     "endless-diagnostics": ("diagnostics = {{'x': np.zeros(7 * 2**20)}}; self.k = 2", {"out-of-memory", "timeout"}),
     "giant-answer": ("diagnostics = {{'x': np.zeros(10 * 2**20)}}", {"invalid-output"}),
     "many-names": ("diagnostics = {{str(i): 0.0 for i in range(50000)}}", {"ok", "timeout"}),  # on a busy machine
+    "limits-others": ("_limit_all({campaign})", {"ok"}),
+    "takes-rights": ("_close_all({folder!r})", {"ok"}),
+    "leaves-deep-folders": ("_deep(1500)", {"ok"}),
+    "steals-its-answer": ("_steal()", {"timeout", "invalid-output", "error"}),
+    "children-take-memory": ("_fork_each(4, lambda: np.ones(15 << 20))", {"out-of-memory", "timeout"}),
+    "many-processes": ("_fork_each(700, int)", {"error", "timeout"}),
+    "large-file": (
+        "file = open(os.path.join(tempfile.gettempdir(), 'x'), 'wb'); [file.write(bytes(1 << 20)) for _ in range(400)]",
+        {"error", "out-of-memory", "timeout"}),
+    "many-files": (
+        "files = [tempfile.TemporaryFile() for _ in range(4)]\n            "
+        "[f.write(bytes(1 << 20)) for f in files for _ in range(120)]; time.sleep(600)", {"out-of-memory", "timeout"}),
+    "memory-file": ("fd = os.memfd_create('x'); os.truncate(fd, 1 << 30); [os.write(fd, bytes(1 << 20)) for _ in "
+                    "range(400)]", {"error"}),
+    "shared-memory": ("self.m = mmap.mmap(-1, 400 << 20); [self.m.write(bytes(1 << 20)) for _ in range(400)]; "
+                      "self.m.madvise(mmap.MADV_DONTNEED); time.sleep(600)", {"error"}),
+    "ragged-diagnostics": (
+        "diagnostics = {{'x': np.zeros((10**6, 1))}}\n        if self.k == 4:\n            "
+        "diagnostics = {{'x': np.zeros((1, 10**6))}}", {"out-of-memory"}),
+    "large-once": ("diagnostics = {{'x': np.zeros(2 * 10**6)}}", {"out-of-memory"}),
+    "nothing-in-a-shape": ("diagnostics = {{'x': np.zeros((0, 3))}}", {"ok"}),
+    "empty-but-large": ("diagnostics = {{'x': np.zeros((0, 2**40))}}", {"out-of-memory"}),
+    "many-dimensions": ("diagnostics = {{'x': np.zeros((1,) * 32)}}", {"invalid-output"}),
+    "a-name-twice": ("diagnostics = {{1: 0.0, '1': np.zeros(3)}}", {"invalid-output"}),
+    "odd-names": ("diagnostics = {{'innovation.' + chr(0xd800): 1.0}}", {"ok"}),
+    "odd-reason": ("raise ValueError(chr(0xd800) * 5000)", {"error"}),
+    "odd-covariance": (
+        "p = np.eye(9); p[0, 0] = 5e-324; p[0, 1] = p[1, 0] = 1e308\n            "
+        "return Estimate(measurements.time, position=self.position, velocity=np.zeros(3), attitude=np.zeros(3), "
+        "covariance=p)", {"invalid-output"}),
     "opens-a-socket": ("import socket; socket.create_connection(('127.0.0.1', 9), 2.0)", {"error"}),
 }  # fmt: skip
 
@@ -153,18 +248,23 @@ def vandals(folder: Path, confinement: str = "auto", workers: int = 2, seeds: in
             "{constructor}", "raise RuntimeError('not today')" if "constructor" in name else "pass"
         )
         path = folder / f"{name.replace('-', '_')}.py"
-        path.write_text(text.format(results=str(results), mark=mark) + _HELPERS)
+        path.write_text(
+            text.format(results=str(results), mark=mark, folder=str(folder), campaign=os.getpid()) + _HELPERS
+        )
         requests.append(EstimatorRequest(str(path), label=name))
     ours = [EstimatorRequest("gnss-only"), EstimatorRequest("oracle")]
     mixed = [requests[0], ours[0], *requests[1:], ours[1]]
     options: dict[str, Any] = {"workers": workers, "timeout": 4.0, "memory": 300 << 20, "confinement": confinement}
+    options["keep_trials"] = True
     scenario = load(SCENARIO)
     run_campaign([scenario], [requests[0], *ours], range(seeds), folder / "alone", **options)
+    rights = {path: path.stat().st_mode for path in (folder, *folder.glob("*.py"), *(folder / "alone").rglob("*"))}
     run_campaign([scenario], mixed, range(seeds), results, **options)
     wanted = {(r.estimator, r.seed): plain(r) for r in store.load(folder / "alone")}
     found = {(r.estimator, r.seed): r for r in store.load(results)}
     touched = [f"{n}, seed {s}" for (n, s), w in wanted.items() if (n, s) not in found or plain(found[n, s]) != w]
     touched += [f"process {line}" for line in _processes(mark)]
+    touched += [f"mode of {path.name}" for path, mode in rights.items() if path.stat().st_mode != mode]
     unnamed = []
     for name, (_, statuses) in tried.items():
         got = [found[name, s].status if (name, s) in found else "no result" for s in range(seeds)]

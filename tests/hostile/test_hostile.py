@@ -10,7 +10,9 @@ import pytest
 from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.warmup import warmup
 from tests.fuzz import fuzz_logs, fuzz_tomls
+from tests.hostile.answers import fuzz_answers
 from tests.hostile.attacks import CHEATS, cheats, vandals
+from tests.hostile.channels import told
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="estimators are confined on POSIX systems only")
 
@@ -37,7 +39,19 @@ def test_no_vandal_touches_another_row(tmp_path: Path, confinement: str) -> None
     harm = vandals(tmp_path, confinement, seeds=1)
     assert harm.touched == []
     assert harm.unnamed == []
-    assert harm.tried >= 13
+    assert harm.tried >= 32
+
+
+def test_no_row_tells_another_of_a_sealed_run(tmp_path: Path, confinement: str) -> None:
+    assert told(tmp_path, confinement) == {}
+
+
+def test_no_answer_ends_a_campaign() -> None:
+    """A sample; ``python -m tests.audit security`` does thousands."""
+    found = fuzz_answers(120, seed=1)
+    assert [what for what in found if what.startswith("raised")] == []
+    assert found["ok"] > 10
+    assert found["invalid-output"] > 30
 
 
 def test_no_broken_file_gives_a_traceback() -> None:

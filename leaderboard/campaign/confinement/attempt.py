@@ -15,8 +15,17 @@ import numpy as np
 from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.leaderboard.campaign.confinement.cores import own_core
 from simnav.leaderboard.campaign.confinement.estimator_process import seed_generators
-from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, NoAnswerError, StoppedError
+from simnav.leaderboard.campaign.confinement.limits import interrupted
+from simnav.leaderboard.campaign.confinement.session import (
+    LOST,
+    EstimatorServer,
+    Limits,
+    NoAnswerError,
+    ServerError,
+    StoppedError,
+)
 from simnav.leaderboard.campaign.isolation import isolate
+from simnav.leaderboard.results.errors import named
 from simnav.trial import FailureError, Trial, run_session, run_trial
 from simnav.trial.log import TrialLog
 from simnav.trial.wire import InvalidOutputError
@@ -41,6 +50,8 @@ __all__ = [
 
 #: What can be asked for; ``auto`` is the strongest that works here.
 CONFINEMENTS = ("auto", "bubblewrap", "process", "none")
+
+_SETTLE = 2.5  # for the end of a worker whose campaign is being killed [s]
 
 _server: EstimatorServer | None = None
 _owner = 0  # process of the server's worker
@@ -168,6 +179,10 @@ def attempt(server: EstimatorServer, entrant: Entrant, recording: Recording, lim
         status, reason, trial = error.status, error.reason, None
     except InvalidOutputError as error:
         status, reason, trial = "invalid-output", str(error), None
+    except ServerError:
+        raise
+    except Exception as error:  # of this process, by what it was sent
+        status, reason, trial = "invalid-output", f"its answers cannot be used: {named(error)}", None
     seconds = time.monotonic() - started
     if status == "out-of-memory" and trial is None and "memory" not in reason:
         reason = f"more than {limits.memory >> 20} MiB of memory was wanted"
@@ -204,16 +219,34 @@ def try_estimator(
     ServerError
         If estimator processes cannot be started.
     """
+    found = _once(entrant, recording, limits, confinement, hidden, sealed)
+    if found.status == "error" and found.trial is None and (found.reason == LOST or interrupted(found.reason)):
+        # It was killed. Perhaps whoever kills the campaign began with it: then this process is soon gone, too.
+        time.sleep(_SETTLE)
+        found = _once(entrant, recording, limits, confinement, hidden, sealed)
+    return found
+
+
+def _once(
+    entrant: Entrant, recording: Recording, limits: Limits, confinement: str, hidden: Sequence[Path], sealed: bool
+) -> Attempt:
+    """One attempt, in a sealed campaign with a server that has had no other estimator."""
     if confinement == "none" or entrant.reference:
         outcome = isolate(_in_a_fork, entrant, recording, timeout=limits.timeout, memory=limits.memory)
         trial: Trial | None = outcome.value if outcome.status == "ok" else None
         status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
         return Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
     try:
-        return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
-    except NoAnswerError:  # the estimator was not there yet, so this is not a result of it
-        close_server()
-        return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+        if sealed and _server is not None and _server.used:
+            close_server()
+        try:
+            return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+        except NoAnswerError:  # the estimator was not there yet, so this is not a result of it
+            close_server()
+            return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+    finally:
+        if sealed:
+            close_server()
 
 
 def _in_a_fork(entrant: Entrant, recording: Recording) -> Trial:

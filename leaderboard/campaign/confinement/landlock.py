@@ -24,8 +24,20 @@ _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # system calls, the 
 _PATH_BENEATH = 1
 
 _WRITE_FILE, _READ_FILE, _TRUNCATE = 1 << 1, 1 << 2, 1 << 14
+#: What all processes can read and some can change: counters and state of other processes, of control groups and of
+#: devices, and logs of the kernel, into which whoever crashes writes. Of these only `_HARMLESS` can be read.
+_STATE = ("/proc", "/sys", "/dev/kmsg", "/var/log", "/run/log", "/var/crash", "/var/lib/systemd/coredump")
+_HARMLESS = (
+    "/proc/cpuinfo", "/proc/meminfo", "/proc/filesystems", "/proc/version", "/proc/sys/vm/overcommit_memory",
+    "/proc/sys/kernel/osrelease", "/proc/sys/kernel/pid_max", "/proc/sys/kernel/threads-max",
+    "/proc/sys/kernel/cap_last_cap", "/proc/sys/kernel/random", "/sys/devices/system/cpu", "/sys/devices/system/node",
+    "/sys/kernel/mm/transparent_hugepage", "/sys/fs/cgroup/cpu.max", "/sys/fs/cgroup/cpu/cpu.cfs_quota_us",
+    "/sys/fs/cgroup/cpu/cpu.cfs_period_us",
+)  # fmt: skip
+
 #: Rights over files by the version of the interface that brought them: all that change something.
-_WRITING = {1: sum(1 << bit for bit in (1, 4, 5, 6, 7, 8, 9, 10, 11, 12)), 2: 1 << 13, 3: _TRUNCATE}
+_IOCTL_DEVICE = 1 << 15  # requests to devices, such as the size of a terminal, which all that can open it can change
+_WRITING = {1: sum(1 << bit for bit in (1, 4, 5, 6, 7, 8, 9, 10, 11, 12)), 2: 1 << 13, 3: _TRUNCATE, 5: _IOCTL_DEVICE}
 _TCP = (4, 0b11)  # version, bind and connect
 _SCOPES = (6, 0b11)  # version, abstract sockets and signals
 
@@ -77,7 +89,10 @@ def restrict(writable: Iterable[str | os.PathLike[str]]) -> bool:
 
 
 class Unreadable:
-    """Files that a process and its children give up to read.
+    """Files that a process and its children give up to read: some that are named, and the state of the system.
+
+    A process can read what the system says of itself, of processors and of memory in total, but not of other processes
+    (`_STATE`): of these an earlier process could change much.
 
     Landlock knows rights that are granted, for a folder with all that is below it. So the right to read is granted for
     everything beside the way to the hidden places. The folders on this way can still be listed.
@@ -89,31 +104,41 @@ class Unreadable:
     """
 
     def __init__(self, hidden: Iterable[str]):
-        self._hidden = {os.path.realpath(path) for path in hidden}
+        self._hidden = {os.path.realpath(path) for path in (*hidden, *_STATE)}
         self._way = {parent for path in self._hidden for parent in _parents(path)}
-        self._ruleset, self._seen = -1, dict[str, int]()
+        self._ruleset, self._seen, self._found = -1, dict[str, int](), dict[str, int]()
 
     def prepare(self) -> None:
-        """Note what can be read; done again where a folder on the way has changed, so that new files count."""
-        if not self._hidden or not available():
+        """Note what can be read; for a folder on the way that has changed, again, so that new files count."""
+        if not available():
             return
-        seen = {folder: os.stat(folder).st_mtime_ns for folder in self._way if os.path.isdir(folder)}
-        if self._ruleset >= 0:
-            if seen == self._seen:
-                return
+        hidden = {path: os.stat(path).st_ino for path in self._hidden if os.path.exists(path)}
+        if self._ruleset >= 0 and hidden != self._found:  # one may be what could be read before, under another name
             os.close(self._ruleset)
-        self._seen, self._ruleset = seen, _ruleset(_READ_FILE)
+            self._ruleset, self._seen = -1, {}
+        if self._ruleset < 0:
+            self._found, self._ruleset = hidden, _ruleset(_READ_FILE)
+            for path in _HARMLESS:
+                _allow(self._ruleset, path, _READ_FILE)
         if self._ruleset < 0:
             return
         for folder in self._way:
-            with contextlib.suppress(OSError), os.scandir(folder) as entries:
-                for entry in entries:  # what a link leads to counts where it lies
-                    if entry.path not in self._hidden and entry.path not in self._way and not entry.is_symlink():
-                        _allow(self._ruleset, entry.path, _READ_FILE)
+            with contextlib.suppress(OSError):
+                changed = os.stat(folder).st_mtime_ns
+                if self._seen.get(folder) == changed:
+                    continue
+                with os.scandir(folder) as entries:
+                    for entry in entries:  # what a link leads to counts where it lies
+                        if entry.path not in self._hidden and entry.path not in self._way and not entry.is_symlink():
+                            _allow(self._ruleset, entry.path, _READ_FILE)
+                self._seen[folder] = changed
 
     def enforce(self) -> bool:
         """Give the rest up; whether that is in force."""
-        return not self._hidden or (self._ruleset >= 0 and _enforce(self._ruleset))
+        if self._ruleset < 0:
+            return False
+        _allow(self._ruleset, f"/proc/{os.getpid()}", _READ_FILE)
+        return _enforce(self._ruleset)
 
 
 def _parents(path: str) -> list[str]:

@@ -18,12 +18,16 @@ __all__ = [
     "WATCH",
     "become_reaper",
     "begin_alone",
+    "children_of",
     "death_of",
+    "die_with_parent",
+    "interrupted",
     "keep_freed_memory",
     "kill_descendants",
     "lift_memory_limit",
     "limit",
     "out_of_memory_kills",
+    "own_settings",
     "prctl",
     "resident",
     "use_huge_pages",
@@ -39,6 +43,8 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 #: Of `prctl`: no program that is started has more rights. Without it no rights can be given up.
 PR_SET_NO_NEW_PRIVS = 38
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_FROM_OUTSIDE = ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT", "SIGQUIT")
+_FILES, _PROCESSES = 1024, 512  # open files and processes (with their threads) of an estimator
 _PATIENCE = 5.0  # s, for which descendants are killed at most
 _MADV_COLLAPSE, _HUGE = 25, 2 << 20  # of madvise(2); bytes of a huge page where a page has 4 KiB
 
@@ -46,7 +52,7 @@ _MADV_COLLAPSE, _HUGE = 25, 2 << 20  # of madvise(2); bytes of a huge page where
 def begin_alone(parent: int) -> None:
     """Begin the life of a forked process: gone with its parent, with signals and streams of its own."""
     os.setsid()  # Ctrl-C in the terminal is not for it, and it can be killed with all that it starts
-    _die_with_parent(parent)
+    die_with_parent(parent)
     signal.set_wakeup_fd(-1)
     faulthandler.disable()
     for which in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD):
@@ -60,8 +66,10 @@ def begin_alone(parent: int) -> None:
     sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
 
 
-def limit(seconds: float, memory: int, *, final: bool = True) -> None:
+def limit(seconds: float, memory: int, *, final: bool = True, alone: bool = False) -> None:
     """Limit this process: no core files, CPU time (if everyone who could kill it is dead), private memory.
+
+    If the limits are final, it also opens at most 1024 files, and no file becomes larger than its memory may.
 
     Parameters
     ----------
@@ -71,6 +79,8 @@ def limit(seconds: float, memory: int, *, final: bool = True) -> None:
         Memory that the process may take in addition to its present memory [bytes].
     final : bool
         True: the process cannot raise the limits again.
+    alone : bool
+        Whether its user has no other processes, so that their number can be limited.
     """
     import resource
 
@@ -80,8 +90,13 @@ def limit(seconds: float, memory: int, *, final: bool = True) -> None:
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(which, (wanted, wanted if final else hard))
 
-    lower(resource.RLIMIT_CORE, 0)
+    lower(resource.RLIMIT_CORE, 1 if _LINUX else 0)  # 0 would still start the program that collects core files
     lower(resource.RLIMIT_CPU, int(4.0 * seconds) + 61)
+    if final:
+        lower(resource.RLIMIT_FSIZE, memory)
+        lower(resource.RLIMIT_NOFILE, _FILES)
+        if alone:
+            lower(resource.RLIMIT_NPROC, _PROCESSES)
     if _LINUX:
         with open("/proc/self/statm") as file:
             data = int(file.read().split()[5]) * resource.getpagesize()
@@ -97,7 +112,7 @@ def lift_memory_limit() -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))
 
 
-def _die_with_parent(parent: int) -> None:
+def die_with_parent(parent: int) -> None:
     """A process that is killed takes this one with it (Linux; elsewhere the limit of CPU time ends it)."""
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -152,7 +167,7 @@ def kill_descendants() -> None:
     """Kill all children of this process, and theirs once they have become its own."""
     deadline = time.monotonic() + _PATIENCE
     while time.monotonic() < deadline:
-        for child in _children():
+        for child in children_of(os.getpid()):
             with contextlib.suppress(OSError):
                 os.kill(child, signal.SIGKILL)
         try:
@@ -162,20 +177,40 @@ def kill_descendants() -> None:
             return
 
 
-def _children() -> list[int]:
-    own = os.getpid()
-    with contextlib.suppress(OSError, ValueError):
-        return [int(child) for child in Path(f"/proc/{own}/task/{own}/children").read_text().split()]
+def children_of(process: int) -> list[int]:
+    """Children of a process."""
     found = []
+    try:
+        for thread in os.listdir(f"/proc/{process}/task"):
+            with open(f"/proc/{process}/task/{thread}/children") as file:
+                found += [int(child) for child in file.read().split()]
+        return found
+    except (OSError, ValueError):
+        if not os.path.exists(f"/proc/{process}/stat") or os.path.exists(f"/proc/self/task/{os.getpid()}/children"):
+            return found  # it has just ended, or there is no such folder
     with contextlib.suppress(OSError):
         for entry in os.listdir("/proc"):
             with contextlib.suppress(OSError, ValueError, IndexError):
-                if (
-                    entry.isdigit()
-                    and int(Path(f"/proc/{entry}/stat").read_text().rpartition(")")[2].split()[1]) == own
-                ):
+                if entry.isdigit() and int(_fields(entry)[1]) == process:
                     found.append(int(entry))
     return found
+
+
+def _fields(process: str) -> list[str]:
+    """What /proc says of a process, after its name: state, parent and so on."""
+    return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+
+
+def own_settings() -> tuple[object, ...]:
+    """What another process of the same user could change of this one: limits, priority, processors."""
+    import resource
+
+    names = [name for name in dir(resource) if name.startswith("RLIMIT_")]
+    limits = tuple((name, resource.getrlimit(getattr(resource, name))) for name in names)
+    if not _LINUX:
+        return (limits, os.getpriority(os.PRIO_PROCESS, 0))
+    scheduling = (os.sched_getscheduler(0), frozenset(os.sched_getaffinity(0)))
+    return (limits, os.getpriority(os.PRIO_PROCESS, 0), scheduling)
 
 
 def resident(process: int) -> int:
@@ -209,6 +244,11 @@ def death_of(code: int) -> str:
         return signal.Signals(-code).name
     except ValueError:
         return f"signal {-code}"
+
+
+def interrupted(reason: str) -> bool:
+    """Whether the reason of a failure may be the end of the whole campaign: the process was killed from outside."""
+    return any(f"({name})" in reason for name in _FROM_OUTSIDE)
 
 
 def why_it_died(death: str, peak: int, memory: int, *, by_kernel: bool) -> tuple[str, str]:

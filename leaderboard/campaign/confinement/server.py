@@ -1,9 +1,10 @@
 """The server of a worker: kernels loaded, nothing secret, forks an estimator process for each run.
 
 It is started as ``python -m simnav.leaderboard.campaign.confinement.server DESCRIPTOR [kernels]``, where the descriptor
-is a Unix socket to the worker. It is asked, in JSON, to fork (two descriptors come with it), to finish with the process
-that it forked, and to import libraries before the next fork. It watches the memory of the process, kills all that is
-left of it, and is gone when the worker is.
+is a Unix socket to the worker. It is asked, in JSON, to fork (descriptors of the pipes come with it, and of a control
+group where there is one), to finish with the process that it forked, and to import libraries before the next fork. It
+watches what the process takes with all that it starts, kills all that is left of it, and is gone when the worker is. If
+its own limits or priority were changed, it ends before the next fork, and the worker starts another one.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ import select
 import shutil
 import signal
 import socket
+import stat
+import subprocess
 import sys
 import tempfile
 import time
@@ -26,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.kinds import INSTRUMENTS
-from simnav.leaderboard.campaign.confinement import seccomp
+from simnav.leaderboard.campaign.confinement import privileges, seccomp
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES, live
 from simnav.leaderboard.campaign.confinement.landlock import Unreadable, restrict
 from simnav.leaderboard.campaign.confinement.limits import (
@@ -35,13 +38,16 @@ from simnav.leaderboard.campaign.confinement.limits import (
     become_reaper,
     begin_alone,
     death_of,
+    die_with_parent,
     keep_freed_memory,
     kill_descendants,
     limit,
     out_of_memory_kills,
+    own_settings,
     resident,
     use_huge_pages,
 )
+from simnav.leaderboard.campaign.confinement.watch import Watch
 from simnav.leaderboard.results.scratch import scratch
 
 __all__ = ["COPY_FROM", "main"]
@@ -68,20 +74,24 @@ def _serve(control: socket.socket, own: Path) -> None:
     """Do what the worker asks for, until it is gone."""
     hidden: list[str] = []
     unreadable = Unreadable(hidden)
-    control.sendall(json.dumps({"ready": True}).encode())
-    while True:
-        request, descriptors = _receive(control)
-        if request is None:
-            return
-        if "fork" in request:
-            if hidden != request["fork"]["hidden"]:
-                hidden = request["fork"]["hidden"]
-                unreadable = Unreadable(hidden)
-            _fork(control, request["fork"], descriptors, own, unreadable)
-        for name in request.get("import", ()):
-            if name in LIBRARIES:
-                with contextlib.suppress(Exception):
-                    importlib.import_module(name)
+    settings = own_settings()
+    try:
+        control.sendall(json.dumps({"ready": True}).encode())
+        while True:
+            request, descriptors = _receive(control)
+            if request is None or ("fork" in request and own_settings() != settings):
+                return
+            if "fork" in request:
+                if hidden != request["fork"]["hidden"]:
+                    hidden = request["fork"]["hidden"]
+                    unreadable = Unreadable(hidden)
+                _fork(control, request["fork"], descriptors, own, unreadable)
+            for name in request.get("import", ()):
+                if name in LIBRARIES:
+                    with contextlib.suppress(Exception):
+                        importlib.import_module(name)
+    finally:
+        _remove(own)
 
 
 def _load() -> None:
@@ -109,7 +119,7 @@ def _load() -> None:
 
 
 def _receive(control: socket.socket) -> tuple[dict[str, Any] | None, list[int]]:
-    data, descriptors, _, _ = socket.recv_fds(control, _LONGEST, 2)
+    data, descriptors, _, _ = socket.recv_fds(control, _LONGEST, 3)
     return (json.loads(data) if data else None), descriptors
 
 
@@ -117,9 +127,15 @@ def _fork(
     control: socket.socket, asked: dict[str, Any], descriptors: list[int], own: Path, unreadable: Unreadable
 ) -> None:
     """Fork an estimator process and look after it until the worker has done with it."""
-    temporary = own / "run"
-    temporary.mkdir()
+    temporary = Path(tempfile.mkdtemp(dir=own))
     cache = asked["cache"] and str(own / asked["cache"])  # below its own folder, or an absolute path
+    if cache:
+        with contextlib.suppress(OSError):
+            os.makedirs(cache, mode=0o700, exist_ok=True)
+    if asked["user"] is not None:
+        for folder in filter(None, (temporary, cache)):
+            with contextlib.suppress(OSError):
+                os.chown(folder, asked["user"], asked["user"])
     if asked["landlock"]:
         unreadable.prepare()
     before, parent = out_of_memory_kills(), os.getpid()
@@ -133,12 +149,14 @@ def _fork(
     for descriptor in descriptors:
         os.close(descriptor)
     start, verdict, ended = resident(child), "", None
+    watch = Watch(child, start, asked["memory"], temporary)
     control.sendall(json.dumps({"forked": child}).encode())
     try:
         while not select.select([control], [], [], WATCH)[0]:
-            if ended is None and not verdict and resident(child) - start > asked["memory"]:
-                verdict = "out-of-memory"
-                os.kill(child, signal.SIGKILL)  # the worker sees its pipe closed
+            if not verdict:
+                verdict = watch.verdict()
+                if verdict:
+                    watch.kill()  # the worker sees the pipe closed
         request, _ = _receive(control)
         if request is None:
             return
@@ -160,17 +178,38 @@ def _fork(
         with contextlib.suppress(OSError):
             os.kill(child, signal.SIGKILL)
         kill_descendants()
-        shutil.rmtree(temporary, ignore_errors=True)
+        _remove(temporary)
     control.sendall(json.dumps(facts).encode())
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder, also where folders in it are very deep, or closed to their owner."""
+
+    def open_up(_: object, path: str, __: object) -> None:
+        with contextlib.suppress(OSError):
+            os.chmod(os.path.dirname(path), stat.S_IRWXU)
+            if os.path.isdir(path) and not os.path.islink(path):
+                os.chmod(path, stat.S_IRWXU)
+
+    for again in range(2):
+        with contextlib.suppress(RecursionError):
+            shutil.rmtree(folder, onerror=open_up if not again else lambda *_: None)
+        if not folder.exists():
+            return
+    with contextlib.suppress(OSError):
+        subprocess.run(["rm", "-rf", "--", str(folder)], stderr=subprocess.DEVNULL, check=False)
 
 
 def _become_estimator(
     parent: int, asked: dict[str, Any], descriptors: list[int], temporary: Path, unreadable: Unreadable
 ) -> None:
     """The forked process until it ends."""
+    if descriptors[2:]:
+        with contextlib.suppress(OSError):
+            os.write(descriptors[2], b"0")  # join the group whose memory is limited
     if asked["landlock"]:
         unreadable.enforce()
-    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, 16) for descriptor in descriptors]
+    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, 16) for descriptor in descriptors[:2]]
     down, up = 3, 4
     for number, descriptor in zip((down, up), moved, strict=True):
         os.dup2(descriptor, number)
@@ -183,15 +222,16 @@ def _become_estimator(
     os.environ["TMPDIR"] = tempfile.tempdir = str(temporary)
     if asked.get("cache"):
         os.environ["SIMNAV_CACHE_DIR"] = asked["cache"]
-        with contextlib.suppress(OSError):
-            os.makedirs(asked["cache"], mode=0o700, exist_ok=True)
         writable.append(asked["cache"])
     with contextlib.suppress(OSError):
         os.chdir(asked["folder"])
     if asked["landlock"]:
         restrict(writable)
+    privileges.give_up(asked["user"])
+    die_with_parent(parent)  # which is forgotten with a change of the user
+    os.umask(0o077)
+    limit(asked["timeout"], asked["memory"], alone=os.geteuid() == asked["user"])
     seccomp.deny()
-    limit(asked["timeout"], asked["memory"])
     live(down, up)
     os._exit(0)
 

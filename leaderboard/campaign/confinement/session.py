@@ -20,11 +20,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.campaign.confinement import bubblewrap, landlock
+from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, privileges
 from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES
 from simnav.leaderboard.campaign.confinement.kinds import homes_of_kinds
 from simnav.leaderboard.campaign.confinement.limits import why_it_died
+from simnav.leaderboard.campaign.confinement.memory_group import MemoryGroup
 from simnav.leaderboard.campaign.confinement.messages import LARGEST, Down, Up, command
+from simnav.leaderboard.campaign.confinement.watch import PROCESSES
 from simnav.leaderboard.campaign.request import file_of
 from simnav.trial import FailureError, LostError
 from simnav.trial.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
@@ -35,7 +37,10 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.trial.log import TrialLog
 
-__all__ = ["EstimatorServer", "Limits", "NoAnswerError", "RemoteSession", "ServerError", "StoppedError"]
+__all__ = ["LOST", "EstimatorServer", "Limits", "NoAnswerError", "RemoteSession", "ServerError", "StoppedError"]
+
+#: Reason of an estimator that ended its server.
+LOST = "it ended the process that had started it"
 
 #: Environment variables that an estimator process inherits; all others are left out.
 _ENVIRONMENT = (
@@ -51,6 +56,7 @@ _TICK = 1000.0  # the longest wait between two looks at the clock [ms]
 _STALL = 50.0  # of a step, or of all since answers were last judged: then they are judged before the next [ms]
 _STEPS = 64  # whose answers are judged together at most
 _BYTES = 1 << 20  # of answers that are judged together
+_STATE = 160  # bytes of a smoothed state, and as much again
 _SIZE = struct.Struct("<8xI")  # of an answer: bytes after the header
 
 
@@ -117,6 +123,8 @@ class EstimatorServer:
     sealed : bool
         Whether the campaign is sealed. Under ``bubblewrap`` the hidden paths are fixed; otherwise both apply to the
         next run.
+    used : bool
+        Whether it has started any estimator process.
 
     Raises
     ------
@@ -127,7 +135,7 @@ class EstimatorServer:
     def __init__(self, confinement: str, hidden: Sequence[Path] = (), *, loaded: bool = True, sealed: bool = False):
         self._landlock = landlock.available()
         self.confinement = confinement if confinement != "process" or not self._landlock else "landlock"
-        self.hidden, self.sealed = tuple(hidden), sealed
+        self.hidden, self.sealed, self.used = tuple(hidden), sealed, False
         self._loaded = loaded
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
@@ -148,6 +156,7 @@ class EstimatorServer:
             theirs.close()
         self._control = ours
         self._ready = False
+        self._group = MemoryGroup()
 
     @property
     def process_id(self) -> int:
@@ -167,6 +176,12 @@ class EstimatorServer:
             return folder
         return None
 
+    @staticmethod
+    def _digest(entrant: Entrant) -> str:
+        """What tells an entrant from all others."""
+        known = f"{entrant.name} {entrant.label} {sorted(entrant.parameters.items())!r} {entrant.source}"
+        return hashlib.blake2b(known.encode(errors="surrogatepass"), digest_size=8).hexdigest()
+
     def _cache(self, entrant: Entrant) -> str:
         """Folder of the kernels that a file compiles; empty where there is none.
 
@@ -175,8 +190,7 @@ class EstimatorServer:
         """
         if not self._landlock:
             return ""
-        known = f"{entrant.name} {entrant.label} {sorted(entrant.parameters.items())!r} {entrant.source}"
-        name = hashlib.blake2b(known.encode(errors="surrogatepass"), digest_size=8).hexdigest()
+        name = self._digest(entrant)
         caches = None if self.sealed else self._caches()
         return name if caches is None else str(caches / name)
 
@@ -214,6 +228,7 @@ class EstimatorServer:
             self._process.wait()
         if self._process.stderr is not None:
             self._process.stderr.close()
+        self._group.close()
 
     def _receive(self, seconds: float) -> dict[str, Any] | None:
         with contextlib.suppress(OSError, ValueError):
@@ -253,11 +268,16 @@ class EstimatorServer:
             "core": core,
             "folder": os.path.dirname(file) or "/",
             "cache": self._cache(entrant) if file else "",
+            "user": privileges.user_for(int(self._digest(entrant), 16)),
             "hidden": [str(path) for path in self.hidden],
         }
+        passed = [down, up]
+        if self._group.limit(limits.memory):
+            passed.append(self._group.joining)
+        kills, self.used = self._group.kills(), True
         try:
             try:
-                socket.send_fds(self._control, [json.dumps({"fork": asked}).encode()], [down, up])
+                socket.send_fds(self._control, [json.dumps({"fork": asked}).encode()], passed)
                 facts = self._receive(_END)
             except OSError:
                 facts = None
@@ -270,18 +290,19 @@ class EstimatorServer:
             try:
                 yield session
             except _GoneError:
-                raise self._finish(session, gone=True) from None
+                raise self._finish(session, kills, gone=True) from None
             except BaseException:
-                self._finish(session, gone=False)
+                self._finish(session, kills, gone=False)
                 raise
-            self._finish(session, gone=False)
-            if session.libraries:
-                self._control.sendall(json.dumps({"import": session.libraries}).encode())
+            self._finish(session, kills, gone=False)
+            if session.libraries and not self.sealed:  # what one has imported, the next would see
+                with contextlib.suppress(OSError):
+                    self._control.sendall(json.dumps({"import": session.libraries}).encode())
         finally:
             os.close(write)
             os.close(read)
 
-    def _finish(self, session: RemoteSession, *, gone: bool) -> StoppedError:
+    def _finish(self, session: RemoteSession, kills: int, *, gone: bool) -> StoppedError:
         """Have the process killed with all that it started; how it ended."""
         facts = None
         with contextlib.suppress(OSError):
@@ -289,13 +310,16 @@ class EstimatorServer:
             facts = self._receive(_END)
         if facts is None:
             self._process.kill()
-            return StoppedError("error", "it ended the process that had started it")
+            return StoppedError("error", LOST)
         session.peak_memory = max(0, int(facts.get("peak", 0)))
         ended, verdict = str(facts.get("ended") or "it closed its pipe"), facts.get("verdict")
         memory = session.limits.memory
         if verdict == "out-of-memory":
             return StoppedError("out-of-memory", f"stopped when it had taken more than {memory >> 20} MiB of memory")
-        return StoppedError(*why_it_died(ended, session.peak_memory, memory, by_kernel=verdict == "killed"))
+        if verdict == "error":
+            return StoppedError("error", f"stopped when it had started more than {PROCESSES} processes")
+        by_kernel = verdict == "killed" or (ended == "SIGKILL" and self._group.kills() > kills)
+        return StoppedError(*why_it_died(ended, session.peak_memory, memory, by_kernel=by_kernel))
 
 
 class _GoneError(LostError):
@@ -332,6 +356,8 @@ class RemoteSession:
         self._write, self._read = write, read
         self._deadline = time.monotonic() + limits.timeout
         os.set_blocking(write, False)
+        os.set_blocking(read, False)  # it can open its pipe again, and take back what it has written
+        self._steps = 0
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(read, select.POLLIN)
         self._writable.register(write, select.POLLOUT)
@@ -372,6 +398,7 @@ class RemoteSession:
         Between two steps next to nothing is done, for the estimator finds the caches of the processor as this process
         left them. Packets are encoded, and answers judged, for up to `_STEPS` steps together.
         """
+        self._steps = len(packets)
         write, read, ready, clock = os.write, os.read, self._readable.poll, time.perf_counter
         size_of, header, put = _SIZE.unpack_from, ANSWER.size, log.put
         for first in range(0, len(packets), _STEPS):
@@ -390,7 +417,10 @@ class RemoteSession:
                     self._send(packet[sent:])
                     self._wait(self._readable)
                     self._silent = False
-                reply = read(self._read, _PIECE)
+                try:
+                    reply = read(self._read, _PIECE)
+                except BlockingIOError:
+                    reply = self._piece()
                 if len(reply) < header or len(reply) != header + size_of(reply)[0]:
                     reply = self._rest(reply, LARGEST)
                 now = clock()
@@ -408,7 +438,7 @@ class RemoteSession:
     def smooth(self) -> NavigationStates | None:
         """The smoothed trajectory, or None."""
         self._send(command(Down.SMOOTH))
-        reply = self._receive(max(LARGEST, self.limits.memory))
+        reply = self._receive(max(LARGEST, _STATE * self._steps))
         if reply[0] == Up.DONE:
             return None
         if reply[0] != Up.TRAJECTORY:
@@ -445,7 +475,7 @@ class RemoteSession:
             with contextlib.suppress(ValueError, TypeError, RecursionError):
                 status, reason = json.loads(reply[ANSWER.size :])
                 if status in ("error", "invalid-output", "out-of-memory", "unsuitable") and isinstance(reason, str):
-                    raise FailureError(status, " ".join(reason.split())[:1000])
+                    raise FailureError(status, " ".join(reason[:2000].split())[:1000])
         raise InvalidOutputError("the answer is not in the form of an estimate")
 
     def _send(self, message: bytes) -> None:
@@ -461,8 +491,14 @@ class RemoteSession:
 
     def _receive(self, most: int) -> bytes:
         """One whole answer of at most so many bytes."""
-        self._wait(self._readable)
-        return self._rest(os.read(self._read, _PIECE), most)
+        return self._rest(self._piece(), most)
+
+    def _piece(self) -> bytes:
+        """What is there next of an answer; nothing where the pipe is closed."""
+        while True:
+            self._wait(self._readable)
+            with contextlib.suppress(BlockingIOError):
+                return os.read(self._read, _PIECE)
 
     def _rest(self, reply: bytes, most: int) -> bytes:
         """The whole answer of which this is what came first."""
@@ -476,8 +512,7 @@ class RemoteSession:
                     raise InvalidOutputError("more than one answer to one step")
                 if len(pieces) == size:
                     return bytes(pieces)
-            self._wait(self._readable)
-            reply = os.read(self._read, _PIECE)
+            reply = self._piece()
             pieces += reply
         raise self._gone()
 

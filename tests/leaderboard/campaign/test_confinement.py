@@ -38,6 +38,13 @@ import os, sys, json, random, time
 import numpy as np
 from simnav import Estimate, Estimator, NavigationStates, UnsuitableScenario
 
+def attempted(what):
+    try:
+        what()
+    except OSError:
+        return True
+    return False
+
 class Mine(Estimator):
     def reset(self, start, instruments):
         self.position, self.k = start.position, 0
@@ -308,7 +315,7 @@ def test_no_channel_leads_to_another_process(server: EstimatorServer, recording:
                 socket.socket(family, kind)
             except PermissionError:
                 found.append("refused")
-        for number in {seccomp.DENIED[platform.machine()][1:4]}:  # shmget, semget, msgget
+        for number in {[seccomp.DENIED[platform.machine()][n] for n in ("shmget", "semget", "msgget")]}:
             found.append(ctypes.CDLL(None).syscall(number, 0x5EC2E7, 1, 0o1600))
         a, b = socket.socketpair()
         a.send(b"x")
@@ -368,3 +375,90 @@ def test_a_sandbox_hides_results_and_has_no_network(recording: Recording, tmp_pa
         )
     finally:
         server.close()
+
+
+def test_a_server_whose_limits_were_changed_starts_nobody(recording: Recording) -> None:
+    """Whoever can lower the limits of a server would have all later estimators fail."""
+    resource = pytest.importorskip("resource")
+    if not hasattr(resource, "prlimit"):
+        pytest.skip("limits of another process cannot be changed here")
+    server = EstimatorServer("process", loaded=False)
+    try:
+        server.wait_until_ready()
+        hard = resource.prlimit(server.process_id, resource.RLIMIT_NOFILE)[1]
+        resource.prlimit(server.process_id, resource.RLIMIT_NOFILE, (40, hard))
+        with pytest.raises(NoAnswerError):
+            attempt(server, entrant("gnss-only"), recording, Limits(60.0, 1 << 30))
+    finally:
+        server.close()
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_who_was_killed_from_outside_is_tried_once_more(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch, times: int
+) -> None:
+    """Whoever kills a campaign may begin with an estimator's process; that is no failure of the estimator."""
+    reason = "the process died (SIGKILL) without an answer"
+    killed = Attempt("error", reason, None, 1.0, 0, "landlock")
+    answers = [killed] * times + [Attempt("ok", "", None, 1.0, 0, "landlock")]
+    monkeypatch.setattr(attempt_module, "_once", lambda *_: answers.pop(0))
+    monkeypatch.setattr(attempt_module, "_SETTLE", 0.0)
+    found = attempt_module.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+    assert (found.status, found.reason) == (("ok", "") if times == 1 else ("error", reason))
+
+
+def test_a_sealed_run_has_a_server_of_its_own(recording: Recording) -> None:
+    """What one estimator changes of its server, the next one would see."""
+    servers = set()
+    close_server()
+    for _ in range(2):
+        made = attempt_module.try_estimator(
+            entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process", sealed=True
+        )
+        assert made.status == "ok"
+        assert attempt_module._server is None
+        servers.add(prepare("process", (), sealed=True).process_id)
+    close_server()
+    assert len(servers) == 2
+
+
+@pytest.mark.skipif(not seccomp.available(), reason="the system calls are not known here")
+def test_no_attribute_of_a_file_or_of_another_process_is_changed(told: Callable[..., Any], tmp_path: Path) -> None:
+    """By them two estimators could pass something on, and one could take a file or its memory from another."""
+    letter = tmp_path / "letter"
+    letter.write_text("x")
+    calls = {
+        "mode": f"os.chmod({str(letter)!r}, 0)",
+        "mode by descriptor": f"os.fchmod(os.open({str(letter)!r}, 0), 0)",
+        "owner": f"os.chown({str(letter)!r}, os.getuid(), -1)",
+        "times": f"os.utime({str(letter)!r})",
+        "attribute": f"os.setxattr({str(letter)!r}, 'user.a', b'1')",
+        "flags": f"__import__('fcntl').ioctl(os.open({str(letter)!r}, 0), 0x40086602, bytes(8))",
+        "hint": f"__import__('fcntl').fcntl(os.open({str(letter)!r}, 0), 1036, bytes(8))",
+        "lock": f"__import__('fcntl').flock(os.open({str(letter)!r}, 0), 2)",
+        "lock of bytes": f"__import__('fcntl').lockf(os.open({str(tmp_path / 'mine.py')!r}, 0), 1)",
+        "limits": "__import__('resource').prlimit(os.getppid(), __import__('resource').RLIMIT_NOFILE, (40, 50))",
+        "limits of its own": "__import__('resource').setrlimit(__import__('resource').RLIMIT_NOFILE, (40, 50))",
+        "priority": "os.setpriority(os.PRIO_PROCESS, os.getppid(), 19)",
+        "priority of a user": "os.setpriority(os.PRIO_USER, 0, 19)",
+        "priority of its own": "os.nice(1)",
+        "processors": "os.sched_setaffinity(os.getppid(), [0])",
+        "scheduler": "os.sched_setscheduler(os.getppid(), os.SCHED_BATCH, os.sched_param(0))",
+        "file in memory": "os.memfd_create('x')",
+        "shared memory": "__import__('mmap').mmap(-1, 4096)",
+        "private memory": "__import__('mmap').mmap(-1, 4096, __import__('mmap').MAP_PRIVATE) and None",
+    }
+    tried = ", ".join(f"[{n!r}, attempted(lambda: {c})]" for n, c in calls.items())
+    found = dict(told(f"[{tried}]"))
+    allowed = {name for name, refused in found.items() if not refused}
+    assert allowed == {"limits of its own", "priority of its own", "private memory"}
+    assert letter.stat().st_mode & 0o777 != 0
+
+
+@pytest.mark.skipif(not landlock.available(), reason="this system has no Landlock")
+def test_the_state_of_the_system_cannot_be_read(told: Callable[..., Any]) -> None:
+    """What an earlier process has changed there would be told to a later one."""
+    names = ["/proc/stat", "/proc/vmstat", "/proc/1/stat", "/proc/loadavg", "/sys/kernel/uevent_seqnum"]
+    names += ["/proc/self/stat", "/proc/meminfo", "/proc/cpuinfo"]
+    found = told(f"[attempted(lambda n=n: open(n).read()) for n in {names!r}]")
+    assert found == [True] * 5 + [False] * 3

@@ -179,3 +179,54 @@ def test_together_or_one_by_one(truth: NavigationStates, limit: float) -> None:
         assert outcome(TrialLog(truth, True, limit), answers, cuts) == one_by_one
         ends.add(one_by_one[0][0])
     assert ends >= ({"ok", InvalidOutputError, DivergedError} if limit == np.inf else {MemoryError, InvalidOutputError})
+
+
+def taken(truth: NavigationStates, diagnostics: list[Any], limit: float = 1 << 30) -> TrialLog:
+    """A log with estimates of these diagnostics; what cannot be taken raises."""
+    log, encode = TrialLog(truth, True, limit), EstimateEncoder()
+    for k, given in enumerate(diagnostics):
+        position = np.array([0.9, 3.1415, 0.0])
+        log.add(encode(Estimate(float(truth.time[k]), position=position, diagnostics=given)), 1e-3)
+    return log
+
+
+def test_diagnostics_are_bounded_as_arrays_of_the_trial(truth: NavigationStates) -> None:
+    """Not only as they arrive: each is as large as the largest of it, at every step."""
+    ragged = [{"x": np.zeros((10**5, 1))}, {"x": np.zeros((1, 10**5))}]
+    with pytest.raises(MemoryError):
+        taken(truth, ragged)
+    with pytest.raises(MemoryError, match="any memory"):
+        taken(truth, [{"x": np.zeros((10**6, 1))}, {"x": np.zeros((1, 10**6))}], np.inf)  # 480 TB
+    with pytest.raises(MemoryError, match="more than 8 MiB"):
+        taken(truth, [{"x": np.zeros(20_000)}], 8 << 20)  # 0.16 MB, but 9.6 MB in 60 steps
+    assert taken(truth, [{"x": np.zeros(10_000)}], 8 << 20).trial("x", "ok", "").diagnostics["x"].shape == (1, 10_000)
+
+
+@pytest.mark.parametrize("shape", [(0,), (0, 3), (3, 0), (1, 0, 2)])
+def test_an_empty_diagnostic_is_one(truth: NavigationStates, shape: tuple[int, ...]) -> None:
+    log = taken(truth, [{"x": np.zeros(shape)}, {}, {"x": np.zeros(shape)}])
+    assert log.trial("x", "ok", "").diagnostics["x"].shape == (3, *shape)
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [({1: 0.0, "1": np.zeros(3)}, "'1' is given twice"), ({"x": np.zeros((1,) * 17)}, "17 dimensions, more than 16")],
+)
+def test_what_cannot_be_an_array_of_the_trial(truth: NavigationStates, given: dict[Any, Any], why: str) -> None:
+    with pytest.raises(InvalidOutputError, match=why):
+        taken(truth, [given])
+
+
+@pytest.mark.parametrize("variance", [5e-324, 1e-300, 0.0, 1.0])
+@pytest.mark.parametrize("covariance", [1e308, -1e308, 1e200, 2.5])
+def test_no_covariance_goes_beyond_what_lapack_can_do(
+    truth: NavigationStates, variance: float, covariance: float
+) -> None:
+    p = np.eye(9)
+    p[0, 0], p[0, 1], p[1, 0] = variance, covariance, covariance
+    log = TrialLog(truth, True)
+    vectors = {"position": np.array([0.9, 3.1415, 0.0]), "velocity": np.zeros(3), "attitude": np.zeros(3)}
+    log.add(EstimateEncoder()(Estimate(float(truth.time[0]), covariance=p, **vectors)), 1e-3)
+    with pytest.raises(InvalidOutputError, match="not positive semi-definite"):
+        log.check_covariances()
+    assert log.n == 0
