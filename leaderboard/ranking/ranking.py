@@ -168,10 +168,11 @@ def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list
 
 
 def _comes_with_simnav(name: str) -> bool:
-    from simnav.estimator import EstimatorError, find
+    from simnav.estimator import EstimatorError
+    from simnav.estimator.registry import registered
 
     try:
-        return comes_with_simnav(find(name))
+        return comes_with_simnav(registered(name))
     except EstimatorError:
         return False
 

@@ -35,7 +35,9 @@ __all__ = [
     "FILES",
     "LOOSE",
     "PROVENANCE",
+    "TRIALS",
     "DamagedError",
+    "SetAsideWarning",
     "StoreWarning",
     "atomic",
     "contents",
@@ -54,9 +56,9 @@ __all__ = [
 ]
 
 _MARKER = "simnav-results.json"
-LOOSE, COMPACTED, _TRIALS, PROVENANCE = "results", "compacted", "trials", "provenance"
+LOOSE, COMPACTED, TRIALS, PROVENANCE = "results", "compacted", "trials", "provenance"
 #: Folders inside a folder of results, those first that others refer to.
-FILES = (PROVENANCE, _TRIALS, COMPACTED, LOOSE)
+FILES = (PROVENANCE, TRIALS, COMPACTED, LOOSE)
 _STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
@@ -65,6 +67,10 @@ T = TypeVar("T")
 
 class StoreWarning(UserWarning):
     """A file of a results folder was set aside, or results in it are not current."""
+
+
+class SetAsideWarning(StoreWarning):
+    """Results in a folder cannot be those of a campaign, and were left out."""
 
 
 def create(folder: str | os.PathLike[str]) -> Path:
@@ -131,7 +137,7 @@ def read_marker(path: Path) -> dict[str, Any]:
     marker = path / _MARKER
     try:
         content = json.loads(marker.read_bytes())
-        if not isinstance(content["format"], int) or not isinstance(content.setdefault("current", {}), dict):
+        if not isinstance(content["format"], int) or not _is_current(content.setdefault("current", {})):
             raise ValueError("no format")
         return dict(content)
     except (ValueError, KeyError, TypeError) as error:
@@ -140,6 +146,20 @@ def read_marker(path: Path) -> dict[str, Any]:
         return {"format": FORMAT, "current": {}}
     except OSError as error:
         raise StoreError(f"{marker} cannot be read: {error.strerror}") from None
+
+
+def _is_current(given: object) -> bool:
+    """Whether it says which results are current: of each scenario the recording, and a variant by label."""
+
+    def entry(one: object) -> bool:
+        rows = one.get("estimators", {}) if isinstance(one, dict) else None
+        return isinstance(rows, dict) and isinstance(one["recording"], str) and all(map(_is_text, rows.values()))
+
+    return isinstance(given, dict) and all(map(entry, given.values()))
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
 
 
 def _write_marker(path: Path, current: Mapping[str, Any]) -> None:
@@ -258,7 +278,7 @@ def steadily(scan: Callable[[], T]) -> T:
 
 def sweep(path: Path) -> None:
     """Delete temporary files that a killed process left."""
-    folders = (path, *(path / name for name in (LOOSE, COMPACTED, _TRIALS)))
+    folders = (path, *(path / name for name in (LOOSE, COMPACTED, TRIALS)))
     for temporary in [file for folder in folders for file in folder.glob(".*.tmp")]:
         with contextlib.suppress(OSError):
             if time.time() - temporary.stat().st_mtime > _STALE:

@@ -107,9 +107,23 @@ class Provenance:
         """
         known = {f.name for f in fields(cls)}
         found = cls(**{name: value for name, value in values.items() if name in known})
+        for f in fields(cls):
+            _check_type(f.name, getattr(found, f.name))
         if not set(values) - known - {"id"} and found.id != values.get("id"):
             raise ValueError(f"the id should be {found.id}, and is {values.get('id')}")
         return found
+
+
+def _check_type(name: str, value: object) -> None:
+    """ValueError for what no provenance has: a folder of others may hold anything."""
+    if name == "dirty":
+        good = value is None or isinstance(value, bool)
+    elif name == "cores":
+        good = type(value) is int and 0 <= value < 1 << 31
+    else:
+        good = isinstance(value, str) and len(value) <= 300 and value.isprintable()
+    if not good:
+        raise ValueError(f"{name} = {ascii(value):.80} is no such value")
 
 
 def here(confinement: str = "", seal: str = "") -> Provenance:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.results.admission import table_of
 from simnav.leaderboard.results.ahead import made_ahead
 from simnav.leaderboard.results.errors import printable
 from simnav.leaderboard.results.provenance import Provenance
@@ -219,6 +220,9 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         known = {str(version).encode(): [n for n in names if version >= _SINCE.get(n, (1,))[0]] for version in READABLE}
         if found.names != known.get((found.metadata or {}).get(b"simnav_results", b"")):
             raise ValueError("it was not written by this version of simnav")
+        for name in found.names:
+            if name not in _HEAVY and found.field(name).type != schema().field(name).type:
+                raise ValueError(f"{name} is a column of {found.field(name).type}, not {schema().field(name).type}")
         wanted = names if columns is None else columns
         there = [n for n in wanted if n in found.names]
         groups = range(file.num_row_groups)
@@ -226,6 +230,8 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         parts = ([k] for k in groups) if heavy else filter(None, [list(groups)])
         tables = (file.read_row_groups(part, columns=there, use_threads=False) for part in parts)
         for table in made_ahead(tables) if heavy and len(groups) > 1 else tables:
+            if lacks := [n for n in there if n not in _HEAVY and table.column(n).null_count]:
+                raise ValueError(f"values of {lacks[0]} are missing")
             for name in (n for n in names if n in wanted and n not in there):
                 unknown = pa.array([_SINCE[name][1]] * len(table), schema().field(name).type)
                 table = table.append_column(schema().field(name), unknown)
@@ -281,8 +287,8 @@ def rows(
         Gives the series of a row of the table, where the column is missing.
     """
     converted: dict[str, Callable[[str], Any]] = {
-        "parameters": json.loads,
-        "draws": json.loads,
+        "parameters": table_of,
+        "draws": table_of,
         "provenance": lambda identity: provenances.get(identity) or Provenance(identity=identity),
     }
     plain = [name for name in table.column_names if name not in _HEAVY]
