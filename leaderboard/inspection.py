@@ -211,12 +211,16 @@ def verify(
     results: str | os.PathLike[str],
     *,
     key: str | os.PathLike[str] | None = None,
-    sample: int = 10,
+    sample: int | None = None,
     scenarios: Scenarios = None,
     estimators: Estimators = None,
+    rows: str | Iterable[str] = (),
     progress: Callable[..., None] | None = None,
 ) -> Verification:
     """Check the seal of results, and repeat a sample of them, which should be equal bit for bit.
+
+    Repeated are runs of every status. Scenarios come from the catalogue or from ``scenarios``, estimators from the
+    registry or from ``estimators``, and nothing that a result names is imported.
 
     Parameters
     ----------
@@ -224,10 +228,13 @@ def verify(
         Folder that a campaign wrote.
     key : path, optional
         Published key of a sealed campaign.
-    sample : int
-        Largest number of runs that are repeated.
+    sample : int, optional
+        Largest number of runs that are repeated; default: so many that 5 % of forged ones are found with 95 %
+        probability (about 59).
     scenarios, estimators : optional
         Scenarios that are not in the catalogue, and estimators that are not registered.
+    rows : str or iterable of str
+        Labels of the rows of which the sample is drawn; default: all.
     progress : callable, optional
         Called with the number of finished runs, the number of all runs, and the next run as ``note=``.
 
@@ -241,8 +248,9 @@ def verify(
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return verify_results(
-            absolute(results), read_seal(key), sample=whole("sample", sample, 1), scenarios=given,
-            estimators=requests(estimators) if estimators else [], progress=progress,
+            absolute(results), read_seal(key), sample=None if sample is None else whole("sample", sample, 1),
+            scenarios=given, estimators=requests(estimators) if estimators else [],
+            rows=[rows] if isinstance(rows, str) else list(rows), progress=progress,
         )  # fmt: skip
 
 

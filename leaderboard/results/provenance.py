@@ -22,7 +22,7 @@ from typing import Any
 
 from simnav.leaderboard.results.errors import RequestError
 
-__all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here"]
+__all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here", "is_commit"]
 
 #: Name and version of the benchmark: its scenarios, and the rules by which results are scored and ranked.
 #: Raised whenever results before and after a change must not stand in one table.
@@ -177,6 +177,18 @@ def _checkout(folder: Path) -> tuple[str, bool | None]:
         return git("rev-parse", "HEAD").strip(), bool(changes.strip())
     except (OSError, subprocess.SubprocessError):
         return "", None
+
+
+@lru_cache(maxsize=256)
+def is_commit(text: str) -> bool:
+    """Whether a text is a commit in the history of the checkout that runs; False without a checkout."""
+    if len(text) != 40 or not set(text) <= set("0123456789abcdef"):
+        return False
+    command = ["git", "-C", str(Path(__file__).resolve().parents[2]), "cat-file", "-e", f"{text}^{{commit}}"]
+    try:
+        return subprocess.run(command, capture_output=True, timeout=20.0, check=False).returncode == 0
+    except (OSError, subprocess.SubprocessError):
+        return False
 
 
 def _cpu() -> str:
