@@ -33,7 +33,7 @@ from simnav.leaderboard.given import (
     seeds_of,
     whole,
 )
-from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, verify
+from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ __all__ = [
     "run",
     "scenario_of",
     "scenarios_of",
+    "seal",
     "sweep",
     "tune",
     "verify",

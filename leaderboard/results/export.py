@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.results.files import whole
+from simnav.leaderboard.results.files import FORMULA, whole
 from simnav.leaderboard.results.formats import writes
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.results.provenance import Provenance, benchmark_of, distinct
@@ -158,6 +158,8 @@ def _with_units(rows: pa.Table) -> pa.Table:
             name += _UNIT_SUFFIX.get(unit, "_" + unit)
         elif values.type == pa.bool_():
             values = pc.if_else(values, "True", "False")
+        elif values.type == pa.string():  # a spreadsheet would compute it
+            values = pc.replace_substring_regex(values, f"({FORMULA})", r"'\1")
         columns[names.get(name, name)] = values
     return pa.table(columns)
 
