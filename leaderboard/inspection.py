@@ -279,8 +279,9 @@ def verify(
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return verify_results(
-            absolute(results), read_seal(key, secret=False), sample=None if sample is None else whole("sample", sample, 1),
-            scenarios=given, estimators=requests(estimators) if estimators else [],
+            absolute(results), read_seal(key, secret=False), scenarios=given,
+            sample=None if sample is None else whole("sample", sample, 1),
+            estimators=requests(estimators) if estimators else [],
             rows=[rows] if isinstance(rows, str) else list(rows), progress=progress,
         )  # fmt: skip
 

@@ -7,8 +7,9 @@ machine, or of a busier one: only what no machine explains counts as different.
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -89,6 +90,12 @@ def differing(stored: Result, again: Result) -> tuple[list[str], list[str]]:
     different, undecided = list[str](), list[str]()
     for name in ("scenario_digest", "estimator_digest", "simnav", "parameters", "reference"):
         _unequal(different, name, getattr(stored, name), getattr(again, name))
+    if again.learned and not stored.learned:
+        undecided.append(
+            "the results do not say what the row learned from; they are of an older format, or were changed"
+        )
+    else:
+        _unequal(different, "learned", _flat(stored.learned), _flat(again.learned))
     if stored.status != again.status:
         (undecided if _explained(stored, again) else different).append(
             f"{stored.status} is stored, {again.status} came out{f' ({again.reason:.200})' if again.reason else ''}"
@@ -118,6 +125,10 @@ def differing(stored: Result, again: Result) -> tuple[list[str], list[str]]:
 def _unequal(found: list[str], name: str, stored: Any, again: Any) -> None:
     if stored != again:
         found.append(f"{name} {_short(stored)} is stored, {_short(again)} came out")
+
+
+def _flat(value: Mapping[str, Any]) -> str:
+    return json.dumps(dict(value), sort_keys=True, default=str)
 
 
 def _short(value: object) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["CONFIDENCE", "SHARE", "finds", "findable", "sample_size"]
+__all__ = ["CONFIDENCE", "SHARE", "findable", "finds", "sample_size"]
 
 #: Share of forged runs that should be found, and with which probability.
 SHARE, CONFIDENCE = 0.05, 0.95

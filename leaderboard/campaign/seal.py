@@ -4,8 +4,8 @@ The seed of a run is a keyed hash (BLAKE2b) of the scenario's id and the run's n
 hash of the key, never the key or the seed.
 
 A key file holds a secret that was drawn at random. Its **commitment**, a hash, is published before the campaign. A
-second line ``public TEXT`` may mix in a value that nobody could choose, such as the numbers of a lottery drawn after the
-commitment: then whoever made the secret did not choose the seeds either.
+second line ``public TEXT`` may mix in a value that nobody could choose, such as the numbers of a lottery drawn after
+the commitment: then whoever made the secret did not choose the seeds either.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import secrets
 import stat
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from simnav.leaderboard.campaign.sources import digest
@@ -131,7 +132,9 @@ def read_seal(path: str | os.PathLike[str] | None, *, secret: bool = True) -> Se
         )
     if secret:
         if os.name == "posix" and mode & 0o077:
-            raise RequestError(f"the key file {file} can be read by others (mode {mode:03o}); 'chmod 600 {file}' mends it")
+            raise RequestError(
+                f"the key file {file} can be read by others (mode {mode:03o}); 'chmod 600 {file}' mends it"
+            )
         if weakness := _weakness(words):
             raise RequestError(f"the key file {file} {weakness}; 'simnav seal NEWFILE' makes one that is random")
     key = hashlib.blake2b(words, digest_size=32, person=b"simnav key").digest()
@@ -170,7 +173,7 @@ def _weakness(words: bytes) -> str:
     n = len(words)
     period = next((p for p in range(1, n // 2 + 1) if words[p:] == words[:-p]), n)
     part = words[:period]
-    steps = bytes((b - a) % 256 for a, b in zip(part, part[1:], strict=False))
+    steps = bytes((b - a) % 256 for a, b in pairwise(part))
     bits = min(_entropy(part), _entropy(steps) * len(part) / max(len(steps), 1))
     if bits < _BITS:
         return f"holds a key that is worth {max(bits, 0.0):.0f} bits at most, and {_BITS:.0f} or more are wanted"
@@ -237,7 +240,9 @@ def mix_public(path: str | os.PathLike[str], public: str) -> Seal:
         raise RequestError(f"the key file {file} has the public value {seal.public!r:.80} already")
     content, _ = _content(file)
     if re.search(rb"\s", content):
-        raise RequestError(f"the key file {file} holds white space; a public value is mixed into a key of one word only")
+        raise RequestError(
+            f"the key file {file} holds white space; a public value is mixed into a key of one word only"
+        )
     try:
         with open(file, "wb") as opened:  # it keeps its mode
             opened.write(content + f"\npublic {text}\n".encode())

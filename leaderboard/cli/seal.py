@@ -28,7 +28,9 @@ def command(
         made = interface.seal(key, public=public)
         where = key.expanduser().resolve()
         out.document({"key": str(where), "commitment": made.commitment, "seal": made.hash, "public": made.public})
-        out.print(f"key:        {where} (keep it secret until the campaign has ended)", f"commitment: {made.commitment}")
+        out.print(
+            f"key:        {where} (keep it secret until the campaign has ended)", f"commitment: {made.commitment}"
+        )
         if made.public:
             out.print(f"public:     {made.public}", f"seal:       {made.hash} (stands in the results)")
         out.print(f"next:       publish the commitment, then simnav campaign --sealed {key}")

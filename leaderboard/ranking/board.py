@@ -184,6 +184,8 @@ class Row:
         Median time per epoch [s].
     peak_memory : int
         Largest of all runs [bytes].
+    learned : str
+        What it says that it learned from; empty where it learned nothing.
     """
 
     estimator: str
@@ -213,6 +215,7 @@ class Row:
     faulty: Consistency = field(default_factory=Consistency)
     update_median: float = math.nan
     peak_memory: int = 0
+    learned: str = ""
 
     @property
     def ranked(self) -> bool:

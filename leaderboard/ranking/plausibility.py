@@ -27,11 +27,11 @@ __all__ = ["FLOORS", "LEAST_ERROR", "MARGIN", "beats", "below_floor", "too_good"
 MARGIN = 0.9
 #: Runs of the oracle on the same seeds from which on a row is compared with them, run by run.
 LEAST_PAIRS = 5
-#: On recorded voyages, the part of a plain row's error below which nobody is believed: of the plain smoother, and of the
-#: plain filter where no smoother ran. The first number is for the geometric mean over the recordings, the second one
-#: for a single recording. Of the rows of simnav the best has 0.88 of the smoother, and 0.09 of the filter.
+#: On recorded voyages, the part of a plain row's error below which nobody is believed: of the plain smoother, and of
+#: the plain filter where no smoother ran. The first number is for the geometric mean over the recordings, the second
+#: one for a single recording. Of the rows of simnav the best has 0.88 of the smoother, and 0.09 of the filter.
 FLOORS = {"smoother": (0.25, 0.1), "filter": (0.04, 0.02)}
-#: Horizontal error [m] below which nobody is believed on a recorded voyage: the best references are known to centimetres.
+#: Horizontal error [m] below which nobody is believed on a recorded voyage: references are known to centimetres.
 LEAST_ERROR = 0.01
 #: Probability that an honest row that is as good as possible is flagged on any scenario of a board.
 _ALPHA = 0.001

@@ -46,7 +46,15 @@ from simnav.leaderboard.ranking.board import (
 )
 from simnav.leaderboard.ranking.evidence import lacking
 from simnav.leaderboard.ranking.identity import real_time_twin
-from simnav.leaderboard.ranking.remarks import recorded_remarks, reference_remarks, remarks, request_remarks, seed_remarks
+from simnav.leaderboard.ranking.learning import learned_by
+from simnav.leaderboard.ranking.remarks import (
+    learned_remarks,
+    recorded_remarks,
+    reference_remarks,
+    remarks,
+    request_remarks,
+    seed_remarks,
+)
 from simnav.leaderboard.ranking.runs import Runs, group
 from simnav.leaderboard.ranking.scenario_runs import Cell, ScenarioRuns
 from simnav.leaderboard.ranking.statistics import (
@@ -255,6 +263,7 @@ def _track(
             *remarks(separation, unit, found, references, why),
             *request_remarks([(len(t.seeds), requested.get(t.name, ())) for t in used]),
             *reference_remarks(references),
+            *learned_remarks(found),
             *seed_remarks([t.seals for t in used]),
             *recorded_remarks(sum(t.recorded for t in used), len(used)),
         ), why, tuple(found),
@@ -367,6 +376,7 @@ def _rows(
             "faulty": _consistency([c.runs for c in mine], "_faulty"),
             "update_median": _median([_median(x) for c in mine if len(x := c.runs.numbers("update_median"))]),
             "peak_memory": max(c.runs.peak_memory for c in mine),
+            "learned": learned_by(r for c in mine for r in c.runs.results),
         })  # fmt: skip
     return rows, separation, why
 

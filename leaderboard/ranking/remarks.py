@@ -11,9 +11,10 @@ from simnav.leaderboard.ranking.statistics import FEWEST, Separation, smallest_p
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Reference, Row
 
-__all__ = ["recorded_remarks", "reference_remarks", "remarks", "request_remarks", "seed_remarks"]
+__all__ = ["learned_remarks", "recorded_remarks", "reference_remarks", "remarks", "request_remarks", "seed_remarks"]
 
 _LEVEL = 0.05
+_LEARNED = 5  # rows that a remark names
 
 
 def remarks(
@@ -91,6 +92,15 @@ def request_remarks(scenarios: Sequence[tuple[int, Sequence[int]]]) -> tuple[str
         steps = ", ".join(map(str, max(raised, key=lambda numbers: len(numbers))))
         found.append(f"The number of seeds was raised after results were there ({steps}) on {len(raised)} {of}.")
     return tuple(found)
+
+
+def learned_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Which rows learned their parameters, and from what, as they say."""
+    found = [f"{r.estimator} {r.learned}" for r in rows if r.learned]
+    if not found:
+        return ()
+    more = f"; and {len(found) - _LEARNED} rows more" if len(found) > _LEARNED else ""
+    return (f"Learned, as the rows say: {'; '.join(found[:_LEARNED])}{more}.",)
 
 
 def seed_remarks(scenarios: Sequence[Collection[str]]) -> tuple[str, ...]:

@@ -139,7 +139,7 @@ class ScenarioRuns:
         self.cells = {n: self._cell(r) for n, r in entries.items()}
 
     def _said_to_be_recorded(self) -> bool:
-        """What the notes say of a scenario that the catalogue does not have; nobody has an oracle for a recorded one."""
+        """What the notes say of a scenario that is not in the catalogue; of a recorded one there is no oracle."""
         if any(ORACLES.get(self.track.score, "oracle") == n for n in self.errors):
             return False
         return bool(self.notes) and all(_RECORDING.match(note) for note in self.notes.values())
@@ -206,7 +206,6 @@ class ScenarioRuns:
             return True
         logs = [_ratio(error, self._stored.value) for seed, error in mine.items() if seed in self.divisor]
         return self._stored.bounds and too_good(logs, self._stored, scenarios)
-
 
     def _below_floor(self, name: str) -> bool:
         if self.track.score not in ORACLES:  # no position error

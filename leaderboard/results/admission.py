@@ -181,7 +181,7 @@ def fault_of(result: Result) -> str:
         value = getattr(result, name)
         if not isinstance(value, str) or len(value) > most or (name != "reason" and not value.isprintable()):
             return f"{name} = {_short(value)} is no printable text of up to {most} characters"
-    for name in ("parameters", "draws"):
+    for name in ("parameters", "draws", "learned"):
         if not isinstance(getattr(result, name), Mapping):
             return f"{name} is no table of values by name"
     for name in ("seconds", "time_limit", "peak_memory", "memory_limit"):

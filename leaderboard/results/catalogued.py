@@ -27,7 +27,7 @@ def catalogued_scenario(identity: str) -> Scenario:
         If it is no versioned id, or the catalogue has no such scenario: one sentence.
     """
     if not is_scenario_id(identity):
-        raise RequestError(f"scenario = {ascii(identity):.80} is no versioned id of the catalogue")
+        raise RequestError(f"scenario = {identity!a:.80} is no versioned id of the catalogue")
     path = next((h.path for h in headers() if h.id == identity), None)
     if path is None:
         raise RequestError(f"scenario {identity} is not in the catalogue; give its file with --scenario")

@@ -26,7 +26,7 @@ __all__ = ["contradiction", "gather"]
 
 #: Relative difference of a score that another processor may make.
 _CLOSE = 1e-6
-_FACTS = ("status", "parameters", "reference", "scenario_digest", "estimator_digest")
+_FACTS = ("status", "parameters", "learned", "reference", "scenario_digest", "estimator_digest")
 
 
 def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[str]]) -> Path:

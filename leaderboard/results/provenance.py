@@ -123,7 +123,7 @@ def _check_type(name: str, value: object) -> None:
     else:
         good = isinstance(value, str) and len(value) <= 300 and value.isprintable()
     if not good:
-        raise ValueError(f"{name} = {ascii(value):.80} is no such value")
+        raise ValueError(f"{name} = {value!a:.80} is no such value")
 
 
 def here(confinement: str = "", seal: str = "") -> Provenance:

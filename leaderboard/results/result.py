@@ -38,8 +38,8 @@ __all__ = [
 ]
 
 #: Version of the format of results, and those that can be read.
-FORMAT = 4
-READABLE = (1, 2, 3, FORMAT)
+FORMAT = 5
+READABLE = (1, 2, 3, 4, FORMAT)
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
@@ -56,6 +56,7 @@ _SINCE: dict[str, tuple[int, Any]] = {
     "estimator_digest": (3, ""),
     "provenance": (3, ""),
     "draws": (4, "{}"),
+    "learned": (5, "{}"),
 }
 
 #: Columns that take most of the memory of a file of results.
@@ -110,6 +111,10 @@ class Result:
         Versions, machine and day; a file names its id only.
     draws : mapping of str to object
         What was drawn for the run, by key path, in the units of the scenario's file.
+    learned : mapping of str to object
+        What the estimator says that it learned from: ``learned_from``, pairs of a first and a last number as of
+        `simnav.estimator.Estimator`, and ``trained_on``, the record of the training. Empty where it learned nothing,
+        or results are older than format 5.
     """
 
     scenario: str
@@ -134,6 +139,7 @@ class Result:
     estimator_digest: str = ""
     provenance: Provenance = field(default_factory=Provenance)
     draws: Mapping[str, Any] = field(default_factory=dict)
+    learned: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reason", printable(self.reason))  # it is what an estimator's exception says
@@ -183,6 +189,7 @@ def schema() -> pa.Schema:
             ("estimator_digest", pa.string()),
             ("provenance", pa.string()),
             ("draws", pa.string()),
+            ("learned", pa.string()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )
@@ -197,6 +204,7 @@ def to_table(result: Result) -> pa.Table:
     row["provenance"] = result.provenance.id
     row["parameters"] = json.dumps(dict(result.parameters), sort_keys=True, default=str)
     row["draws"] = json.dumps(dict(result.draws), default=str)
+    row["learned"] = json.dumps(dict(result.learned), sort_keys=True, default=str)
     row["scores"] = [(str(name), float(value)) for name, value in result.scores.items()]
     row["series"] = [{"name": n, "shape": list(a.shape), "values": a.ravel()} for n, a in arrays.items()]
     return pa.Table.from_pylist([row], schema=schema())
@@ -289,6 +297,7 @@ def rows(
     converted: dict[str, Callable[[str], Any]] = {
         "parameters": table_of,
         "draws": table_of,
+        "learned": table_of,
         "provenance": lambda identity: provenances.get(identity) or Provenance(identity=identity),
     }
     plain = [name for name in table.column_names if name not in _HEAVY]

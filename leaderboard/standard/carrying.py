@@ -23,7 +23,6 @@ from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
 from simnav.leaderboard.campaign.verification import compared, listed, request_of
 from simnav.leaderboard.results import store
-from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.packing import write_packed
@@ -144,7 +143,7 @@ def _repeatable(
         if change == "gone":
             left.append(f"{label} on {name}: the scenario is not there any more")
             continue
-        scenario = known[name] = known.get(name) or load(name)
+        scenario = known[name] = known.get(name) or catalogued_scenario(name)
         if any(r.scenario_digest != scenario.content_hash() for r in of[row]):
             left.append(f"{label} on {name}: the scenario itself has changed")
             continue

@@ -28,7 +28,7 @@ __all__ = ["Again", "Asked", "Wanted", "answer"]
 
 
 #: What is compared of a run beside its status and scores.
-_FACTS = ("key", "recording", "parameters", "reference", "note", "draws", "seconds", "peak_memory", "simnav",
+_FACTS = ("key", "recording", "parameters", "reference", "learned", "note", "draws", "seconds", "peak_memory", "simnav",
           "time_limit", "memory_limit", "scoring", "scenario_digest", "estimator_digest")  # fmt: skip
 
 
@@ -138,8 +138,8 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
             progress(done, total, what)
             try:
                 run_campaign(
-                    [catalogued_scenario(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder, workers=1,
-                    confinement=asked.confinement, seal=seal if sealed else PUBLIC,
+                    [catalogued_scenario(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder,
+                    workers=1, confinement=asked.confinement, seal=seal if sealed else PUBLIC,
                     progress=partial(_noted, progress, done, total, what),
                 )  # fmt: skip
             except Exception as error:

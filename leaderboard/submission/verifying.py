@@ -301,8 +301,8 @@ def _limits(results: Sequence[Result]) -> list[str]:
         other = [r for r in results if r.scenario == scenario and (r.time_limit, r.memory_limit) != usual]
         if other:
             findings.append(
-                f"{len(other)} results on {scenario} have other limits than {usual[0]:g} s and {usual[1] >> 20} MiB, such "
-                f"as {other[0].time_limit:g} s and {other[0].memory_limit >> 20} MiB"
+                f"{len(other)} results on {scenario} have other limits than {usual[0]:g} s and {usual[1] >> 20} MiB, "
+                f"such as {other[0].time_limit:g} s and {other[0].memory_limit >> 20} MiB"
             )
     return findings
 
