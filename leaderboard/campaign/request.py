@@ -181,8 +181,8 @@ def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
             raise RequestError(
                 f"{other.name} and {r.name}: the rows of both would be called {r.label!r}; give one file another name"
             )
-    for label, other in lookalikes(by_label).items():
-        raise RequestError(f"estimator {label!r} can be taken for {other!r} in a table; give it another name")
+    for label, alike in lookalikes(by_label).items():
+        raise RequestError(f"estimator {label!r} can be taken for {alike!r} in a table; give it another name")
     return list(by_label.values())
 
 

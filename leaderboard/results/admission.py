@@ -201,8 +201,6 @@ def _fault_of_scores(result: Result) -> str:
 
 
 def _fault_of_reference(result: Result) -> str:
-    if type(result.reference) is not bool:
-        return f"reference = {_short(result.reference)} is neither true nor false"
     if result.reference != _is_reference(_base(result.estimator)):
         said = "says that it was told the truth, which only simnav's own references are"
         return said if result.reference else "says that it was not told the truth, as simnav's own references are"

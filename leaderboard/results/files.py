@@ -63,7 +63,7 @@ def cell(value: object) -> object:
     >>> cell("=HYPERLINK(1)"), cell("-1.5"), cell(-1.5), cell("ekf")
     ("'=HYPERLINK(1)", '-1.5', -1.5, 'ekf')
     """
-    if not isinstance(value, str) or not re.match(FORMULA, value):
+    if not isinstance(value, str) or value == "-" or not re.match(FORMULA, value):
         return value
     try:
         float(value)

@@ -152,8 +152,10 @@ def _is_current(given: object) -> bool:
     """Whether it says which results are current: of each scenario the recording, and a variant by label."""
 
     def entry(one: object) -> bool:
-        rows = one.get("estimators", {}) if isinstance(one, dict) else None
-        return isinstance(rows, dict) and isinstance(one["recording"], str) and all(map(_is_text, rows.values()))
+        if not isinstance(one, dict) or not isinstance(one.get("recording"), str):
+            return False
+        rows = one.get("estimators", {})
+        return isinstance(rows, dict) and all(map(_is_text, rows.values()))
 
     return isinstance(given, dict) and all(map(entry, given.values()))
 

@@ -23,6 +23,7 @@ from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
 from simnav.leaderboard.campaign.verification import compared, listed, request_of
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.packing import write_packed
