@@ -153,6 +153,9 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
             open_bundle(path, Path(scratch) / str(k)).results if path.is_file() else path
             for k, path in enumerate(paths)
         ]
+        for path, place in zip(paths, places, strict=True):
+            if path.is_file():  # how many seeds a submission asked says nothing of the campaigns of a board
+                (place / requested.FILE).unlink(missing_ok=True)
         target = gather(absolute(output), places)
     return results_of(target)
 

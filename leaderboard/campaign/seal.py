@@ -176,7 +176,7 @@ def _weakness(words: bytes) -> str:
     steps = bytes((b - a) % 256 for a, b in pairwise(part))
     bits = min(_entropy(part), _entropy(steps) * len(part) / max(len(steps), 1))
     if bits < _BITS:
-        return f"holds a key that is worth {max(bits, 0.0):.0f} bits at most, and {_BITS:.0f} or more are wanted"
+        return f"holds a key that is worth {abs(round(bits))} bits at most, and {_BITS:.0f} or more are wanted"
     hexadecimal = re.fullmatch(rb"[0-9a-fA-F]+", words)
     printable = re.fullmatch(rb"[\t-~]+", words)
     if printable and not hexadecimal and (b" " in words or not all(re.search(letters, words) for letters in _LETTERS)):

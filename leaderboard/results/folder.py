@@ -17,6 +17,7 @@ import contextlib
 import errno
 import json
 import os
+import stat
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -140,7 +141,7 @@ def read_marker(path: Path) -> dict[str, Any]:
         if not isinstance(content["format"], int) or not _is_current(content.setdefault("current", {})):
             raise ValueError("no format")
         return dict(content)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         set_aside(marker, error)
         _write_marker(path, {})
         return {"format": FORMAT, "current": {}}
@@ -246,7 +247,16 @@ def set_aside(path: Path, error: Exception) -> None:
 def files_of(path: Path) -> list[Path]:
     """All files of results, those with many first."""
     loose = sorted((path / LOOSE).glob("*.parquet"))  # listed first: what is gone by now is in a part
-    return parts_of(path) + loose
+    return [file for file in parts_of(path) + loose if not _is_special(file)]
+
+
+def _is_special(file: Path) -> bool:
+    """Whether it is a pipe or a device, on which a reader would wait for ever."""
+    try:
+        mode = file.stat().st_mode
+    except OSError:  # gone, or not to be read: whoever opens it says so
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def parts_of(path: Path) -> list[Path]:

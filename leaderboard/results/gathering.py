@@ -149,10 +149,12 @@ def other_recording(a: Result, b: Result) -> str:
 
 
 def _copy(path: Path, target: Path, mine: Collection[str]) -> None:
-    """Copy the files of a folder; of trials only those of results that no other folder holds, too."""
+    """Copy the files of a folder; a trial from the folder that first holds its result."""
     for part in store.FILES:
         for file in sorted((path / part).glob("[!.]*")):
             if file.suffix not in (".json", ".parquet") or (part == TRIALS and file.stem not in mine):
+                continue
+            if file.is_symlink() or not file.is_file():  # what a link of others leads to is none of their results
                 continue
             place = target / part / file.name
             if place.exists() and (part not in (COMPACTED, LOOSE) or place.read_bytes() == file.read_bytes()):

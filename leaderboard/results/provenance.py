@@ -88,9 +88,7 @@ class Provenance:
         """Short id: a digest of all fields; empty where nothing is known."""
         if self.identity or self == Provenance():
             return self.identity
-        content = {name: value for name, value in asdict(self).items() if name != "seal" or value}
-        text = json.dumps(content, sort_keys=True)
-        return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
+        return _identity(asdict(self))
 
     def to_dict(self) -> dict[str, Any]:
         """All fields, with the id."""
@@ -109,9 +107,17 @@ class Provenance:
         found = cls(**{name: value for name, value in values.items() if name in known})
         for f in fields(cls):
             _check_type(f.name, getattr(found, f.name))
-        if not set(values) - known - {"id"} and found.id != values.get("id"):
-            raise ValueError(f"the id should be {found.id}, and is {values.get('id')}")
+        later = set(values) - known - {"id"}
+        identity = _identity({k: v for k, v in values.items() if k != "id"} | {"identity": ""}) if later else found.id
+        if identity != values.get("id"):
+            raise ValueError(f"the id should be {identity}, and is {values.get('id')!a:.80}")
         return found
+
+
+def _identity(values: Mapping[str, Any]) -> str:
+    """Digest of all fields; a seal counts where there is one."""
+    content = {name: value for name, value in values.items() if name != "seal" or value}
+    return hashlib.blake2b(json.dumps(content, sort_keys=True).encode(), digest_size=6).hexdigest()
 
 
 def _check_type(name: str, value: object) -> None:

@@ -133,8 +133,13 @@ def provenances(folder: str | os.PathLike[str]) -> dict[str, Provenance]:
     found = {}
     for file in sorted((Path(folder) / PROVENANCE).glob("*.json")):
         try:
-            one = Provenance.from_dict(json.loads(file.read_bytes()))
-        except (ValueError, TypeError, AttributeError) as error:
+            if not file.is_file():  # a pipe, on which a reader would wait for ever
+                continue
+            values = json.loads(file.read_bytes())
+            one = Provenance.from_dict(values)
+            if values["id"] != file.stem:
+                raise ValueError(f"it is called {file.stem}, and its id is {values['id']}")
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             set_aside(file, error)
             continue
         except OSError as error:

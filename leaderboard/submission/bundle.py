@@ -267,6 +267,10 @@ def _check_rows(contents: Contents, what: str, files: Mapping[str, Path]) -> Non
     """Whether the estimators are in the bundle, and are none of simnav's own."""
     from simnav.estimator.registry import is_own
 
+    for name in ("title", "benchmark", "profile", "main"):
+        text = getattr(contents, name)
+        if not (text.isascii() and text.isprintable()):
+            raise RequestError(f"{what}: {name} = {text!a:.80} is no printable ASCII text")
     labels = [row.label for row in contents.estimators]
     if len(set(labels)) < len(labels):
         raise RequestError(f"{what}: two of its estimators have the same label")

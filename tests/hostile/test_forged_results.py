@@ -296,6 +296,45 @@ def test_a_provenance_of_other_types_is_set_aside(folder: Path, value: Any) -> N
     assert not any(r.provenance.cpu for r in store.load(folder))
 
 
+@pytest.mark.parametrize("more", [{}, {"later": 1}])
+def test_nobody_says_where_the_results_of_others_were_made(folder: Path, tmp_path: Path, more: dict[str, Any]) -> None:
+    """A provenance under the id of another one, also with a field that hides it."""
+    (file,) = (folder / "provenance").glob("*.json")
+    kept = file.read_bytes()
+    file.write_text(json.dumps(json.loads(kept) | {"cpu": "another"} | more))
+    with pytest.warns(store.StoreWarning, match="the id should be"):
+        store.load(folder)
+    file.with_name("0123456789ab.json").write_bytes(kept)
+    with pytest.warns(store.StoreWarning, match="it is called 0123456789ab"):
+        store.load(folder)
+
+
+def test_links_and_pipes_of_others_are_left_alone(folder: Path, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.json"
+    secret.write_text('{"of": "mine"}')
+    (folder / "provenance" / "0123456789ab.json").symlink_to(secret)
+    (folder / "results").mkdir(exist_ok=True)
+    os.mkfifo(folder / "results" / "v-9.parquet")
+    os.mkfifo(folder / "provenance" / "pipe.json")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert len(simnav.merge([folder], tmp_path / "merged")) == 2
+    assert [p.name for p in (tmp_path / "merged" / "provenance").iterdir()] == [
+        r.provenance.id + ".json" for r in store.load(tmp_path / "merged")[:1]
+    ]
+
+
+@pytest.mark.parametrize(
+    "current",
+    [{"a-v1": 1}, {"a-v1": {"recording": "r", "estimators": [1]}}, {"a-v1": {"estimators": {"ekf": {}}}}, {"a-v1": []}],
+)
+def test_a_marker_of_other_types_is_set_aside(folder: Path, current: Any) -> None:
+    marker = folder / "simnav-results.json"
+    marker.write_text(json.dumps(json.loads(marker.read_text()) | {"current": current}))
+    with pytest.warns(store.StoreWarning, match="set aside"):
+        assert store.load(folder) == []
+
+
 def test_scores_that_are_no_numbers_stop_nothing(folder: Path) -> None:
     forge(folder, fields(score_horizontal_rmse=math.inf, score_r95=math.nan))
     ranking = simnav.rank(folder)
