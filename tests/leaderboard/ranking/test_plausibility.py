@@ -66,11 +66,11 @@ def test_one_recording_that_is_read_is_enough() -> None:
 
 
 def test_honest_rows_are_ranked() -> None:
-    """With as much better than the plain smoother as any row of simnav is on any recorded voyage, and more."""
+    """Rows that are better than the plain smoother by more than any row of simnav is on a recorded voyage."""
     others = runs("ekf", 1.0) + runs("ekf-rts", 1.0, smoothed=0.5)
     for part in (0.35, 0.5, 0.9, 3.0):
         assert standing(others + runs("honest", part), "honest")[0] == "ranked"
-    assert standing(others, "ekf-rts")[0] == "ranked"
+    assert standing(others, "ekf-rts")[0] == "identical"  # in real time it is ekf, and no more than that
 
 
 def test_a_recorded_scenario_is_recorded_whatever_the_notes_say() -> None:
