@@ -96,9 +96,8 @@ def test_what_is_no_pairs_of_integers_is_refused(told: object) -> None:
 
 def test_results_say_what_a_row_learned_from(tmp_path: Path) -> None:
     """Of the policy that comes along, and of a file of others that learned."""
-    (tmp_path / "taught.py").write_text(
-        LEARNED.format(ranges="[(3, 5)]\n    trained_on = {'scenario': 'bay', 'voyages': 3}").replace("Learned", "Taught")
-    )
+    told = "[(3, 5)]\n    trained_on = {'scenario': 'bay', 'voyages': 3}"
+    (tmp_path / "taught.py").write_text(LEARNED.format(ranges=told).replace("Learned", "Taught"))
     scenario = load("gnss-noise-step").model_copy(update={"duration": 20.0})
     asked = [EstimatorRequest("policy-ekf"), EstimatorRequest(str(tmp_path / "taught.py")), EstimatorRequest("ekf")]
     run_campaign([scenario], asked, [7], tmp_path / "out", workers=1, confinement="none")
