@@ -19,6 +19,7 @@ from simnav.leaderboard.results.scratch import scratch
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
     from simnav.leaderboard.campaign.rescoring import Rescored
+    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.campaign.verification import Verification
     from simnav.leaderboard.papers.reproduction import Reproduction
     from simnav.leaderboard.ranking.board import Ranking
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["bound", "cite", "merge", "rank", "reproduce", "rescore", "verify"]
+__all__ = ["bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"]
 
 
 def rank(
@@ -113,7 +114,7 @@ def rescore(
     with mistakes(StoreError):
         return rescore_results(
             absolute(results), [n.strip() for n in names if n.strip()], given, progress,
-            seal=read_seal(key),
+            seal=read_seal(key, secret=False),
         )  # fmt: skip
 
 
@@ -149,8 +150,41 @@ def merge(folders: Iterable[str | os.PathLike[str]], output: str | os.PathLike[s
         if not paths:
             raise RequestError("no folder was named whose results should be merged")
         places = [open_bundle(path, home / str(k)).results if path.is_file() else path for k, path in enumerate(paths)]
+        for path, place in zip(paths, places, strict=True):
+            if path.is_file():  # how many seeds a submission asked says nothing of the campaigns of a board
+                (place / requested.FILE).unlink(missing_ok=True)
         target = gather(absolute(output), places)
     return results_of(target)
+
+
+def seal(key: str | os.PathLike[str], *, public: str = "") -> Seal:
+    """Make or check the key of sealed seeds, for the commitment that is published before a campaign.
+
+    Parameters
+    ----------
+    key : path
+        File of the key. One that does not exist is made, with 256 random bits; one that exists should be readable by
+        its owner only, and hold what was drawn at random.
+    public : str
+        A value that nobody can choose and everybody can look up, such as the numbers of a lottery that were drawn after
+        the commitment was published. The seeds then follow from the key and from this value. It is stored in the file.
+
+    Returns
+    -------
+    simnav.leaderboard.campaign.seal.Seal
+        Its ``commitment`` is to be published before the campaign. Its ``hash`` stands in the results: the same without
+        a public value.
+
+    Raises
+    ------
+    RequestError
+        If the key is no secret, or has another public value already.
+    """
+    from simnav.leaderboard.campaign.seal import make_key, mix_public, read_seal
+
+    file = absolute(key)
+    made = read_seal(file) if file.exists() else make_key(file)
+    return mix_public(file, public) if public else made
 
 
 def cite(results: str | os.PathLike[str] | None = None) -> Citation:
@@ -208,12 +242,16 @@ def verify(
     results: str | os.PathLike[str],
     *,
     key: str | os.PathLike[str] | None = None,
-    sample: int = 10,
+    sample: int | None = None,
     scenarios: Scenarios = None,
     estimators: Estimators = None,
+    rows: str | Iterable[str] = (),
     progress: Callable[..., None] | None = None,
 ) -> Verification:
     """Check the seal of results, and repeat a sample of them, which should be equal bit for bit.
+
+    Repeated are runs of every status. Scenarios come from the catalogue or from ``scenarios``, estimators from the
+    registry or from ``estimators``, and nothing that a result names is imported.
 
     Parameters
     ----------
@@ -221,10 +259,13 @@ def verify(
         Folder that a campaign wrote.
     key : path, optional
         Published key of a sealed campaign.
-    sample : int
-        Largest number of runs that are repeated.
+    sample : int, optional
+        Largest number of runs that are repeated; default: so many that 5 % of forged ones are found with 95 %
+        probability (about 59).
     scenarios, estimators : optional
         Scenarios that are not in the catalogue, and estimators that are not registered.
+    rows : str or iterable of str
+        Labels of the rows of which the sample is drawn; default: all.
     progress : callable, optional
         Called with the number of finished runs, the number of all runs, and the next run as ``note=``.
 
@@ -238,8 +279,10 @@ def verify(
     given = [] if scenarios is None else scenarios_of(scenarios)
     with mistakes(StoreError):
         return verify_results(
-            absolute(results), read_seal(key), sample=whole("sample", sample, 1), scenarios=given,
-            estimators=requests(estimators) if estimators else [], progress=progress,
+            absolute(results), read_seal(key, secret=False), scenarios=given,
+            sample=None if sample is None else whole("sample", sample, 1),
+            estimators=requests(estimators) if estimators else [],
+            rows=[rows] if isinstance(rows, str) else list(rows), progress=progress,
         )  # fmt: skip
 
 

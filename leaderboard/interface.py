@@ -32,7 +32,7 @@ from simnav.leaderboard.given import (
     seeds_of,
     whole,
 )
-from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, verify
+from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
@@ -72,6 +72,7 @@ __all__ = [
     "run",
     "scenario_of",
     "scenarios_of",
+    "seal",
     "sweep",
     "tune",
     "verify",

@@ -242,7 +242,7 @@ def verify_bundle(
     bundle: str | os.PathLike[str],
     *,
     key: str | os.PathLike[str] | None = None,
-    sample: int = 10,
+    sample: int | None = None,
     present: bool = False,
     tolerance: float | None = None,
     progress: Callable[..., None] | None = None,
@@ -256,8 +256,9 @@ def verify_bundle(
     key : path, optional
         File of a secret key. The estimators also run on seeds that are derived from it, which the submission cannot
         know, and should be no worse there.
-    sample : int
-        Largest number of runs that are repeated.
+    sample : int, optional
+        Largest number of runs that are repeated; default: so many that 5 % of forged ones are found with 95 %
+        probability (about 59).
     present : bool
         True: use the packages of this environment, which is quick and needs no network. By default a new environment is
         made.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.request import enlist
@@ -33,6 +33,8 @@ class Entrant:
         Entry point of another package that registers it; empty where there is none.
     learned_from : tuple of pairs of int
         As of `simnav.estimator.Estimator`.
+    learned : mapping
+        What results say of the training (`simnav.leaderboard.campaign.training_runs.record_of`).
     """
 
     name: str
@@ -44,6 +46,7 @@ class Entrant:
     point: str = ""
     search: tuple[str, ...] = ()
     learned_from: tuple[tuple[int, int], ...] = ()
+    learned: Mapping[str, Any] = field(default_factory=dict)
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

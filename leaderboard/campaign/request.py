@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, find, make, names, register
+from simnav.leaderboard.results.admission import label_fault, lookalikes
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 __all__ = [
@@ -168,15 +169,20 @@ def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
     Raises
     ------
     RequestError
-        If two estimators have the same label: tables could not distinguish them.
+        If two estimators have the same label, or labels that look alike: tables could not distinguish them. Or if a
+        label is none (`simnav.leaderboard.results.admission.label_fault`).
     """
     by_label: dict[str, EstimatorRequest] = {}
     for r in found:
+        if why := label_fault(r.label):
+            raise RequestError(f"estimator {r.label!a:.120}: {why}")
         other = by_label.setdefault(r.label, r)
         if (_source(other), other.point) != (_source(r), r.point):
             raise RequestError(
                 f"{other.name} and {r.name}: the rows of both would be called {r.label!r}; give one file another name"
             )
+    for label, alike in lookalikes(by_label).items():
+        raise RequestError(f"estimator {label!r} can be taken for {alike!r} in a table; give it another name")
     return list(by_label.values())
 
 

@@ -15,6 +15,7 @@ from simnav.leaderboard.campaign.own_scores import same_code, scoring_code, scor
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.single_run import record
 from simnav.leaderboard.results import store, trials
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
@@ -167,17 +168,10 @@ def _sealed_alike(kept: list[Result], seal: Seal) -> list[Result]:
 
 def _scenarios(examples: Mapping[str, Result], given: Iterable[Scenario], seal: Seal) -> dict[str, Scenario]:
     """The scenarios of results, by id, as they were when the results were computed."""
-    from simnav.scenario import load
-
     found, simulator = {s.id: s for s in given}, simulator_version()
     for scenario, result in examples.items():
         if scenario not in found:
-            try:
-                found[scenario] = load(scenario)
-            except ValueError as error:
-                raise RequestError(
-                    f"scenario {scenario} is not in the catalogue; give its file with --scenario"
-                ) from error
+            found[scenario] = catalogued_scenario(scenario)
         if seal.recording(recording_digest(found[scenario], simulator)) != result.recording:
             raise RequestError(
                 f"the recordings of {scenario} cannot be made again, for the scenario or the simulator has changed "

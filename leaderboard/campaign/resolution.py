@@ -20,7 +20,7 @@ from simnav.leaderboard.campaign.fingerprint import estimator_source, named_file
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
 from simnav.leaderboard.campaign.session_class import carry, is_session
-from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of
+from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, record_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 __all__ = ["resolve", "variant_of"]
@@ -50,8 +50,11 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         if comes_with_simnav(cls):
             with mistakes(EstimatorError):
                 made = request.make()
-            reference, learned_from = is_own_reference(cls.name), ranges_of(declared_ranges(made))
-            return replace(entrant, reference=reference, source=estimator_source(cls), learned_from=learned_from)
+            told = declared_ranges(made)
+            return replace(
+                entrant, reference=is_own_reference(cls.name), source=estimator_source(cls),
+                learned_from=ranges_of(told), learned=record_of(told),
+            )  # fmt: skip
         with contextlib.suppress(Exception):  # the other process says what is wrong
             source = estimator_source(cls)  # here, where the text of a session is known
         if request.cls is not None or is_session(cls.__module__):
@@ -74,10 +77,10 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
             "told the truth"
         )
     try:
-        learned_from = ranges_of(found["learned_from"])
+        learned_from, learned = ranges_of(found["learned_from"]), record_of(found["learned_from"])
     except ValueError as error:
         raise RequestError(f"estimator {request.name!r}: {error}") from None
-    return replace(entrant, source=source or found["source"], learned_from=learned_from)
+    return replace(entrant, source=source or found["source"], learned_from=learned_from, learned=learned)
 
 
 def _absolute(value: Any) -> Any:

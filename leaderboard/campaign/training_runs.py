@@ -1,8 +1,9 @@
-"""No estimator is scored on a run that its parameters were learned from."""
+"""What an estimator learned from: no estimator is scored on such a run, and results say what it was."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from simnav.estimator import Estimator
@@ -12,17 +13,51 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.scenario import Scenario
 
-__all__ = ["declared_ranges", "ranges_of", "require_unseen"]
+__all__ = ["declared_ranges", "ranges_of", "record_of", "require_unseen"]
 
 _MOST_RANGES = 1000
+_LONGEST = 8000  # of the record of a training, as JSON
 
 
 def declared_ranges(estimator: Estimator) -> Any:
-    """What an estimator tells as `simnav.estimator.Estimator.learned_from`, as lists; a text where it is wrong."""
+    """What an estimator tells of its training, as plain values; a text where it is wrong.
+
+    The pairs of `simnav.estimator.Estimator.learned_from` as lists. Where the estimator or its policy also has
+    ``trained_on``, a record of the training, a mapping of both.
+    """
     try:
-        return [[int(n) for n in pair] for pair in estimator.learned_from]
+        ranges = [[int(n) for n in pair] for pair in estimator.learned_from]
+        policy = getattr(estimator, "policy", None)
+        record = getattr(estimator, "trained_on", None) or getattr(policy, "trained_on", None)
+        if not isinstance(record, Mapping) or not record:
+            return ranges
+        return {"learned_from": ranges, "trained_on": json.loads(json.dumps(dict(record), default=str))}
     except Exception as error:
         return f"{type(error).__name__}: {error}"
+
+
+def record_of(given: Any) -> dict[str, Any]:
+    """What a result says of the training of its estimator, from what `declared_ranges` gave.
+
+    Returns
+    -------
+    dict
+        ``learned_from`` and ``trained_on``, where the estimator tells them; empty for one that learned nothing.
+
+    Raises
+    ------
+    ValueError
+        If it is too long, or no table of plain values: one sentence.
+    """
+    ranges = [list(pair) for pair in ranges_of(given)]
+    record = given.get("trained_on", {}) if isinstance(given, dict) else {}
+    text = json.dumps(record, default=str)
+    if not isinstance(record, dict) or len(text) > _LONGEST:
+        raise ValueError(
+            f"trained_on should be a table of at most {_LONGEST} characters as JSON, but is {text[:100]}..."
+        )
+    found = {"learned_from": ranges} if ranges else {}
+    return {**found, "trained_on": record} if record else found
 
 
 def ranges_of(given: Any) -> tuple[tuple[int, int], ...]:
@@ -33,6 +68,8 @@ def ranges_of(given: Any) -> tuple[tuple[int, int], ...]:
     ValueError
         If it is not pairs of integers: one sentence.
     """
+    if isinstance(given, dict):
+        given = given.get("learned_from")
     if not isinstance(given, list) or len(given) > _MOST_RANGES or not all(_is_pair(pair) for pair in given):
         text = repr(given)
         text = text if len(text) <= 100 else f"{text[:100]}..."

@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
-from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
+from simnav.leaderboard.campaign.comparison import CLOSE, Comparison, claims, compared, differing, listed, too_quick
+from simnav.leaderboard.campaign.fingerprint import named_files
+from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.sampling import findable, sample_size
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.scratch import scratch
-from simnav.scenario import load
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
-__all__ = ["CLOSE", "Comparison", "Verification", "compared", "listed", "request_of", "verify_results"]
+__all__ = ["CLOSE", "Comparison", "Verification", "compared", "listed", "missing_seeds", "request_of", "verify_results"]
 
-#: Relative difference of a score that was computed from a trial in single precision.
-CLOSE = 1e-6
+#: A limit of a stranger's results is taken up to this multiple of the default.
+_MOST_TIME, _MOST_MEMORY = 10.0, 16
 
 
 @dataclass(frozen=True)
@@ -38,22 +41,33 @@ class Verification:
     folder : str
         Folder of the results.
     results : int
-        Number of results in the folder.
+        Number of results in the folder, or of the rows that were asked for.
     seal : str
         Hash of the key; empty for public seeds.
     other_seals : int
         Results that were not made under this key.
-    repeated : int
-        Runs that were repeated.
+    repeated, same : int
+        Runs that were repeated, and those of them that gave the same to the bit.
     close : tuple of str
         Those of which some scores differ by less than `CLOSE`, and which: as scores do that were computed again from
         a kept trial (`simnav.rescore`).
     different : tuple of str
-        Those that gave other scores, and which.
+        Those that gave something else, and what.
     not_repeatable : tuple of str
-        Those that could not be repeated, and why: other code, or an estimator that is not here.
+        Those that could not be repeated or confirmed, and why: other code, an estimator that is not here, a limit of
+        time or memory that another machine meets.
     unknown : tuple of str
         Scores of the results that are not known in this process, for a plug-in was not loaded; they were not looked at.
+    claims : tuple of str
+        Versions, commits and kinds of confinement that are not those of the repetition, or do not exist.
+    unconfirmed : tuple of str
+        What the results say of commit, processor, system and confinement, and cannot be confirmed here.
+    set_aside : tuple of str
+        Results in the folder that cannot be those of a campaign.
+    missing : tuple of str
+        Rows that lack seeds which other rows of the scenario have. A board does not rank them.
+    finds : str
+        What the sample can find.
     """
 
     folder: str
@@ -61,15 +75,22 @@ class Verification:
     seal: str
     other_seals: int
     repeated: int
+    same: int
     close: tuple[str, ...]
     different: tuple[str, ...]
     not_repeatable: tuple[str, ...]
     unknown: tuple[str, ...]
+    claims: tuple[str, ...] = ()
+    unconfirmed: tuple[str, ...] = ()
+    set_aside: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    finds: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether all that was looked at is as it should be, and something was."""
-        return bool(self.repeated) and not (self.other_seals or self.different or self.not_repeatable)
+        faults = self.other_seals or self.different or self.not_repeatable or self.claims or self.set_aside
+        return bool(self.repeated) and not faults
 
     def to_dict(self) -> dict[str, Any]:
         """Plain."""
@@ -80,22 +101,31 @@ def verify_results(
     folder: Path,
     seal: Seal = PUBLIC,
     *,
-    sample: int = 10,
+    sample: int | None = None,
     scenarios: Sequence[Scenario] = (),
     estimators: Sequence[EstimatorRequest] = (),
+    rows: Collection[str] = (),
     progress: Callable[..., None] | None = None,
 ) -> Verification:
     """Check the seal of all results, and repeat a sample of them; see `simnav.leaderboard.inspection.verify`."""
-    found = store.load(folder, series=False)
-    if not found:
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", store.StoreWarning)
+        found = store.load(folder, series=False)
+    set_aside = tuple(str(w.message) for w in said if isinstance(w.message, store.SetAsideWarning))
+    if not found and not set_aside:
         raise RequestError(f"there are no results in {folder}")
+    if unknown_rows := sorted(set(rows) - {r.estimator for r in found}):
+        raise RequestError(f"there are no results of {unknown_rows[0]!r} in {folder}")
+    missing = missing_seeds(found)
+    found = [r for r in found if not rows or r.estimator in rows]
     mine = [r for r in found if r.provenance.seal == seal.hash]
-    tried = [r for r in mine if r.status == "ok"]
-    chosen = random.SystemRandom().sample(tried, min(sample, len(tried)))
+    count = sample_size(len(mine)) if sample is None else min(sample, len(mine))
+    chosen = random.SystemRandom().sample(mine, count)
     known = {s.id: s for s in scenarios}
     requests = {e.label: e for e in estimators}
     report = progress or (lambda *_, **__: None)
-    close, different, without, unknown = [], [], [], dict[str, None]()
+    close, different, without, unknown, same = [], [], [], dict[str, None](), 0
+    pairs: list[tuple[Result, Result]] = []
     with scratch("verify") as home:
         for k, result in enumerate(chosen):
             what = f"{result.estimator} on {result.scenario}, run {result.seed}"
@@ -105,23 +135,47 @@ def verify_results(
             except (RequestError, ValueError) as error:
                 without.append(f"{what}: {sentence(error)}")
                 continue
-            if again.key != result.key:
+            if again.key != result.key or again.recording != result.recording:
                 without.append(f"{what}: simulator, scenario, estimator or parameters are not those of the result")
                 continue
-            if again.status != result.status:
-                different.append(f"{what}: {result.status} is stored, {again.status} came out")
-                continue
-            comparison = compared(result, again)
-            unknown |= dict.fromkeys(comparison.unknown)
-            if comparison.different:
-                different.append(f"{what}: {listed(comparison.different)}")
+            pairs.append((result, again))
+            others, undecided = differing(result, again)
+            if again.status == result.status:
+                comparison = compared(result, again)
+                unknown |= dict.fromkeys(comparison.unknown)
+                others += comparison.different
+            else:
+                comparison = Comparison([], [], [])
+            if others:
+                different.append(f"{what}: {listed(others)}")
+            elif undecided:
+                without.append(f"{what}: {listed(undecided)}")
             elif comparison.close:
                 close.append(f"{what}: {listed(comparison.close)}")
+            else:
+                same += 1
         report(len(chosen), len(chosen))
+    used = next((a.provenance.confinement for _, a in pairs if a.tried and not a.reference), "")
+    contradicted, unconfirmed = claims(mine, here(used))
     return Verification(
-        str(folder), len(found), seal.hash, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
-        tuple(without), tuple(unknown),
+        str(folder), len(found), seal.hash, len(found) - len(mine), len(chosen), same, tuple(close),
+        (*different, *too_quick(pairs)), tuple(without), tuple(unknown), tuple(contradicted), tuple(unconfirmed),
+        set_aside, missing, findable(len(mine), len(chosen)),
     )  # fmt: skip
+
+
+def missing_seeds(results: Sequence[Result]) -> tuple[str, ...]:
+    """Rows that lack seeds of a scenario that others have, in words."""
+    seeds: dict[str, dict[str, set[int]]] = {}
+    for r in results:
+        seeds.setdefault(r.scenario, {}).setdefault(r.estimator, set()).add(r.seed)
+    found = []
+    for scenario, by in sorted(seeds.items()):
+        every = set().union(*by.values())
+        for label, mine in sorted(by.items()):
+            if lacking := every - mine:
+                found.append(f"{label} lacks {len(lacking)} of {len(every)} runs of {scenario}, such as {min(lacking)}")
+    return tuple(found)
 
 
 def _repeat(
@@ -131,57 +185,38 @@ def _repeat(
     known: Mapping[str, Scenario],
     requests: Mapping[str, EstimatorRequest],
 ) -> Result:
-    scenario = known.get(result.scenario) or load(result.scenario)
+    scenario = known.get(result.scenario) or catalogued_scenario(result.scenario)
     request = requests.get(result.estimator) or request_of(result)
+    usual = time_limit(scenario)  # a run that is said to have met a tiny limit is given the usual one
     run_campaign(
-        [scenario], [request], [result.seed], folder, workers=1, timeout=result.time_limit or None,
-        memory=result.memory_limit or MEMORY, seal=seal,
+        [scenario], [request], [result.seed], folder, workers=1,
+        timeout=min(max(result.time_limit, usual), _MOST_TIME * usual),
+        memory=min(max(result.memory_limit, MEMORY), _MOST_MEMORY * MEMORY), seal=seal,
     )  # fmt: skip
     mine = (result.scenario, result.estimator, result.seed)
-    return next(r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)
+    found = (r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)
+    again = next(found, None)
+    if again is None:
+        raise RequestError("the repeated run gave no result that can be read")
+    return again
 
 
 def request_of(result: Result) -> EstimatorRequest:
-    """The registered estimator of a result, with its parameters and its label."""
-    return EstimatorRequest(result.estimator.partition("(")[0], dict(result.parameters), result.estimator)
+    """The registered estimator of a result, with its parameters and its label; never a file that the result names.
 
-
-class Comparison(NamedTuple):
-    """Scores that differ, each with both values in words, and those that are not known here."""
-
-    close: list[str]
-    different: list[str]
-    unknown: list[str]
-
-
-def compared(stored: Result, again: Result, close: float = CLOSE) -> Comparison:
-    """Compare scores to the bit, wall times aside; NaN is equal to NaN.
-
-    What was stored in single precision (`simnav.leaderboard.results.packing`) is compared with the rounded score. A
-    score that came to simnav after the results, or by a plug-in, need not be in them.
+    Raises
+    ------
+    RequestError
+        If no estimator of that name is registered, or a parameter names a file of this machine.
     """
-    from simnav.scoring import SCORES
+    from simnav.estimator import EstimatorError
+    from simnav.estimator.registry import registered
 
-    found = Comparison([], [], [])
-    homes = same_code(stored.scoring, scoring_code())
-    for name in dict.fromkeys((*stored.scores, *again.scores)):
-        if name.startswith("update_"):
-            continue
-        if name not in stored.scores:
-            if SCORES[name].__module__ in homes:
-                found.different.append(f"{name} is missing")
-        elif name not in again.scores:
-            found.unknown.append(name)
-        else:
-            a, b = float(stored.scores[name]), float(again.scores[name])
-            if a.hex() in (b.hex(), float(np.float32(b)).hex()):
-                continue
-            words = f"{name} {a:.9g} is stored, {b:.9g} came out"
-            (found.close if abs(a - b) <= close * max(abs(a), abs(b)) else found.different).append(words)
-    return found
-
-
-def listed(scores: Sequence[str]) -> str:
-    """The first three of them, and how many more there are."""
-    more = f"; and {len(scores) - 3} more" if len(scores) > 3 else ""
-    return "; ".join(scores[:3]) + more
+    name = result.estimator.partition("(")[0]
+    try:
+        registered(name)
+    except EstimatorError as error:
+        raise RequestError(f"{sentence(error)}; give its file with --estimator") from None
+    if named_files(result.parameters.values()):
+        raise RequestError("a parameter of the result names a file; give the estimator with --estimator")
+    return EstimatorRequest(name, dict(result.parameters), result.estimator)

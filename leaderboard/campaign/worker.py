@@ -107,6 +107,7 @@ class Unit:
             scenario_digest=self.scenario.content_hash(),
             estimator_digest=entrant.source,
             provenance=here(confinement, self.seal.hash),
+            learned=entrant.learned,
         )
 
 

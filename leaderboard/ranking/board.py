@@ -185,6 +185,8 @@ class Row:
         (`simnav.leaderboard.ranking.stored_costs`).
     peak_memory : int
         Largest of all runs [bytes].
+    learned : str
+        What it says that it learned from; empty where it learned nothing.
     """
 
     estimator: str
@@ -214,6 +216,7 @@ class Row:
     faulty: Consistency = field(default_factory=Consistency)
     update_median: float = math.nan
     peak_memory: int = 0
+    learned: str = ""
 
     @property
     def ranked(self) -> bool:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
-from simnav.estimator import EstimatorError, describe
+from simnav.estimator import EstimatorError
+from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking.tracks import SMOOTHED
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def real_time_twin(label: str, score: str, boards: Collection[Mapping[str, Runs]
     if score == SMOOTHED or not any(SMOOTHED in r.scores for by in boards if label in by for r in by[label].good):
         return ""
     try:
-        twin = describe(label).real_time_as
+        twin = registered(label).real_time_as
     except EstimatorError:
         return ""
     shared = 0

@@ -46,7 +46,15 @@ from simnav.leaderboard.ranking.board import (
 )
 from simnav.leaderboard.ranking.evidence import lacking
 from simnav.leaderboard.ranking.identity import real_time_twin
-from simnav.leaderboard.ranking.remarks import reference_remarks, remarks, request_remarks
+from simnav.leaderboard.ranking.learning import learned_by
+from simnav.leaderboard.ranking.remarks import (
+    learned_remarks,
+    recorded_remarks,
+    reference_remarks,
+    remarks,
+    request_remarks,
+    seed_remarks,
+)
 from simnav.leaderboard.ranking.runs import Runs, group
 from simnav.leaderboard.ranking.scenario_runs import Cell, ScenarioRuns
 from simnav.leaderboard.ranking.statistics import (
@@ -136,7 +144,7 @@ def rank(
     """
     runs = group(results)
     known = dict(tracks or {})
-    headers = {} if known.keys() >= runs.keys() else catalogued()
+    headers = catalogued()  # what a scenario is, it says, and not what results say
     known = {**{name: h.track for name, h in headers.items()}, **known}
     boards: list[TrackRanking] = []
     scenarios: dict[str, ScenarioRanking] = {}
@@ -169,10 +177,11 @@ def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list
 
 
 def _comes_with_simnav(name: str) -> bool:
-    from simnav.estimator import EstimatorError, find
+    from simnav.estimator import EstimatorError
+    from simnav.estimator.registry import registered
 
     try:
-        return comes_with_simnav(find(name))
+        return comes_with_simnav(registered(name))
     except EstimatorError:
         return False
 
@@ -255,6 +264,9 @@ def _track(
             *remarks(separation, unit, found, references, why),
             *request_remarks([(len(t.seeds), requested.get(t.name, ())) for t in used]),
             *reference_remarks(references),
+            *learned_remarks(found),
+            *seed_remarks([t.seals for t in used]),
+            *recorded_remarks(sum(t.recorded for t in used), len(used)),
         ), why, tuple(found),
     )  # fmt: skip
 
@@ -270,6 +282,7 @@ def _kind(references: Sequence[Reference]) -> str:
 _IMPLAUSIBLE = (
     "its errors on {} are below those of an oracle, which knows the noise and every fault, by more than chance"
 )
+_TOO_CLOSE = "its errors on {} are far below those of the plain smoother: it may hold the reference, which is public"
 _IDENTICAL = "in real time it is {}, to the bit; it is ranked by what it smooths"
 _VARIANT = "it is one of {} variants of {}; {} of them are ranked"
 
@@ -285,7 +298,8 @@ def _standing(
     if why := lacking({t.name: (len(cells[t.name].logs) if t.name in cells else 0, len(t.seeds)) for t in tables}):
         return "incomplete", why
     if bad := [t.name for t in tables if t.implausible(name, len(tables))]:
-        return "implausible", _IMPLAUSIBLE.format(bad[0])
+        recorded = any(t.recorded for t in tables if t.name == bad[0])
+        return "implausible", (_TOO_CLOSE if recorded else _IMPLAUSIBLE).format(bad[0])
     boards = [{m: c.runs for m, c in t.cells.items()} for t in tables]
     if twin := real_time_twin(name, tables[0].track.score, boards):
         return "identical", _IDENTICAL.format(twin)
@@ -365,6 +379,7 @@ def _rows(
             "faulty": _consistency([c.runs for c in mine], "_faulty"),
             "update_median": _median([_median(x) for c in mine if len(x := c.runs.numbers("update_median"))]),
             "peak_memory": max(c.runs.peak_memory for c in mine),
+            "learned": learned_by(r for c in mine for r in c.runs.results),
         })  # fmt: skip
     return rows, separation, why
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.ranking.board import FIRM_REFERENCE
@@ -11,9 +11,10 @@ from simnav.leaderboard.ranking.statistics import FEWEST, Separation, smallest_p
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Reference, Row
 
-__all__ = ["reference_remarks", "remarks", "request_remarks"]
+__all__ = ["learned_remarks", "recorded_remarks", "reference_remarks", "remarks", "request_remarks", "seed_remarks"]
 
 _LEVEL = 0.05
+_LEARNED = 5  # rows that a remark names
 
 
 def remarks(
@@ -91,6 +92,60 @@ def request_remarks(scenarios: Sequence[tuple[int, Sequence[int]]]) -> tuple[str
         steps = ", ".join(map(str, max(map(tuple, raised), key=len)))
         found.append(f"The number of seeds was raised after results were there ({steps}) on {len(raised)} {of}.")
     return tuple(found)
+
+
+def learned_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Which rows learned their parameters, and from what, as they say."""
+    found = [f"{r.estimator} {r.learned}" for r in rows if r.learned]
+    if not found:
+        return ()
+    more = f"; and {len(found) - _LEARNED} rows more" if len(found) > _LEARNED else ""
+    return (f"Learned, as the rows say: {'; '.join(found[:_LEARNED])}{more}.",)
+
+
+def seed_remarks(scenarios: Sequence[Collection[str]]) -> tuple[str, ...]:
+    """Whether anybody could simulate the runs of a track beforehand.
+
+    Parameters
+    ----------
+    scenarios : sequence of collection of str
+        Of each scenario, the hashes of the keys of its seeds; an empty text for public seeds.
+
+    Examples
+    --------
+    >>> seed_remarks([{""}, {""}])
+    ('Seeds are public: anybody can simulate the runs, and choose or learn parameters on them.',)
+    >>> seed_remarks([{"5ce1"}, {"5ce1"}])
+    ('Seeds are sealed (5ce1): nobody could simulate the runs before the key was published.',)
+    """
+    seals = sorted({seal for found in scenarios for seal in found})
+    public = sum("" in found for found in scenarios)
+    sealed = ", ".join(seal for seal in seals if seal)
+    if not sealed:
+        return ("Seeds are public: anybody can simulate the runs, and choose or learn parameters on them.",)
+    if not public:
+        return (f"Seeds are sealed ({sealed}): nobody could simulate the runs before the key was published.",)
+    return (f"Seeds are public on {public} of {len(scenarios)} scenarios, and sealed on the others ({sealed}).",)
+
+
+def recorded_remarks(recorded: int, scenarios: int) -> tuple[str, ...]:
+    """What is known of recorded voyages: their measurements and their reference may be public.
+
+    Examples
+    --------
+    >>> recorded_remarks(0, 3)
+    ()
+    >>> recorded_remarks(1, 3)[0].partition(":")[0]
+    '1 of 3 scenarios is recorded'
+    """
+    if not recorded:
+        return ()
+    verb = "is" if recorded == 1 else "are"
+    return (
+        f"{recorded} of {scenarios} scenarios {verb} recorded: logs and references can be downloaded by anybody, so an "
+        "estimator can hold them, with sealed seeds, too. A row far below the plain smoother is not ranked; one that "
+        "uses a reference a little would not be noticed.",
+    )
 
 
 def reference_remarks(references: Sequence[Reference]) -> tuple[str, ...]:

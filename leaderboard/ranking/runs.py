@@ -19,9 +19,8 @@ from simnav.scoring import SCORES
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result, Series
 
-__all__ = ["Run", "Runs", "at_times", "group", "has_series"]
+__all__ = ["Runs", "at_times", "group", "has_series"]
 
-Run = tuple[int, str]  # seed, note: what identifies a run of a scenario
 _PLACES = {name: k for k, name in enumerate(SCORES)}
 
 
@@ -49,12 +48,12 @@ class Runs:
     """
 
     def __init__(self, results: Sequence[Result]):
-        self.results = sorted(results, key=_run)
+        self.results = sorted(results, key=lambda r: r.seed)
         self.scenario, self.estimator = results[0].scenario, results[0].estimator
         self.reference = any(r.reference for r in results)
         self._medians: dict[str, Interval] = {}
         for a, b in pairwise(self.results):
-            if _run(a) == _run(b):
+            if a.seed == b.seed:  # whatever their notes say
                 what = f"two results of {self.estimator!r} on {self.scenario} for seed {a.seed}"
                 raise ValueError(f"{what}; keep one of them")
 
@@ -137,10 +136,6 @@ class Runs:
             return None
         values = np.asarray(rows, dtype=np.float64)
         return Band(self.estimator, np.arange(values.shape[1], dtype=np.float64), values)
-
-
-def _run(result: Result) -> Run:
-    return result.seed, result.note
 
 
 def has_series(series: Mapping[str, Series], name: str) -> bool:

@@ -22,9 +22,10 @@ from numpy.typing import NDArray
 
 from simnav.leaderboard.ranking.board import Reference
 from simnav.leaderboard.ranking.evidence import common_seeds, notes_by_seed
+from simnav.leaderboard.ranking.plain_row import PLAIN as PLAIN_ROWS
 from simnav.leaderboard.ranking.plain_row import plain_row
-from simnav.leaderboard.ranking.plausibility import beats, too_good
-from simnav.leaderboard.ranking.reference import ORACLES, reference_of
+from simnav.leaderboard.ranking.plausibility import beats, below_floor, too_good
+from simnav.leaderboard.ranking.reference import ORACLES, PLAIN, reference_of
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.ranking.statistics import FAILURE
 from simnav.leaderboard.ranking.tracks import RECORDED, SMOOTHED, Track
@@ -35,6 +36,8 @@ Array = NDArray[np.float64]
 
 #: Logarithm of the ratio that a failed run has, and that no run exceeds.
 CAP = math.log(FAILURE)
+#: The plain smoothers: the floor of recorded voyages is a part of their error.
+SMOOTHERS = PLAIN_ROWS[SMOOTHED]
 _LEAST = math.log(1e-9)  # of an error of zero
 _RECORDING = re.compile(r"recording '([^']*)'")
 
@@ -124,24 +127,26 @@ class ScenarioRuns:
         if track.score == SMOOTHED and track.name == "post-processing":  # whoever never smooths is not in it
             entries = {n: r for n, r in entries.items() if np.isfinite(r.scores(track.score)).any()}
         self.notes = notes_by_seed([r for runs in entries.values() for r in runs.tried])
-        self.recorded = track.name == RECORDED or (self._said_to_be_recorded() if recorded is None else recorded)
         voters = [r for n, r in entries.items() if not r.reference and n not in apart]
         voters = voters or [r for r in entries.values() if not r.reference] or list(entries.values())
         self.seeds = common_seeds([{r.seed for r in runs.tried} for runs in voters])
         self.errors = {n: self._errors(r) for n, r in entries.items()}
+        self.recorded = track.name == RECORDED or (self._said_to_be_recorded() if recorded is None else recorded)
+        self._smoothed = {n: _column(by[n], SMOOTHED) for n in SMOOTHERS if n in by}
         self._stored = reference_of(name, track.score, entries, self.recorded)
         self.divisor, self.reference = self._reference()
         self.plain = plain_row(track.score, {n for n in entries if self._whole(n)})
         self.cells = {n: self._cell(r) for n, r in entries.items()}
 
     def _said_to_be_recorded(self) -> bool:
+        """What the notes say of a scenario that is not in the catalogue; of a recorded one there is no oracle."""
+        if any(ORACLES.get(self.track.score, "oracle") == n for n in self.errors):
+            return False
         return bool(self.notes) and all(_RECORDING.match(note) for note in self.notes.values())
 
     def _errors(self, runs: Runs) -> dict[int, float]:
         """The error by seed; infinite where a run failed or has no position."""
-        values = runs.column(self.track.score).tolist()
-        pairs = zip(runs.results, values, strict=True)
-        return {r.seed: v if r.status == "ok" and math.isfinite(v) else math.inf for r, v in pairs if r.tried}
+        return _column(runs, self.track.score)
 
     def _whole(self, name: str) -> bool:
         """Whether a row has a finite error above zero on every seed that counts."""
@@ -168,6 +173,11 @@ class ScenarioRuns:
         counted = runs if same else Runs(there) if there else runs
         return Cell(counted, len(counts), [self.unit(r.seed) for r in there], np.array(logs, dtype=np.float64))
 
+    @cached_property
+    def seals(self) -> frozenset[str]:
+        """Hashes of the keys from which the seeds follow; an empty text for public seeds."""
+        return frozenset(r.provenance.seal for cell in self.cells.values() for r in cell.runs.results)
+
     def log(self, name: str, seed: int) -> float:
         """Logarithm of the ratio of a row's error to the reference in one run; infinite where the run failed."""
         return _ratio(self.errors[name][seed], self.divisor[seed])
@@ -181,10 +191,14 @@ class ScenarioRuns:
         return found.group(1) if found else note
 
     def implausible(self, name: str, scenarios: int = 1) -> bool:
-        """Whether a row is better here than what is possible: than an oracle on the same runs, or its stored figure."""
-        cell = self.cells[name]
-        if cell.runs.reference or self.recorded:
+        """Whether a row is better here than what is possible: than an oracle on the same runs, or its stored figure.
+
+        On recorded voyages: far better than the plain smoother, or the plain filter where there is none.
+        """
+        if self.cells[name].runs.reference:
             return False
+        if self.recorded:
+            return self._below_floor(name)
         oracle = self.errors.get(ORACLES.get(self.track.score, "oracle"), {})
         mine = {seed: error for seed, error in self.errors[name].items() if math.isfinite(error)}
         pairs = [_ratio(error, oracle[seed]) for seed, error in mine.items() if 0.0 < oracle.get(seed, 0.0) < math.inf]
@@ -192,6 +206,26 @@ class ScenarioRuns:
             return True
         logs = [_ratio(error, self._stored.value) for seed, error in mine.items() if seed in self.divisor]
         return self._stored.bounds and too_good(logs, self._stored, scenarios)
+
+    def _below_floor(self, name: str) -> bool:
+        if self.track.score not in ORACLES:  # no position error
+            return False
+        mine = {seed: error for seed, error in self.errors[name].items() if math.isfinite(error)}
+        units = {seed: self.unit(seed) for seed in mine}
+        smoother = next((n for n in SMOOTHERS if n in self._smoothed), "")
+        if smoother and name != smoother:
+            return below_floor(mine, self._smoothed[smoother], "smoother", units)
+        filters = [n for n in PLAIN if n in self.errors and n != name]
+        others = self.errors[filters[0]] if filters else dict.fromkeys(mine, self._stored.value)
+        if not filters and not self._stored.estimator:
+            others = {}
+        return below_floor(mine, others, "filter", units)
+
+
+def _column(runs: Runs, score: str) -> dict[int, float]:
+    """A score by seed; infinite where a run failed or does not have it."""
+    pairs = zip(runs.results, runs.column(score).tolist(), strict=True)
+    return {r.seed: v if r.status == "ok" and math.isfinite(v) else math.inf for r, v in pairs if r.tried}
 
 
 def _ratio(error: float, divisor: float) -> float:

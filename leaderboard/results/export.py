@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.results.files import whole
+from simnav.leaderboard.results.files import FORMULA, whole
 from simnav.leaderboard.results.formats import writes
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.results.provenance import Provenance, benchmark_of, distinct
@@ -43,7 +43,7 @@ MOST_IN_JSON = 20_000
 _CHUNK = 8192  # runs that are converted at a time
 _UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
 _DEGREES = math.degrees(1.0)
-_FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "reference", "status", "reason", "note")
+_FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 #: Column -> attribute: digests of scenario, estimator and simulator, and limits.
 _ORIGIN = {
@@ -158,6 +158,8 @@ def _with_units(rows: pa.Table) -> pa.Table:
             name += _UNIT_SUFFIX.get(unit, "_" + unit)
         elif values.type == pa.bool_():
             values = pc.if_else(values, "True", "False")
+        elif values.type == pa.string():  # a spreadsheet would compute it
+            values = pc.replace_substring_regex(values, f"({FORMULA})", r"'\1")
         columns[names.get(name, name)] = values
     return pa.table(columns)
 
@@ -189,7 +191,7 @@ def table(results: Sequence[Result]) -> pa.Table:
     columns: dict[str, Any] = {}
     for name in (*_FACTS, *_COSTS):
         values = [getattr(r, name) for r in results]
-        if name in ("draws", "parameters"):  # runs share them
+        if name in ("draws", "parameters", "learned"):  # runs share them
             texts = {id(v): v for v in values}
             known = {key: json.dumps(plain(dict(v)), sort_keys=True) for key, v in texts.items()}
             values = [known[id(v)] for v in values]

@@ -6,10 +6,14 @@ import contextlib
 import csv
 import io
 import os
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-__all__ = ["csv_text", "whole", "write_whole"]
+__all__ = ["FORMULA", "cell", "csv_text", "whole", "write_whole"]
+
+#: Begin of a text that a spreadsheet would compute, as a regular expression; a text that is a number is no formula.
+FORMULA = r"^[=+\-@\t\r]"
 
 
 @contextlib.contextmanager
@@ -43,11 +47,26 @@ def write_whole(path: Path, content: str | bytes) -> Path:
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    r"""Rows of values as a text of CSV.
+    r"""Rows of values as a text of CSV; a text that a spreadsheet would compute is quoted (`cell`).
 
     >>> csv_text([("row", "score"), ("ekf", 1.5)])
     'row,score\nekf,1.5\n'
     """
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows(map(cell, row) for row in rows)
     return text.getvalue()
+
+
+def cell(value: object) -> object:
+    """A value of a CSV file: a text that begins like a formula gets an apostrophe before it; numbers stay.
+
+    >>> cell("=HYPERLINK(1)"), cell("-1.5"), cell(-1.5), cell("ekf")
+    ("'=HYPERLINK(1)", '-1.5', -1.5, 'ekf')
+    """
+    if not isinstance(value, str) or value == "-" or not re.match(FORMULA, value):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value

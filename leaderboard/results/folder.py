@@ -17,6 +17,7 @@ import contextlib
 import errno
 import json
 import os
+import stat
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -35,7 +36,9 @@ __all__ = [
     "FILES",
     "LOOSE",
     "PROVENANCE",
+    "TRIALS",
     "DamagedError",
+    "SetAsideWarning",
     "StoreWarning",
     "atomic",
     "contents",
@@ -54,9 +57,9 @@ __all__ = [
 ]
 
 _MARKER = "simnav-results.json"
-LOOSE, COMPACTED, _TRIALS, PROVENANCE = "results", "compacted", "trials", "provenance"
+LOOSE, COMPACTED, TRIALS, PROVENANCE = "results", "compacted", "trials", "provenance"
 #: Folders inside a folder of results, those first that others refer to.
-FILES = (PROVENANCE, _TRIALS, COMPACTED, LOOSE)
+FILES = (PROVENANCE, TRIALS, COMPACTED, LOOSE)
 _STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
@@ -65,6 +68,10 @@ T = TypeVar("T")
 
 class StoreWarning(UserWarning):
     """A file of a results folder was set aside, or results in it are not current."""
+
+
+class SetAsideWarning(StoreWarning):
+    """Results in a folder cannot be those of a campaign, and were left out."""
 
 
 def create(folder: str | os.PathLike[str]) -> Path:
@@ -131,15 +138,31 @@ def read_marker(path: Path) -> dict[str, Any]:
     marker = path / _MARKER
     try:
         content = json.loads(marker.read_bytes())
-        if not isinstance(content["format"], int) or not isinstance(content.setdefault("current", {}), dict):
+        if not isinstance(content["format"], int) or not _is_current(content.setdefault("current", {})):
             raise ValueError("no format")
         return dict(content)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         set_aside(marker, error)
         _write_marker(path, {})
         return {"format": FORMAT, "current": {}}
     except OSError as error:
         raise StoreError(f"{marker} cannot be read: {error.strerror}") from None
+
+
+def _is_current(given: object) -> bool:
+    """Whether it says which results are current: of each scenario the recording, and a variant by label."""
+
+    def entry(one: object) -> bool:
+        if not isinstance(one, dict) or not isinstance(one.get("recording"), str):
+            return False
+        rows = one.get("estimators", {})
+        return isinstance(rows, dict) and all(map(_is_text, rows.values()))
+
+    return isinstance(given, dict) and all(map(entry, given.values()))
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
 
 
 def _write_marker(path: Path, current: Mapping[str, Any]) -> None:
@@ -224,7 +247,16 @@ def set_aside(path: Path, error: Exception) -> None:
 def files_of(path: Path) -> list[Path]:
     """All files of results, those with many first."""
     loose = sorted((path / LOOSE).glob("*.parquet"))  # listed first: what is gone by now is in a part
-    return parts_of(path) + loose
+    return [file for file in parts_of(path) + loose if not _is_special(file)]
+
+
+def _is_special(file: Path) -> bool:
+    """Whether it is a pipe or a device, on which a reader would wait for ever."""
+    try:
+        mode = file.stat().st_mode
+    except OSError:  # gone, or not to be read: whoever opens it says so
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def parts_of(path: Path) -> list[Path]:
@@ -258,7 +290,7 @@ def steadily(scan: Callable[[], T]) -> T:
 
 def sweep(path: Path) -> None:
     """Delete temporary files that a killed process left."""
-    folders = (path, *(path / name for name in (LOOSE, COMPACTED, _TRIALS)))
+    folders = (path, *(path / name for name in (LOOSE, COMPACTED, TRIALS)))
     for temporary in [file for folder in folders for file in folder.glob(".*.tmp")]:
         with contextlib.suppress(OSError):
             if time.time() - temporary.stat().st_mtime > _STALE:

@@ -22,7 +22,7 @@ from typing import Any
 
 from simnav.leaderboard.results.errors import RequestError
 
-__all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here"]
+__all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here", "is_commit"]
 
 #: Name and version of the benchmark: its scenarios, and the rules by which results are scored and ranked.
 #: Raised whenever results before and after a change must not stand in one table.
@@ -88,9 +88,7 @@ class Provenance:
         """Short id: a digest of all fields; empty where nothing is known."""
         if self.identity or self == Provenance():
             return self.identity
-        content = {name: value for name, value in asdict(self).items() if name != "seal" or value}
-        text = json.dumps(content, sort_keys=True)
-        return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
+        return _identity(asdict(self))
 
     def to_dict(self) -> dict[str, Any]:
         """All fields, with the id."""
@@ -107,9 +105,31 @@ class Provenance:
         """
         known = {f.name for f in fields(cls)}
         found = cls(**{name: value for name, value in values.items() if name in known})
-        if not set(values) - known - {"id"} and found.id != values.get("id"):
-            raise ValueError(f"the id should be {found.id}, and is {values.get('id')}")
+        for f in fields(cls):
+            _check_type(f.name, getattr(found, f.name))
+        later = set(values) - known - {"id"}
+        identity = _identity({k: v for k, v in values.items() if k != "id"} | {"identity": ""}) if later else found.id
+        if identity != values.get("id"):
+            raise ValueError(f"the id should be {identity}, and is {values.get('id')!a:.80}")
         return found
+
+
+def _identity(values: Mapping[str, Any]) -> str:
+    """Digest of all fields; a seal counts where there is one."""
+    content = {name: value for name, value in values.items() if name != "seal" or value}
+    return hashlib.blake2b(json.dumps(content, sort_keys=True).encode(), digest_size=6).hexdigest()
+
+
+def _check_type(name: str, value: object) -> None:
+    """ValueError for what no provenance has: a folder of others may hold anything."""
+    if name == "dirty":
+        good = value is None or isinstance(value, bool)
+    elif name == "cores":
+        good = type(value) is int and 0 <= value < 1 << 31
+    else:
+        good = isinstance(value, str) and len(value) <= 300 and value.isprintable()
+    if not good:
+        raise ValueError(f"{name} = {value!a:.80} is no such value")
 
 
 def here(confinement: str = "", seal: str = "") -> Provenance:
@@ -163,6 +183,18 @@ def _checkout(folder: Path) -> tuple[str, bool | None]:
         return git("rev-parse", "HEAD").strip(), bool(changes.strip())
     except (OSError, subprocess.SubprocessError):
         return "", None
+
+
+@lru_cache(maxsize=256)
+def is_commit(text: str) -> bool:
+    """Whether a text is a commit in the history of the checkout that runs; False without a checkout."""
+    if len(text) != 40 or not set(text) <= set("0123456789abcdef"):
+        return False
+    command = ["git", "-C", str(Path(__file__).resolve().parents[2]), "cat-file", "-e", f"{text}^{{commit}}"]
+    try:
+        return subprocess.run(command, capture_output=True, timeout=20.0, check=False).returncode == 0
+    except (OSError, subprocess.SubprocessError):
+        return False
 
 
 def _cpu() -> str:

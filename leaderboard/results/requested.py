@@ -24,7 +24,7 @@ def read(folder: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
     try:
         content = json.loads((Path(folder) / FILE).read_text(encoding="utf-8"))
         return {str(name): tuple(int(n) for n in numbers) for name, numbers in content.items()}
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, ValueError, TypeError, AttributeError, OverflowError, RecursionError):
         return {}
 
 

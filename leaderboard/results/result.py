@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.results.admission import table_of
 from simnav.leaderboard.results.ahead import made_ahead
 from simnav.leaderboard.results.errors import printable
 from simnav.leaderboard.results.provenance import Provenance
@@ -37,8 +38,8 @@ __all__ = [
 ]
 
 #: Version of the format of results, and those that can be read.
-FORMAT = 4
-READABLE = (1, 2, 3, FORMAT)
+FORMAT = 5
+READABLE = (1, 2, 3, 4, FORMAT)
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
@@ -55,6 +56,7 @@ _SINCE: dict[str, tuple[int, Any]] = {
     "estimator_digest": (3, ""),
     "provenance": (3, ""),
     "draws": (4, "{}"),
+    "learned": (5, "{}"),
 }
 
 #: Columns that take most of the memory of a file of results.
@@ -109,6 +111,10 @@ class Result:
         Versions, machine and day; a file names its id only.
     draws : mapping of str to object
         What was drawn for the run, by key path, in the units of the scenario's file.
+    learned : mapping of str to object
+        What the estimator says that it learned from: ``learned_from``, pairs of a first and a last number as of
+        `simnav.estimator.Estimator`, and ``trained_on``, the record of the training. Empty where it learned nothing,
+        or results are older than format 5.
     """
 
     scenario: str
@@ -133,6 +139,7 @@ class Result:
     estimator_digest: str = ""
     provenance: Provenance = field(default_factory=Provenance)
     draws: Mapping[str, Any] = field(default_factory=dict)
+    learned: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reason", printable(self.reason))  # it is what an estimator's exception says
@@ -182,6 +189,7 @@ def schema() -> pa.Schema:
             ("estimator_digest", pa.string()),
             ("provenance", pa.string()),
             ("draws", pa.string()),
+            ("learned", pa.string()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )
@@ -196,6 +204,7 @@ def to_table(result: Result) -> pa.Table:
     row["provenance"] = result.provenance.id
     row["parameters"] = json.dumps(dict(result.parameters), sort_keys=True, default=str)
     row["draws"] = json.dumps(dict(result.draws), default=str)
+    row["learned"] = json.dumps(dict(result.learned), sort_keys=True, default=str)
     row["scores"] = [(str(name), float(value)) for name, value in result.scores.items()]
     row["series"] = [{"name": n, "shape": list(a.shape), "values": a.ravel()} for n, a in arrays.items()]
     return pa.Table.from_pylist([row], schema=schema())
@@ -219,6 +228,9 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         known = {str(version).encode(): [n for n in names if version >= _SINCE.get(n, (1,))[0]] for version in READABLE}
         if found.names != known.get((found.metadata or {}).get(b"simnav_results", b"")):
             raise ValueError("it was not written by this version of simnav")
+        for name in found.names:
+            if name not in _HEAVY and found.field(name).type != schema().field(name).type:
+                raise ValueError(f"{name} is a column of {found.field(name).type}, not {schema().field(name).type}")
         wanted = names if columns is None else columns
         there = [n for n in wanted if n in found.names]
         groups = range(file.num_row_groups)
@@ -226,6 +238,8 @@ def batches(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
         parts = ([k] for k in groups) if heavy else filter(None, [list(groups)])
         tables = (file.read_row_groups(part, columns=there, use_threads=False) for part in parts)
         for table in made_ahead(tables) if heavy and len(groups) > 1 else tables:
+            if lacks := [n for n in there if n not in _HEAVY and table.column(n).null_count]:
+                raise ValueError(f"values of {lacks[0]} are missing")
             for name in (n for n in names if n in wanted and n not in there):
                 unknown = pa.array([_SINCE[name][1]] * len(table), schema().field(name).type)
                 table = table.append_column(schema().field(name), unknown)
@@ -281,8 +295,9 @@ def rows(
         Gives the series of a row of the table, where the column is missing.
     """
     converted: dict[str, Callable[[str], Any]] = {
-        "parameters": json.loads,
-        "draws": json.loads,
+        "parameters": table_of,
+        "draws": table_of,
+        "learned": table_of,
         "provenance": lambda identity: provenances.get(identity) or Provenance(identity=identity),
     }
     plain = [name for name in table.column_names if name not in _HEAVY]

@@ -22,6 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from simnav.leaderboard.results.admission import admitted
 from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.folder import (
     COMPACTED,
@@ -29,6 +30,7 @@ from simnav.leaderboard.results.folder import (
     LOOSE,
     PROVENANCE,
     DamagedError,
+    SetAsideWarning,
     StoreWarning,
     atomic,
     contents,
@@ -56,6 +58,7 @@ __all__ = [
     "FORMAT",
     "Ending",
     "Result",
+    "SetAsideWarning",
     "StoreError",
     "StoreWarning",
     "atomic",
@@ -72,6 +75,7 @@ __all__ = [
     "write",
 ]
 
+_SENTENCES = 3  # of a warning
 #: More files with many results than this are merged into one.
 MOST_PARTS = 16
 
@@ -129,8 +133,13 @@ def provenances(folder: str | os.PathLike[str]) -> dict[str, Provenance]:
     found = {}
     for file in sorted((Path(folder) / PROVENANCE).glob("*.json")):
         try:
-            one = Provenance.from_dict(json.loads(file.read_bytes()))
-        except (ValueError, TypeError, AttributeError) as error:
+            if not file.is_file():  # a pipe, on which a reader would wait for ever
+                continue
+            values = json.loads(file.read_bytes())
+            one = Provenance.from_dict(values)
+            if values["id"] != file.stem:
+                raise ValueError(f"it is called {file.stem}, and its id is {values['id']}")
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             set_aside(file, error)
             continue
         except OSError as error:
@@ -238,7 +247,8 @@ def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.
 def load(folder: str | os.PathLike[str], *, series: bool = True, scores: Collection[str] | None = None) -> list[Result]:
     """The current results of a folder, each once, in order of scenario, estimator and seed.
 
-    Only the columns that are needed are read, so that a hundred thousand results take seconds.
+    Only the columns that are needed are read, so that a hundred thousand results take seconds. Results that cannot be
+    those of a campaign (`simnav.leaderboard.results.admission`) are left out, with a warning.
 
     Parameters
     ----------
@@ -283,7 +293,11 @@ def load(folder: str | os.PathLike[str], *, series: bool = True, scores: Collect
             StoreWarning,
             2,
         )
-    return sorted(found.values(), key=lambda r: (r.scenario, r.estimator, r.seed))
+    taken, refused = admitted(found.values())
+    if refused:
+        more = f"; and {len(refused) - _SENTENCES} reasons more" if len(refused) > _SENTENCES else ""
+        warnings.warn(f"{path}: {'; '.join(refused[:_SENTENCES])}{more}", SetAsideWarning, 2)
+    return sorted(taken, key=lambda r: (r.scenario, r.estimator, r.seed))
 
 
 def compact(folder: str | os.PathLike[str]) -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.site.charts import columns
 
 if TYPE_CHECKING:
@@ -78,11 +79,13 @@ class EstimatorFacts:
 
 def estimator_facts(label: str) -> EstimatorFacts:
     """What the registered class says of itself."""
-    from simnav.estimator import describe, find
+    from simnav.estimator import describe
+    from simnav.estimator.registry import registered
 
     name = name_of(label)
     try:
-        found, cls = describe(name), find(name)
+        cls = registered(name)  # a label of others never names a file that is imported
+        found = describe(cls.name)
     except (ValueError, ImportError):
         return EstimatorFacts()
     text = re.split(r"\n(?:Parameters|Attributes|Notes|References)\n-+\n", inspect.getdoc(cls) or "")[0]
@@ -118,13 +121,10 @@ def catalogued(identity: str) -> Scenario | None:
 
     It is read once a build, which begins with ``catalogued.cache_clear()``.
     """
-    from simnav.scenario import load
-
     try:
-        scenario = load(identity)
+        return catalogued_scenario(identity)
     except (ValueError, LookupError, OSError):
         return None
-    return scenario if scenario.id == identity else None
 
 
 def toml_of(identity: str) -> str:

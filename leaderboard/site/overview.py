@@ -168,13 +168,15 @@ def board_row(
     notes: list[str] = [] if row.ranked else [row.standing]
     if row.ranked and row.provisional and not provisional:
         notes.append("provisional")
+    if row.learned:
+        notes.append("learned")
     if same:
         notes.append(f"same result: {', '.join(same)}")
     return {
         "name": {"text": row.estimator, "page": entry.page, "note": ", ".join(notes)},
         "ranks": {"text": row.ranks.replace("-", "–") or None, "sort": row.rank_low},
         "best": row.may_be_best,
-        "score": {"value": short(row.score), "help": row.why or None},
+        "score": {"value": short(row.score), "help": row.why or row.learned or None},
         "bar": {"value": short(row.score), "low": short(row.low), "high": short(row.high)},
         "interval": _ends(row.low, row.high),
         "over_scenarios": _ends(row.scenarios_low, row.scenarios_high),
@@ -194,7 +196,7 @@ def board_row(
         "memory": row.peak_memory or None,
         "reference": row.reference,
         "mark": row.standing if not row.ranked else "",
-        "words": f"{entry.facts.summary} {row.why}",
+        "words": f"{entry.facts.summary} {row.why} {row.learned}",
     }
 
 

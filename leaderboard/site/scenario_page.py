@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.evidence import notes_by_seed
 from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, curves
@@ -427,7 +428,7 @@ def _one_run(
     drawn = next((r.draws for r in mine if r.draws), {})
     return {
         "seed": seed,
-        "note": next((r.note for r in mine if r.note), ""),
+        "note": notes_by_seed([r for r in mine if r.status != "no-recording"]).get(seed, ""),  # as most rows have it
         "draws": [[key, tables.number(v) if isinstance(v, (int, float)) else str(v)] for key, v in drawn.items()],
         "charts": data,
     }

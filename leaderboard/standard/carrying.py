@@ -22,6 +22,7 @@ from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.own_scores import scoring_code, scoring_differs
 from simnav.leaderboard.campaign.verification import compared, listed, request_of
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.packing import write_packed
@@ -29,7 +30,7 @@ from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.results.scratch import scratch
 from simnav.leaderboard.standard.currency import changes
-from simnav.scenario import Scenario, load
+from simnav.scenario import Scenario
 
 __all__ = ["LAST_DIGIT", "Carried", "carry"]
 
@@ -143,7 +144,7 @@ def _repeatable(
         if change == "gone":
             left.append(f"{label} on {name}: the scenario is not there any more")
             continue
-        scenario = known[name] = known.get(name) or load(name)
+        scenario = known[name] = known.get(name) or catalogued_scenario(name)
         if any(r.scenario_digest != scenario.content_hash() for r in of[row]):
             left.append(f"{label} on {name}: the scenario itself has changed")
             continue

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from simnav.estimator import EstimatorError, find
+from simnav.estimator import EstimatorError
+from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.fingerprint import (
     estimator_source,
     has_recordings,
@@ -20,9 +21,9 @@ from simnav.leaderboard.campaign.fingerprint import (
 from simnav.leaderboard.campaign.own_scores import changed_code, scoring_code
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import Result
-from simnav.scenario import load
 
 __all__ = ["Change", "Outdated", "changes", "outdated"]
 
@@ -141,7 +142,7 @@ def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
 def _recording(scenario: str, simulator: str) -> str | None:
     """The digest of a scenario's recordings: None where the catalogue does not have it, empty without its files."""
     try:
-        found = load(scenario)
+        found = catalogued_scenario(scenario)
     except (ValueError, OSError):
         return None
     return recording_digest(found, simulator) if has_recordings(found) else ""
@@ -150,7 +151,7 @@ def _recording(scenario: str, simulator: str) -> str | None:
 def _source(name: str) -> str:
     """The digest of the code of an estimator of simnav; empty for all others."""
     try:
-        cls = find(name)
+        cls = registered(name)
     except EstimatorError:
         return ""
     return estimator_source(cls) if comes_with_simnav(cls) else ""

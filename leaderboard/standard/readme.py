@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from simnav.estimator import EstimatorError, describe
+from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
 from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
 from simnav.leaderboard.ranking.summary import best_rows, gain_text, sentence, spread
@@ -107,7 +108,7 @@ def draw(ranking: Ranking, path: Path) -> Path | None:
 def _method(row: TrackRow) -> str:
     """What a row is, in a few words; empty for one that is not registered by this name."""
     try:
-        summary = describe(row.estimator).summary
+        summary = describe(registered(row.estimator).name).summary
     except EstimatorError:
         return ""
     return summary.partition(": ")[0].rstrip(".")

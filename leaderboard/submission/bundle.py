@@ -12,6 +12,7 @@ There is no pickle in it. The SHA-256 of the whole file names a submission.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -20,9 +21,11 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
+from simnav.leaderboard.results.admission import is_scenario_id, label_fault, lookalikes
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.leaderboard.results.files import whole
 from simnav.leaderboard.submission.archive import digest_of, opened, unpack, write_archive
+from simnav.leaderboard.submission.requirement import requirement
 
 __all__ = ["SUFFIX", "Bundle", "Contents", "File", "Row", "open_bundle", "write_bundle"]
 
@@ -100,10 +103,10 @@ class Contents(_Part):
     title: str = Field(min_length=1, max_length=200)
     benchmark: str = Field(max_length=200)
     profile: str = Field(max_length=200)
-    runs: dict[str, Annotated[int, Field(ge=1, le=MOST_RUNS)]] = Field(max_length=1000)
+    runs: dict[str, Annotated[int, Field(ge=0, le=MOST_RUNS)]] = Field(max_length=1000)
     main: str = Field(min_length=1, max_length=200)
     estimators: tuple[Row, ...] = Field(min_length=1, max_length=100)
-    requires: tuple[str, ...] = ()
+    requires: tuple[str, ...] = Field((), max_length=100)
     files: dict[str, File]
 
 
@@ -263,13 +266,33 @@ def _check_rows(contents: Contents, what: str, files: Mapping[str, Path]) -> Non
     """Whether the estimators are in the bundle, and are none of simnav's own."""
     from simnav.estimator.registry import is_own
 
+    for name in ("title", "benchmark", "profile", "main"):
+        text = getattr(contents, name)
+        if not (text.isascii() and text.isprintable()):
+            raise RequestError(f"{what}: {name} = {text!a:.80} is no printable ASCII text")
     labels = [row.label for row in contents.estimators]
     if len(set(labels)) < len(labels):
         raise RequestError(f"{what}: two of its estimators have the same label")
+    for label in labels:
+        if why := label_fault(label):
+            raise RequestError(f"{what}: estimator {label!a:.80}: {why}")
+    for label, other in lookalikes(labels).items():
+        raise RequestError(f"{what}: estimator {label!a:.80} can be taken for {other}; choose another name")
+    for scenario in contents.runs:
+        if not is_scenario_id(scenario):
+            raise RequestError(f"{what}: {scenario!a:.80} is no versioned id of a scenario")
+    if sum(contents.runs.values()) * len(labels) > MOST_RUNS:
+        raise RequestError(f"{what}: it states more than {MOST_RUNS} runs")
+    for text in contents.requires:
+        try:
+            requirement(text)
+        except RequestError as error:
+            raise RequestError(f"{what}: {error}") from None
     if f"source/{contents.main}" not in files:
         raise RequestError(f"{what}: source/{contents.main} is missing")
     for row in contents.estimators:
-        if is_own(row.label) or (row.point and is_own(row.name)):
+        named = re.split(r"[(:\[ ]", row.label, maxsplit=1)[0]  # with parameters it would be shown as one of theirs
+        if is_own(named) or (row.point and is_own(row.name)):
             raise RequestError(f"{what}: {row.label} is a name of one of simnav's own estimators; choose another one")
         file = file_of(row.name)
         if contents.main.endswith(".whl"):

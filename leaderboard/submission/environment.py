@@ -7,12 +7,14 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
 from simnav.leaderboard.campaign.sources import LIBRARY
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.submission.requirement import requirement
 
 __all__ = ["clean_python", "install_requirements", "search_variables"]
 
@@ -39,7 +41,8 @@ def clean_python(folder: Path, versions: Mapping[str, str]) -> Path:
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     simnav = _copied(LIBRARY.parent, folder.with_name("simnav-source")) or f"simnav=={version('simnav')}"
     pinned = [f"{name}=={versions[name]}" for name in _PINNED if re.fullmatch(r"[\w.+!]+", versions.get(name, ""))]
-    _pip(python, [simnav, *pinned], "simnav cannot be installed into a new environment")
+    wheels = ["--only-binary", ",".join(_PINNED)]  # of an old version that only its source is left, nothing is built
+    _pip(python, [*wheels, simnav, *pinned], "simnav cannot be installed into a new environment")
     return python
 
 
@@ -63,15 +66,14 @@ def install_requirements(python: Path, requires: Sequence[str], folder: Path) ->
     """
     if not requires:
         return
-    for requirement in requires:
-        if not re.match(r"[A-Za-z0-9]", requirement) or not requirement.isprintable():
-            raise RequestError(f"{requirement!r:.200} is no requirement of a package")
+    plain = [requirement(text) for text in requires]
     frozen = _run([str(python), "-m", "pip", "freeze", "--exclude-editable"], "the environment cannot be listed")
     kept = [line for line in frozen.splitlines() if re.fullmatch(r"[\w.-]+==[\w.+!]+", line)]
     constraints = folder.with_name(f"{folder.name}.txt")
     constraints.write_text("\n".join(kept) + "\n")
-    words = ["--only-binary", ":all:", "--target", str(folder), "--constraint", str(constraints), *requires]
-    _pip(python, words, "what the submission requires cannot be installed")
+    words = ["--only-binary", ":all:", "--target", str(folder), "--constraint", str(constraints), *plain]
+    with tempfile.TemporaryDirectory(prefix="simnav-empty-") as empty:  # a name may be that of a file where pip runs
+        _pip(python, words, "what the submission requires cannot be installed", Path(empty))
 
 
 def search_variables(clean: bool) -> dict[str, str]:
@@ -80,15 +82,16 @@ def search_variables(clean: bool) -> dict[str, str]:
     return variables | {"PYTHONSAFEPATH": "1"}
 
 
-def _pip(python: Path, words: Sequence[str], failure: str) -> None:
-    _run([str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *words], failure)
+def _pip(python: Path, words: Sequence[str], failure: str, folder: Path | None = None) -> None:
+    _run([str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *words], failure, folder)
 
 
-def _run(command: Sequence[str], failure: str) -> str:
+def _run(command: Sequence[str], failure: str, folder: Path | None = None) -> str:
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_LONGEST, check=False, env=search_variables(True)
-        )
+            command, capture_output=True, text=True, timeout=_LONGEST, check=False, env=search_variables(True),
+            cwd=folder,
+        )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RequestError(f"{failure}: {error}; --present uses the packages that are here") from None
     if done.returncode:

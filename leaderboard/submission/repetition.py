@@ -15,15 +15,21 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.campaign.campaign import MEMORY, Progress, run_campaign
+from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import sentence
 from simnav.leaderboard.results.provenance import here
-from simnav.scenario import load
+from simnav.leaderboard.results.result import Result
 
 __all__ = ["Again", "Asked", "Wanted", "answer"]
+
+
+#: What is compared of a run beside its status and scores.
+_FACTS = ("key", "recording", "parameters", "reference", "learned", "note", "draws", "seconds", "peak_memory", "simnav",
+          "time_limit", "memory_limit", "scoring", "scenario_digest", "estimator_digest")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -36,10 +42,6 @@ class Wanted:
         Versioned id of the scenario, label of the estimator.
     seeds : list of int
         Numbers of the runs, where they are sealed.
-    time_limit : float
-        Time that a run may take [s]; 0 where it is not known.
-    memory_limit : int
-        Memory that a run may take [bytes]; 0 where it is not known.
     sealed : bool
         Whether the seeds follow from a key.
     """
@@ -47,8 +49,6 @@ class Wanted:
     scenario: str
     label: str
     seeds: list[int]
-    time_limit: float = 0.0
-    memory_limit: int = 0
     sealed: bool = False
 
 
@@ -99,10 +99,12 @@ class Again:
         Scenario, estimator, seed and seal of the repeated run.
     status, reason : str
         As in `simnav.leaderboard.results.result.Result`; ``not-run`` where it could not be tried.
-    key, recording : str
-        As in `simnav.leaderboard.results.result.Result`.
     scores : mapping of str to float
         All bits of each score, and NaN, are kept in JSON.
+    facts : mapping
+        All else that is compared, as in `simnav.leaderboard.results.result.Result`.
+    confinement : str
+        What kept the estimator from the truth.
     """
 
     scenario: str
@@ -111,9 +113,17 @@ class Again:
     sealed: bool
     status: str
     reason: str
-    key: str = ""
-    recording: str = ""
     scores: Mapping[str, float] = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    confinement: str = ""
+
+    @property
+    def result(self) -> Result:
+        """The run as a result."""
+        return Result(
+            self.scenario, self.seed, self.label, status=self.status, reason=self.reason, scores=self.scores,
+            **{"parameters": {}, "reference": False, **self.facts},
+        )  # fmt: skip
 
 
 def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
@@ -128,9 +138,9 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
             progress(done, total, what)
             try:
                 run_campaign(
-                    [load(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder, workers=1,
-                    timeout=wanted.time_limit or None, confinement=asked.confinement, seal=seal if sealed else PUBLIC,
-                    memory=wanted.memory_limit or MEMORY, progress=partial(_noted, progress, done, total, what),
+                    [catalogued_scenario(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder,
+                    workers=1, confinement=asked.confinement, seal=seal if sealed else PUBLIC,
+                    progress=partial(_noted, progress, done, total, what),
                 )  # fmt: skip
             except Exception as error:
                 for seed in wanted.seeds:
@@ -141,8 +151,8 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
         for r in store.load(asked.folder, series=False) if Path(asked.folder).is_dir() else ():
             if bool(r.provenance.seal) == sealed:
                 found[sealed, r.scenario, r.estimator, r.seed] = Again(
-                    r.scenario, r.estimator, r.seed, sealed, r.status, r.reason, r.key, r.recording,
-                    dict(r.scores),
+                    r.scenario, r.estimator, r.seed, sealed, r.status, r.reason, dict(r.scores),
+                    {name: getattr(r, name) for name in _FACTS}, r.provenance.confinement,
                 )  # fmt: skip
     return {"runs": [asdict(a) for a in found.values()], "provenance": here().to_dict()}
 

@@ -21,6 +21,7 @@ from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_sim
 from simnav.leaderboard.campaign.sources import code_of, followed
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.submission.archive import write_archive
+from simnav.leaderboard.submission.requirement import here, requirement
 
 __all__ = ["Source", "requirements_of", "source_of"]
 
@@ -87,7 +88,7 @@ def source_of(given: str, parameters: Mapping[str, Any], scratch: Path, requires
             )
     first = asked[0]
     if file_of(first.name):
-        return _file(first, requires)
+        return _file(first, tuple(map(requirement, requires)))
     with mistakes():
         cls = find(first.name)
     if comes_with_simnav(cls):
@@ -97,7 +98,13 @@ def source_of(given: str, parameters: Mapping[str, Any], scratch: Path, requires
     if not point or owner is None:
         raise RequestError(f"{first.name} belongs to no installed package; submit its file instead")
     wheel = _wheel(owner, scratch)
-    return Source(owner.name, tuple(asked), {wheel.name: wheel}, wheel.name, (*requirements_of(owner), *requires))
+    return Source(
+        owner.name,
+        tuple(asked),
+        {wheel.name: wheel},
+        wheel.name,
+        (*requirements_of(owner), *map(requirement, requires)),
+    )
 
 
 def _points(name: str) -> set[str]:
@@ -137,8 +144,8 @@ def _file(asked: EstimatorRequest, requires: tuple[str, ...]) -> Source:
 
 
 def requirements_of(dist: Distribution) -> tuple[str, ...]:
-    """What a package requires beside simnav, without its extras."""
-    found = [r for r in dist.requires or () if not re.search(r";.*\bextra\s*==", r)]
+    """What a package requires here beside simnav, without its extras."""
+    found = filter(None, map(here, dist.requires or ()))
     return tuple(r for r in found if _normal(re.split(r"[\s\[<>=!~;(]", r, maxsplit=1)[0]) != "simnav")
 
 

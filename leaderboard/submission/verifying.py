@@ -14,13 +14,16 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.campaign.campaign import MEMORY
+from simnav.leaderboard.campaign.comparison import claims, differing, listed, too_quick
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
-from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
+from simnav.leaderboard.campaign.recorder import time_limit
+from simnav.leaderboard.campaign.sampling import findable, sample_size
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
-from simnav.leaderboard.campaign.verification import listed
 from simnav.leaderboard.profiles import load as load_profile
 from simnav.leaderboard.profiles import profiles
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance, benchmark_of, distinct
 from simnav.leaderboard.results.scratch import scratch
@@ -41,7 +44,6 @@ TOLERANCE = 1e-6
 _SEALED_RUNS = 8  # of each scenario
 _LEVEL = 0.01  # of the test that sealed runs are no worse
 _SCORE = "horizontal_rmse"
-_REPEATABLE = ("ok", "error", "diverged", "invalid-output")  # a limit of time may be met on another machine
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,12 @@ class SubmissionReport:
         Largest relative difference of a score that counts as the same.
     different : tuple of str
         Runs that gave something else, and what.
+    undecided : tuple of str
+        Runs that the repetition does not confirm, such as one that meets a limit of time on one machine only.
+    unconfirmed : tuple of str
+        What the results say of commit, processor, system and confinement, and cannot be confirmed here.
+    finds : str
+        What the sample can find.
     unknown : tuple of str
         Scores of the results that are not known where the runs were repeated, because a plug-in registers them. They
         were not looked at.
@@ -116,6 +124,9 @@ class SubmissionReport:
     close: int
     tolerance: float
     different: tuple[str, ...]
+    undecided: tuple[str, ...]
+    unconfirmed: tuple[str, ...]
+    finds: str
     unknown: tuple[str, ...]
     sealed: tuple[SealedRuns, ...]
 
@@ -127,7 +138,7 @@ class SubmissionReport:
     @property
     def passed(self) -> bool:
         """Whether the submission holds."""
-        return bool(self.repeated) and not (self.findings or self.different or self.worse)
+        return bool(self.repeated) and not (self.findings or self.different or self.undecided or self.worse)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain."""
@@ -138,7 +149,7 @@ def verify_bundle(
     path: Path,
     seal: Seal = PUBLIC,
     *,
-    sample: int = 10,
+    sample: int | None = None,
     present: bool = False,
     tolerance: float = TOLERANCE,
     progress: Callable[..., None] | None = None,
@@ -151,10 +162,11 @@ def verify_bundle(
         raise RequestError("the estimator of a submission cannot be confined on this system, so it is not run")
     with scratch("verify") as home:
         bundle = open_bundle(path, home / "bundle")
-        results = _results(bundle)
-        findings = [*_incomplete(bundle, results), *_strange(bundle, results)]
-        chosen = _sample(results, sample)
-        wanted = [*_wanted(chosen), *(_sealed(bundle, results, sample) if seal.secret else ())]
+        results, set_aside = _results(bundle)
+        findings = [*set_aside, *_incomplete(bundle, results), *_strange(bundle, results)]
+        count = sample_size(len(results)) if sample is None else min(sample, len(results))
+        chosen = random.SystemRandom().sample(results, count)
+        wanted = [*_wanted(chosen), *(_sealed(bundle, results, count) if seal.secret else ())]
         provenance = distinct(r.provenance for r in results)
         python = Path(sys.executable)
         if not present:
@@ -166,25 +178,35 @@ def verify_bundle(
         )  # fmt: skip
         again, where = repeat(python, asked, home, not present, report)
     known = {(r.scenario, r.estimator, r.seed): r for r in chosen}
-    identical, close, different, unknown = 0, 0, list[str](), dict[str, None]()
-    for run in (a for a in again if not a.sealed):
-        before = known[run.scenario, run.label, run.seed]
-        said = _difference(before, run, tolerance, where)
+    identical, close, different, undecided, unknown = 0, 0, list[str](), list[str](), dict[str, None]()
+    pairs = []
+    for run in (a for a in again if not a.sealed and (a.scenario, a.label, a.seed) in known):
+        before, what = known[run.scenario, run.label, run.seed], f"{run.label} on {run.scenario}, seed {run.seed}"
+        said, open_questions = _difference(before, run, tolerance, where)
+        if run.status != "not-run":
+            pairs.append((before, run.result))
         if said:
-            different.append(f"{run.label} on {run.scenario}, seed {run.seed}: {said}")
+            different.append(f"{what}: {said}")
+        elif open_questions:
+            undecided.append(f"{what}: {open_questions}")
         elif _same_bits(before, run):
             identical += 1
         else:
             close += 1
         unknown |= dict.fromkeys(n for n in before.scores if run.scores and n not in run.scores)
-    missing = len(chosen) - identical - close - len(different)
+    missing = len(chosen) - identical - close - len(different) - len(undecided)
     if missing > 0:
         findings.append(f"{missing} runs of the sample gave no answer")
+    different += too_quick(pairs)
+    used = next((a.confinement for a in again if a.confinement), "")
+    contradicted, unconfirmed = claims(results, replace(where, confinement=used))
+    findings += contradicted
     contents = bundle.contents
     return SubmissionReport(
         str(path), bundle.digest, contents.title, tuple(r.label for r in contents.estimators), contents.profile,
         len(results), tuple(findings), f"{'present' if present else 'clean'} environment: {_versions(where)}",
-        len(chosen), identical, close, tolerance, tuple(different), tuple(unknown),
+        len(chosen), identical, close, tolerance, tuple(different), tuple(undecided),
+        tuple(unconfirmed), findable(len(results), len(chosen)), tuple(unknown),
         _compared(results, [a for a in again if a.sealed]),
     )  # fmt: skip
 
@@ -192,10 +214,13 @@ def verify_bundle(
 # --- what the bundle says ------------------------------------------------------------------------------------
 
 
-def _results(bundle: Bundle) -> list[Result]:
-    with warnings.catch_warnings(), mistakes(store.StoreError):
-        warnings.simplefilter("ignore", store.StoreWarning)
+def _results(bundle: Bundle) -> tuple[list[Result], list[str]]:
+    """The results, and why others in the bundle were not taken."""
+    with warnings.catch_warnings(record=True) as said, mistakes(store.StoreError):
+        warnings.simplefilter("always", store.StoreWarning)
         found = store.load(bundle.results, series=False)
+    lost = [str(w.message) for w in said if isinstance(w.message, store.StoreWarning)]
+    set_aside = [text.replace(f"{bundle.results}", "results") for text in lost]
     if not found:
         raise RequestError(f"{bundle.path.name} holds no results that can be read")
     version = benchmark_of(r.provenance for r in found)
@@ -204,7 +229,7 @@ def _results(bundle: Bundle) -> list[Result]:
             f"{bundle.path.name} belongs to {version or 'a benchmark without a version'}, and this version of simnav "
             f"runs {BENCHMARK}: submit it again with this version"
         )
-    return found
+    return found, set_aside
 
 
 def runs_of(profile: str) -> dict[str, int]:
@@ -224,8 +249,14 @@ def _incomplete(bundle: Bundle, results: Sequence[Result]) -> list[str]:
         official = runs_of(contents.profile)
         for scenario in sorted({*official, *contents.runs}):
             want, said = official.get(scenario, 0), contents.runs.get(scenario, 0)
-            absent = said == 0 and load_scenario(scenario).log is not None  # not everybody has the logs
-            if want != said and not absent:
+            if want == said:
+                continue
+            try:
+                absent = said == 0 and catalogued_scenario(scenario).log is not None  # not everybody has the logs
+            except RequestError as error:
+                findings.append(str(error))
+                continue
+            if not absent:
                 findings.append(f"the profile {contents.profile} has {want} seeds of {scenario}, the bundle {said}")
     there: dict[tuple[str, str], set[int]] = {}
     for r in results:
@@ -249,34 +280,40 @@ def _strange(bundle: Bundle, results: Sequence[Result]) -> list[str]:
         findings.append("there are results of estimators that were told the truth")
     if any(r.provenance.seal for r in results):
         findings.append("there are results on sealed seeds")
+    findings += _limits(results)
+    made = distinct(r.provenance for r in results)
+    for name in ("simnav", "commit", "numpy", "numba", "gtsam"):
+        if len(several := sorted({str(getattr(p, name)) for p in made})) > 1:
+            findings.append(f"its results were made with several versions of {name}: {', '.join(several):.200}")
     open_runs = sum(r.provenance.confinement in ("", "none") for r in results if r.tried)
     if open_runs:
         findings.append(f"{open_runs} results were computed without confinement")
     return findings
 
 
-def _sample(results: Sequence[Result], most: int) -> list[Result]:
-    """Runs at random, taken from all scenarios and estimators in turn."""
-    draw = random.SystemRandom()
-    groups: dict[tuple[str, str], list[Result]] = {}
-    for result in results:
-        if result.status in _REPEATABLE and not result.reference:
-            groups.setdefault((result.scenario, result.estimator), []).append(result)
-    for group in groups.values():
-        draw.shuffle(group)
-    order = list(groups)
-    draw.shuffle(order)
-    chosen: list[Result] = []
-    while len(chosen) < most and any(groups.values()):
-        chosen += [groups[key].pop() for key in order if groups[key]][: most - len(chosen)]
-    return chosen
+def _limits(results: Sequence[Result]) -> list[str]:
+    """Limits that are not those of `simnav submit`, under which a run could be said to have failed or to have held."""
+    findings = []
+    for scenario in sorted({r.scenario for r in results}):
+        try:
+            usual = time_limit(catalogued_scenario(scenario)), MEMORY
+        except RequestError as error:
+            findings.append(str(error))
+            continue
+        other = [r for r in results if r.scenario == scenario and (r.time_limit, r.memory_limit) != usual]
+        if other:
+            findings.append(
+                f"{len(other)} results on {scenario} have other limits than {usual[0]:g} s and {usual[1] >> 20} MiB, "
+                f"such as {other[0].time_limit:g} s and {other[0].memory_limit >> 20} MiB"
+            )
+    return findings
 
 
 def _wanted(results: Sequence[Result]) -> list[Wanted]:
-    groups: dict[tuple[str, str, float, int], list[int]] = {}
+    groups: dict[tuple[str, str], list[int]] = {}
     for r in results:
-        groups.setdefault((r.scenario, r.estimator, r.time_limit, r.memory_limit), []).append(r.seed)
-    return [Wanted(scenario, label, seeds, time, memory) for (scenario, label, time, memory), seeds in groups.items()]
+        groups.setdefault((r.scenario, r.estimator), []).append(r.seed)
+    return [Wanted(scenario, label, seeds) for (scenario, label), seeds in groups.items()]
 
 
 def _sealed(bundle: Bundle, results: Sequence[Result], sample: int) -> list[Wanted]:
@@ -346,10 +383,9 @@ def _compared_scores(before: Result, again: Again) -> dict[str, tuple[float, flo
 
 
 def _removed(before: Result, again: Again) -> list[str]:
-    """Scores that the results lack, though simnav computed them then: the main one, and all of unchanged code."""
-    homes = same_code(before.scoring, scoring_code())
-    absent = (name for name in again.scores if name not in before.scores and not name.startswith("update_"))
-    return [name for name in absent if name == _SCORE or (name in SCORES and SCORES[name].__module__ in homes)]
+    """Scores of simnav that the results lack: `simnav submit` computes all."""
+    absent = (name for name in again.scores if name not in before.scores)
+    return [name for name in absent if name in SCORES and SCORES[name].__module__.startswith("simnav.")]
 
 
 def _same_bits(before: Result, again: Again) -> bool:
@@ -357,10 +393,21 @@ def _same_bits(before: Result, again: Again) -> bool:
     return all(float(a).hex() == float(b).hex() for a, b in pairs)
 
 
-def _difference(before: Result, again: Again, tolerance: float, where: Provenance) -> str:
-    """What differs, in words; empty where the run is the same to the tolerance."""
+def _difference(before: Result, again: Again, tolerance: float, where: Provenance) -> tuple[str, str]:
+    """What differs, and what is not confirmed, in words; both empty where the run is the same to the tolerance."""
     if again.status == "not-run":
-        return f"it could not be run: {again.reason}"
+        return f"it could not be run: {again.reason}", ""
+    if code := _other_code(before, again.result, where):
+        return code, ""
+    different, undecided = differing(before, again.result)
+    if before.status == again.status:
+        if removed := _removed(before, again):
+            different.append(f"the results lack {listed(removed)}")
+        different += filter(None, [_worst_score(before, again, tolerance)])
+    return listed(different), listed(undecided)
+
+
+def _other_code(before: Result, again: Result, where: Provenance) -> str:
     if again.recording != before.recording:
         made = before.provenance
         return (
@@ -370,10 +417,11 @@ def _difference(before: Result, again: Again, tolerance: float, where: Provenanc
         )
     if again.key != before.key:
         return "the results were not made with this source, this name and these parameters"
-    if again.status != before.status:
-        return f"it ended with {again.status} ({again.reason or 'no reason'}), and in the results with {before.status}"
-    if removed := _removed(before, again):
-        return f"the results lack {listed(removed)}"
+    return ""
+
+
+def _worst_score(before: Result, again: Again, tolerance: float) -> str:
+    """The score that differs most, in words; empty where all agree to the tolerance."""
     worst, text = tolerance, ""
     for name, (a, b) in _compared_scores(before, again).items():
         if a == b or (math.isnan(a) and math.isnan(b)):

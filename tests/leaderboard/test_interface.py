@@ -137,7 +137,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 }  # fmt: skip
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
-ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "submit", "tune", "verify"}
+ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "seal", "submit", "tune", "verify"}
 ELSEWHERE |= {"standard run", "standard check", "standard carry", "standard publish", "train anfis"}
 
 

@@ -164,7 +164,9 @@
     text(kind) {
       const columns = this.visible(), rows = this.rows();
       if (kind === "csv") {
-        const quote = (x) => (/[",\n]/.test(x) ? `"${x.replaceAll('"', '""')}"` : x);
+        // A text that a spreadsheet would compute gets an apostrophe; a number is none.
+        const inert = (x) => (/^[=+\-@\t\r]/.test(x) && Number.isNaN(Number(x)) ? `'${x}` : x);
+        const quote = (x) => ((y) => (/[",\n\r]/.test(y) ? `"${y.replaceAll('"', '""')}"` : y))(inert(x));
         const cell = (c, row) => {
           const value = row[c.key], plain = value !== null && typeof value === "object" ? value.value ?? value.text : value;
           return quote(plain === null || plain === undefined ? (c.kind === "interval" ? text(c, row) : "") : String(plain));

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import tracemalloc
 from collections import Counter
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import simnav
 from simnav.leaderboard.campaign.campaign import run_campaign
@@ -19,6 +21,7 @@ from simnav.leaderboard.campaign.rescoring import rescore_results
 from simnav.leaderboard.campaign.seal import Seal, read_seal
 from simnav.leaderboard.campaign.verification import verify_results
 from simnav.leaderboard.campaign.worker import Unit
+from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scenario import load
@@ -30,7 +33,8 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="isolation without fo
 @pytest.fixture
 def key(tmp_path: Path) -> Path:
     path = tmp_path / "key"
-    path.write_text("0123456789abcdef0123456789abcdef\n")
+    path.write_text("8f3c5a0e7d19b264c1f07ae9365bd482\n")
+    path.chmod(0o600)
     return path
 
 
@@ -93,11 +97,68 @@ def test_a_key_is_a_secret_and_stays_one(tmp_path: Path, key: Path) -> None:
     assert len(seeds) == 100
     assert all(0 <= s < 2**63 for s in seeds)
     assert read_seal(key).seed("a-v1", 7) == seal.seed("a-v1", 7)
-    with pytest.raises(RequestError, match="absent cannot be read: No such file or directory; 'openssl rand -hex 32"):
+    with pytest.raises(RequestError, match=r"absent cannot be read: No such file or directory; 'simnav seal .*' makes"):
         read_seal(tmp_path / "absent")
     (tmp_path / "short").write_text("secret")
     with pytest.raises(RequestError, match="holds 6 bytes; a key has 16 to 4096"):
         read_seal(tmp_path / "short")
+    key.chmod(0o644)
+    with pytest.raises(RequestError, match=r"can be read by others \(mode 644\); 'chmod 600"):
+        read_seal(key)
+    assert read_seal(key, secret=False).key == seal.key  # once it is published, it need not be a secret
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("0123456789abcdef0123456789abcdef", "worth 6 bits at most"),
+        ("deadbeef" * 8, "worth 17 bits at most"),
+        ("1" * 64, "worth 0 bits at most"),
+        ("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789", "bits at most"),
+        ("password1234567890Password", "bits at most"),
+        ("the sealed campaign of the Society of Navigation in the year 2026", "holds words"),
+        ("thequickbrownfoxjumpsoverthelazydogthequick", "holds words"),
+    ],
+)
+def test_a_key_that_can_be_guessed_is_refused(tmp_path: Path, words: str, said: str) -> None:
+    (tmp_path / "key").write_text(words)
+    (tmp_path / "key").chmod(0o600)
+    with pytest.raises(RequestError, match=said):
+        read_seal(tmp_path / "key")
+
+
+def test_random_keys_of_all_usual_forms_are_taken(tmp_path: Path) -> None:
+    draw = random.Random(1)
+    for k in range(50):
+        drawn = draw.randbytes(32)
+        for words in (drawn.hex().encode(), drawn[:16].hex().encode(), b"\x01" + drawn + b"\x01"):
+            file = tmp_path / f"key-{k}-{len(words)}"
+            file.write_bytes(words)
+            file.chmod(0o600)
+            assert read_seal(file).secret
+
+
+def test_the_commitment_is_known_before_a_public_value_is_mixed_in(tmp_path: Path) -> None:
+    file = tmp_path / "key"
+    made = CliRunner().invoke(app, ["seal", str(file), "--json"])
+    assert made.exit_code == 0, made.output
+    before = json.loads(made.stdout)
+    assert file.stat().st_mode & 0o777 == 0o600
+    assert before["commitment"] == before["seal"] == read_seal(file).hash
+    assert file.read_text().strip() not in made.stdout
+    first = [read_seal(file).seed("a-v1", n) for n in range(5)]
+    after = json.loads(CliRunner().invoke(app, ["seal", str(file), "--public", "7 12 33", "--json"]).stdout)
+    mixed = read_seal(file)
+    assert after["commitment"] == before["commitment"] == mixed.commitment
+    assert after["seal"] == mixed.hash != mixed.commitment
+    assert mixed.public == "7 12 33"
+    assert not set(first) & {mixed.seed("a-v1", n) for n in range(5)}
+    assert file.stat().st_mode & 0o777 == 0o600
+    again = CliRunner().invoke(app, ["seal", str(file), "--public", "8 12 33"])
+    assert again.exit_code == 2
+    assert "has the public value '7 12 33' already" in " ".join(again.output.split())
+    checked = CliRunner().invoke(app, ["seal", str(file)])
+    assert f"commitment: {mixed.commitment}" in checked.stdout
 
 
 def test_a_thousand_million_runs_cost_no_memory() -> None:

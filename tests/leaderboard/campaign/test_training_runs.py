@@ -15,7 +15,8 @@ from simnav.leaderboard.campaign.campaign import run_campaign
 from simnav.leaderboard.campaign.confinement.estimator_process import _Session
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, require_unseen
+from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, record_of, require_unseen
+from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scenario import load
 
@@ -91,3 +92,25 @@ def test_an_estimator_of_others_tells_it_too(
 def test_what_is_no_pairs_of_integers_is_refused(told: object) -> None:
     with pytest.raises(ValueError, match="learned_from should hold at most 1000 pairs of integers"):
         ranges_of(told)
+
+
+def test_results_say_what_a_row_learned_from(tmp_path: Path) -> None:
+    """Of the policy that comes along, and of a file of others that learned."""
+    told = "[(3, 5)]\n    trained_on = {'scenario': 'bay', 'voyages': 3}"
+    (tmp_path / "taught.py").write_text(LEARNED.format(ranges=told).replace("Learned", "Taught"))
+    scenario = load("gnss-noise-step").model_copy(update={"duration": 20.0})
+    asked = [EstimatorRequest("policy-ekf"), EstimatorRequest(str(tmp_path / "taught.py")), EstimatorRequest("ekf")]
+    run_campaign([scenario], asked, [7], tmp_path / "out", workers=1, confinement="none")
+    learned = {r.estimator: r.learned for r in store.load(tmp_path / "out")}
+    assert learned["policy-ekf"]["trained_on"]["voyages"] == 64
+    assert learned["policy-ekf"]["learned_from"] == [list(pair) for pair in make("policy-ekf").learned_from]
+    assert learned["taught"] == {"learned_from": [[3, 5]], "trained_on": {"scenario": "bay", "voyages": 3}}
+    assert learned["ekf"] == {}
+
+
+def test_a_record_of_a_training_is_short_and_plain() -> None:
+    assert record_of([[1, 2]]) == {"learned_from": [[1, 2]]}
+    assert record_of({"learned_from": [], "trained_on": {"voyages": 2}}) == {"trained_on": {"voyages": 2}}
+    for record in ({"a": "x" * 9000}, [1], "text"):
+        with pytest.raises(ValueError, match="trained_on should be a table of at most 8000 characters"):
+            record_of({"learned_from": [], "trained_on": record})

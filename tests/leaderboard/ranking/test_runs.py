@@ -44,4 +44,5 @@ def test_failures_do_not_count_as_runs_that_do_not_suit():
 def test_a_run_counts_once():
     with pytest.raises(ValueError, match="two results of 'e' on s-v1"):
         Runs([ended(0), ended(1), ended(0)])
-    Runs([ended(0, note="morning"), ended(0, note="evening")])
+    with pytest.raises(ValueError, match="two results of 'e' on s-v1"):
+        Runs([ended(0, note="morning"), ended(0, note="evening")])  # a note makes no other run of it

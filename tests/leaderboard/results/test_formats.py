@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -10,7 +12,7 @@ import pytest
 
 from simnav.leaderboard.results import formats
 from simnav.leaderboard.results.export import Document, table
-from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.result import Result
 from simnav.recording import Recording
 from simnav.scenario import load
@@ -28,6 +30,18 @@ def test_every_format_of_results_is_written(tmp_path: Path):
     assert (row["seed"], row["parameters"], row["horizontal_rmse"]) == (3, '{"gain": 0.5}', 2.5)
     assert row["drift"] is None
     assert [row] == table([ONE]).to_pylist()
+
+
+def test_a_text_that_a_spreadsheet_would_compute_is_quoted(tmp_path: Path):
+    """Texts of others stand in tables that people open; numbers stay numbers, also below zero."""
+    texts = ["=1+1", "+1+cmd", "-1+1", "@SUM(A1)", "\t=1"]
+    rows = [replace(ONE, reason=text, note=text, parameters={}, scores={"horizontal_rmse": -2.5}) for text in texts]
+    (path,) = formats.write("results", "csv", Document(rows), tmp_path / "r.csv")
+    read = list(csv.DictReader(path.open(encoding="utf-8", newline="")))
+    assert [r["note"] for r in read] == [f"'{text}" for text in texts]
+    assert not any(cell[:1] in "=+@\t" for r in read for cell in r.values() if cell)
+    assert {r["horizontal_rmse_m"] for r in read} == {"-2.5"}
+    assert csv_text([("=x", "-1.5", -1.5, "-", "a")]) == "'=x,-1.5,-1.5,-,a\n"
 
 
 def test_every_format_of_a_recording_is_written(tmp_path: Path):

@@ -283,7 +283,7 @@ def test_a_folder_of_another_format_is_left_alone(folder: Path) -> None:
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 99, "simnav": "9.0"}))
     before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()}
     for action in (store.create, store.load, store.compact, store.keys, lambda f: store.select(f, {})):
-        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 4"):
+        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 5"):
             action(folder)
     assert {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()} == before
 
@@ -367,7 +367,7 @@ def test_results_of_older_formats_are_read(
 
     store.write(folder, result(0))
     (path,) = loose(folder)
-    since_3, since_4 = ["scenario_digest", "estimator_digest", "provenance"], ["draws"]
+    since_3, since_4 = ["scenario_digest", "estimator_digest", "provenance"], ["draws", "learned"]
     old = pq.read_table(path).drop_columns(missing + since_3 + since_4)
     pq.write_table(old.replace_schema_metadata({"simnav_results": str(version)}), path)
     marker = folder / "simnav-results.json"

@@ -9,6 +9,7 @@ import stat
 import sys
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -22,10 +23,11 @@ from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import Provenance
-from simnav.leaderboard.submission import archive, source, verifying
+from simnav.leaderboard.submission import archive, environment, source, verifying
 from simnav.leaderboard.submission.bundle import open_bundle
 from simnav.leaderboard.submission.repetition import Again, Asked, answer
 from tests.cases.packages import install
+from tests.hostile.forging import evil_scenario, fields, forge
 
 PROFILE = """
 title = "two short voyages"
@@ -125,7 +127,8 @@ def test_a_bundle_holds_what_is_needed_and_no_more(made: Path, tmp_path: Path) -
 
 def test_it_holds_to_the_bit_and_on_sealed_seeds_and_runs_confined(made: Path, tmp_path: Path) -> None:
     key = tmp_path / "key"
-    key.write_text("0123456789abcdef0123456789abcdef")
+    key.write_text("8f3c5a0e7d19b264c1f07ae9365bd482")
+    key.chmod(0o600)
     done = CliRunner().invoke(app, ["verify", str(made), "--present", "--key", str(key), "--json"])
     told = json.loads(done.stdout)
     assert (done.exit_code, told["findings"], told["different"]) == (0, [], [])
@@ -342,6 +345,125 @@ def test_a_size_that_is_a_lie_is_noticed(made: Path, tmp_path: Path) -> None:
     (tmp_path / "broken.zip").write_bytes(bytes(broken))
     with pytest.raises(RequestError):
         open_bundle(tmp_path / "broken.zip", tmp_path / "other")
+
+
+def told(**changes: object) -> Callable[[Path], None]:
+    """Other contents of ``bundle.json``."""
+
+    def change(folder: Path) -> None:
+        contents = json.loads((folder / "bundle.json").read_text())
+        (folder / "bundle.json").write_text(json.dumps(contents | changes))
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("requires", "said"),
+    [
+        ("evil @ file:///tmp/evil", "names an address"),
+        ("evil@https://example.org/evil-1.0.tar.gz", "names an address"),
+        ("evil[all] @ git+https://example.org/evil", "names an address"),
+        ("./evil", "is no requirement of a package"),
+        ("evil/", "is no requirement of a package"),
+        ("/tmp/evil", "is no requirement of a package"),
+        ("../evil", "is no requirement of a package"),
+        ("file:///tmp/evil", "is no requirement of a package"),
+        ("git+https://example.org/evil", "is no requirement of a package"),
+        ("-r evil.txt", "is no requirement of a package"),
+        ("--index-url=https://example.org", "is no requirement of a package"),
+        ("evil --config-settings=x=y", "is no requirement of a package"),
+        ("evil>=1 --hash=sha256:00", "is no requirement of a package"),
+        ("evil; python_version > '3'", "has a marker"),
+        ("evil-1.0.zip", "is no name of a package with versions"),
+        ("evil-1.0-py3-none-any.whl", "is no name of a package with versions"),
+        ("evil===../evil", "is no name of a package with versions"),
+        ("evil\n-r other", "is no printable text"),
+        ("\u0435vil", "is no printable text"),
+        ("x" * 1000, "is no printable text of up to 200 characters"),
+    ],
+)
+def test_a_requirement_is_a_name_with_versions(made: Path, tmp_path: Path, requires: str, said: str) -> None:
+    bad = changed(made, tmp_path / "bad.zip", told(requires=[requires]), hashes=False)
+    with pytest.raises(RequestError, match=said):
+        open_bundle(bad, tmp_path / "open")
+    with pytest.raises(RequestError, match=said):
+        environment.install_requirements(Path(sys.executable), [requires], tmp_path / "packages")
+    with pytest.raises(RequestError, match=said):
+        source.source_of(str(written(tmp_path / "mine")), {}, tmp_path, (requires,))
+
+
+def test_requirements_reach_pip_in_their_plain_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[list[str]] = []
+    monkeypatch.setattr(environment, "_run", lambda command, *_: seen.append(list(command)) or "")
+    environment.install_requirements(Path(sys.executable), ["Torch[cpu] >= 2.6 , < 3"], tmp_path / "packages")
+    assert seen[-1][-1] == "Torch[cpu]<3,>=2.6"
+    assert seen[-1][6:8] == ["--only-binary", ":all:"]
+
+
+@pytest.mark.parametrize("scenario", ["../../evil.toml", "/tmp/evil.toml", "evil.toml", "a/b-v1", "clean-voyages"])
+def test_a_bundle_names_scenarios_by_id_only(made: Path, tmp_path: Path, scenario: str) -> None:
+    bad = changed(made, tmp_path / "bad.zip", told(runs={scenario: 1}), hashes=False)
+    with pytest.raises(RequestError, match="is no versioned id of a scenario"):
+        open_bundle(bad, tmp_path / "open")
+
+
+@pytest.mark.usefixtures("here")
+def test_the_code_of_a_scenario_in_a_bundle_is_not_run(made: Path, tmp_path: Path) -> None:
+    path, witness = evil_scenario(tmp_path / "others")
+
+    def change(folder: Path) -> None:
+        forge(folder / "results", lambda r: replace(r, scenario=str(path)) if r.seed == 1 else r)
+
+    bad = changed(made, tmp_path / "bad.zip", change, hashes=True)
+    report = publishing.verify_bundle(bad, present=True)
+    assert not witness.exists()
+    assert not report.passed
+    assert "is no versioned id, such as coastal-voyage-v1" in report.findings[0]
+    with pytest.raises(RequestError):
+        simnav.merge([bad], tmp_path / "merged")
+    assert not witness.exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"status": "no-recording", "scores": {}}, "no-recording is stored, ok came out"),
+        ({"status": "unsuitable", "scores": {}}, "unsuitable is stored, ok came out"),
+        ({"status": "timeout", "scores": {}}, "timeout is stored, ok came out"),
+        ({"status": "timeout", "time_limit": 1e-3, "scores": {}}, "have other limits than 60 s"),
+        ({"status": "skipped", "scores": {}}, "status = 'skipped' is none of"),
+        ({"note": "recording 'dive 1'"}, "note "),
+        ({"draws": {"duration_s": 1.0}}, "draws "),
+        ({"score_update_median": 1e-9, "seconds": 1e-9}, "update_median 1e-09 s is stored"),
+        ({"score_nees_horizontal": None}, "the results lack nees_horizontal"),
+        ({"score_coverage_95": 1.0}, "coverage_95 is"),
+        ({"made_numpy": "9.9.9"}, "its results were made with several versions of numpy"),
+        ({"made_commit": "0" * 40}, "several versions of commit"),
+        ({"scoring": "{}", "score_r95": None}, "the results lack r95"),
+        ({"estimator_digest": "0" * 24}, "estimator_digest"),
+        ({"reference": True}, "says that it was told the truth"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_the_worst_run_cannot_be_forged(made: Path, tmp_path: Path, changes: dict[str, object], said: str) -> None:
+    def change(folder: Path) -> None:
+        forge(folder / "results", lambda r: fields(**changes)(r) if r.seed == 1 else r)
+
+    report = publishing.verify_bundle(changed(made, tmp_path / "bad.zip", change, hashes=True), present=True)
+    assert not report.passed
+    assert said in " | ".join((*report.findings, *report.different, *report.undecided))
+
+
+def test_a_row_of_a_bundle_looks_like_no_other(made: Path, tmp_path: Path) -> None:
+    for k, (label, said) in enumerate({
+        "\u0435kf": "consists of printable ASCII", "EKF": "can be taken for ekf", "sw_fgo": "can be taken for sw-fgo",
+        "ekf(window=3)": "is a name of one of simnav's own", "ekf:Mine": "is a name of one of simnav's own",
+        "x" * 201: "at most 200", "a\nb": "consists of printable ASCII",
+    }.items()):  # fmt: skip
+        contents = {"estimators": [{"label": label, "name": "my_last_fix.py:MyLastFix"}]}
+        bad = changed(made, tmp_path / f"bad-{k}.zip", told(**contents), hashes=False)
+        with pytest.raises(RequestError, match=said):
+            open_bundle(bad, tmp_path / f"open-{k}")
 
 
 # -- what cannot be submitted -------------------------------------------------------------------------------------

@@ -1,0 +1,51 @@
+"""What a row learned from, in words for a board."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["learned_by", "learned_words"]
+
+_SHOWN = 3  # ranges of runs
+
+
+def learned_by(results: Iterable[Result]) -> str:
+    """What the estimator of some results learned from, in words; empty where nothing is said."""
+    texts = {id(r.learned): r.learned for r in results if r.learned}
+    return "; ".join(sorted({words for learned in texts.values() if (words := learned_words(learned))}))
+
+
+def learned_words(learned: Mapping[str, Any]) -> str:
+    """The record of a training in one line.
+
+    Parameters
+    ----------
+    learned : mapping
+        As of `simnav.leaderboard.results.result.Result`.
+
+    Examples
+    --------
+    >>> learned_words({"learned_from": [[5, 8]], "trained_on": {"scenario": "training-gnss-faults", "voyages": 4}})
+    'learned from 4 voyages of training-gnss-faults'
+    >>> learned_words({"learned_from": [[5, 8], [20, 20]]}), learned_words({})
+    ('learned from runs of streams 5 to 8, 20', '')
+    """
+    record = learned.get("trained_on")
+    record = record if isinstance(record, Mapping) else {}
+    ranges = [p for p in _listed(learned.get("learned_from")) if isinstance(p, list) and len(p) == 2]
+    streams = ", ".join(f"{a} to {b}" if a != b else f"{a}" for a, b in ranges[:_SHOWN])
+    more = f" and {len(ranges) - _SHOWN} more" if len(ranges) > _SHOWN else ""
+    scenario, voyages = record.get("scenario"), record.get("voyages")
+    if scenario and isinstance(voyages, int):
+        return f"learned from {voyages} voyages of {str(scenario)[:100]}"
+    if streams:
+        return f"learned from runs of streams {streams}{more}"
+    return f"learned from {', '.join(f'{k} {v}' for k, v in list(record.items())[:3])[:200]}" if record else ""
+
+
+def _listed(value: object) -> list[Any]:
+    return value if isinstance(value, list) else []

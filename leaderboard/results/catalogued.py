@@ -1,0 +1,38 @@
+"""The scenario that a result names: of the catalogue, by its versioned id, and never a path.
+
+`simnav.scenario.load` also reads files, and imports the plug-ins that they name. A result of others must not choose
+which file that is. A scenario that is not in the catalogue is given by the user (``--scenario FILE``).
+"""
+
+from __future__ import annotations
+
+from simnav.leaderboard.results.admission import is_scenario_id
+from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.scenario import Scenario, headers, load
+
+__all__ = ["catalogued_scenario"]
+
+
+def catalogued_scenario(identity: str) -> Scenario:
+    """The scenario of the catalogue with this versioned id.
+
+    Parameters
+    ----------
+    identity : str
+        As it stands in a result or a bundle.
+
+    Raises
+    ------
+    RequestError
+        If it is no versioned id, or the catalogue has no such scenario: one sentence.
+    """
+    if not is_scenario_id(identity):
+        raise RequestError(f"scenario = {identity!a:.80} is no versioned id of the catalogue")
+    path = next((h.path for h in headers() if h.id == identity), None)
+    if path is None:
+        raise RequestError(f"scenario {identity} is not in the catalogue; give its file with --scenario")
+    with mistakes(ValueError):
+        scenario = load(path)
+    if scenario.id != identity:
+        raise RequestError(f"{path} holds {scenario.id}, not {identity}")
+    return scenario
