@@ -87,9 +87,9 @@ def request_remarks(scenarios: Sequence[tuple[int, Sequence[int]]]) -> tuple[str
     if early:
         count, asked_for = min(early)
         found.append(f"Stopped early: {count} of {asked_for} seeds that were asked for count on {len(early)} {of}.")
-    raised = [asked for _, asked in scenarios if len(asked) > 1]
+    raised = [tuple(asked) for _, asked in scenarios if len(asked) > 1]
     if raised:
-        steps = ", ".join(map(str, max(map(tuple, raised), key=len)))
+        steps = ", ".join(map(str, max(raised, key=len)))
         found.append(f"The number of seeds was raised after results were there ({steps}) on {len(raised)} {of}.")
     return tuple(found)
 
