@@ -89,7 +89,8 @@ def request_remarks(scenarios: Sequence[tuple[int, Sequence[int]]]) -> tuple[str
         found.append(f"Stopped early: {count} of {asked_for} seeds that were asked for count on {len(early)} {of}.")
     raised = [tuple(asked) for _, asked in scenarios if len(asked) > 1]
     if raised:
-        steps = ", ".join(map(str, max(raised, key=len)))
+        longest = max(raised, key=len)
+        steps = ", ".join(map(str, longest))
         found.append(f"The number of seeds was raised after results were there ({steps}) on {len(raised)} {of}.")
     return tuple(found)
 
