@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         verify,
     )
     from simnav.leaderboard.publishing import (
-        carry_standard,
+        audit_standard,
         check_standard,
         publish_standard,
         run_standard,
@@ -93,10 +93,10 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "audit_standard",
     "bench",
     "bound",
     "campaign",
-    "carry_standard",
     "check",
     "check_standard",
     "cite",
@@ -175,7 +175,7 @@ _HOMES = {
         "verify",
     ),
     "leaderboard.publishing": (
-        "carry_standard",
+        "audit_standard",
         "check_standard",
         "publish_standard",
         "run_standard",

@@ -27,6 +27,8 @@ class Entrant:
         Whether it is one of simnav's references, which receive the truth.
     source : str
         Digest of the source of the estimator.
+    version : int
+        Declared version of the estimator.
     code : bytes
         The class itself, where no other process can import it.
     point : str
@@ -44,6 +46,7 @@ class Entrant:
     point: str = ""
     search: tuple[str, ...] = ()
     learned_from: tuple[tuple[int, int], ...] = ()
+    version: int = 1
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

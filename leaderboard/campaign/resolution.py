@@ -16,7 +16,7 @@ from simnav.estimator.registry import is_own_reference, point_of
 from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, variant
+from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, own_code, variant, with_library
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
 from simnav.leaderboard.campaign.session_class import carry, is_session
@@ -51,7 +51,10 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
             with mistakes(EstimatorError):
                 made = request.make()
             reference, learned_from = is_own_reference(cls.name), ranges_of(declared_ranges(made))
-            return replace(entrant, reference=reference, source=estimator_source(cls), learned_from=learned_from)
+            return replace(
+                entrant, reference=reference, source=estimator_source(cls), learned_from=learned_from,
+                version=cls.version,
+            )  # fmt: skip
         with contextlib.suppress(Exception):  # the other process says what is wrong
             source = estimator_source(cls)  # here, where the text of a session is known
         if request.cls is not None or is_session(cls.__module__):
@@ -77,7 +80,9 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         learned_from = ranges_of(found["learned_from"])
     except ValueError as error:
         raise RequestError(f"estimator {request.name!r}: {error}") from None
-    return replace(entrant, source=source or found["source"], learned_from=learned_from)
+    return replace(
+        entrant, source=source or with_library(found["source"]), learned_from=learned_from, version=found["version"]
+    )
 
 
 def _absolute(value: Any) -> Any:
@@ -91,7 +96,10 @@ def _describe(entrant: Entrant) -> dict[str, Any]:
     """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
     made = entrant.make()
     cls = type(made)
-    return {"reference": cls.reference, "source": estimator_source(cls), "learned_from": declared_ranges(made)}
+    return {
+        "reference": cls.reference, "source": own_code(cls), "learned_from": declared_ranges(made),
+        "version": cls.version,
+    }  # fmt: skip
 
 
 def variant_of(entrant: Entrant, recording: str) -> str:

@@ -17,6 +17,7 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.leaderboard.results.versions import declared, is_declared
 from simnav.scenario import load
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def verify_results(
             except (RequestError, ValueError) as error:
                 without.append(f"{what}: {sentence(error)}")
                 continue
-            if again.key != result.key:
+            if not _same_address(result, again):
                 without.append(f"{what}: simulator, scenario, estimator or parameters are not those of the result")
                 continue
             if again.status != result.status:
@@ -122,6 +123,13 @@ def verify_results(
         str(folder), len(found), seal.hash, len(found) - len(mine), len(chosen), tuple(close), tuple(different),
         tuple(without), tuple(unknown),
     )  # fmt: skip
+
+
+def _same_address(stored: Result, again: Result) -> bool:
+    """Whether a result is that of a run: by declared versions, if it came with simnav, otherwise by its key."""
+    if not is_declared(stored.recording):
+        return stored.key == again.key
+    return [r.key for r in declared([stored])] == [r.key for r in declared([again])]
 
 
 def _repeat(

@@ -22,6 +22,7 @@ from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
+from simnav.simulation.version import SIMULATOR_VERSION
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
@@ -105,6 +106,8 @@ class Unit:
             scenario_digest=self.scenario.content_hash(),
             estimator_digest=entrant.source,
             provenance=here(confinement, self.seal.hash),
+            simulator_version=SIMULATOR_VERSION,
+            estimator_version=entrant.version,
         )
 
 

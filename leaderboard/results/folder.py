@@ -35,6 +35,7 @@ __all__ = [
     "FILES",
     "LOOSE",
     "PROVENANCE",
+    "TRIALS",
     "DamagedError",
     "StoreWarning",
     "atomic",
@@ -54,9 +55,9 @@ __all__ = [
 ]
 
 _MARKER = "simnav-results.json"
-LOOSE, COMPACTED, _TRIALS, PROVENANCE = "results", "compacted", "trials", "provenance"
+LOOSE, COMPACTED, TRIALS, PROVENANCE = "results", "compacted", "trials", "provenance"
 #: Folders inside a folder of results, those first that others refer to.
-FILES = (PROVENANCE, _TRIALS, COMPACTED, LOOSE)
+FILES = (PROVENANCE, TRIALS, COMPACTED, LOOSE)
 _STALE = 3600.0  # a temporary file of this age was left behind [s]
 
 
@@ -258,7 +259,7 @@ def steadily(scan: Callable[[], T]) -> T:
 
 def sweep(path: Path) -> None:
     """Delete temporary files that a killed process left."""
-    folders = (path, *(path / name for name in (LOOSE, COMPACTED, _TRIALS)))
+    folders = (path, *(path / name for name in (LOOSE, COMPACTED, TRIALS)))
     for temporary in [file for folder in folders for file in folder.glob(".*.tmp")]:
         with contextlib.suppress(OSError):
             if time.time() - temporary.stat().st_mtime > _STALE:

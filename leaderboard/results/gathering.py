@@ -13,12 +13,16 @@ from simnav.leaderboard.results import requested, store
 from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.folder import COMPACTED, LOOSE, DamagedError, tables_of
 from simnav.leaderboard.results.provenance import BENCHMARK
+from simnav.leaderboard.results.versions import is_declared
 
 __all__ = ["gather"]
 
 
 def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[str]]) -> Path:
     """Put the results of several folders into one, and return its path; see `simnav.leaderboard.inspection.merge`.
+
+    Results that came with simnav go together with those of a local campaign if the declared version of the simulator is
+    the same; they are known by it from then on. One estimator on one scenario must come from one sort of folder.
 
     Raises
     ------
@@ -39,7 +43,9 @@ def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[s
         for scenario, entry in marker["current"].items():
             both = current.setdefault(scenario, {"recording": entry["recording"], "estimators": {}})
             first = whence.setdefault((scenario, ""), path)
-            if both["recording"] != entry["recording"]:
+            if both["recording"] != entry["recording"] and _same_simulator(first, path, scenario):
+                both["recording"] = max(both["recording"], entry["recording"], key=is_declared)
+            elif both["recording"] != entry["recording"]:
                 raise StoreError(
                     f"{scenario}, or the simulator, differs between {first} and {path}: run one of them again"
                 )
@@ -61,6 +67,19 @@ def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[s
     store.select(target, {s: (e["recording"], e["estimators"]) for s, e in current.items()})
     store.compact(target)
     return target
+
+
+def _same_simulator(first: Path, second: Path, scenario: str) -> bool:
+    """Whether one folder came with simnav, and the simulator of the other has the same version."""
+    if not any(is_declared(store.described(p)["current"][scenario]["recording"]) for p in (first, second)):
+        return False
+    found = {
+        r.simulator_version
+        for p in (first, second)
+        for r in store.load(p, series=False, scores=())
+        if r.scenario == scenario
+    }
+    return len(found) == 1
 
 
 def _looked_through(file: Path) -> None:

@@ -27,6 +27,7 @@ __all__ = [
     "FORMAT",
     "NO_TRIAL",
     "READABLE",
+    "SINCE_VERSIONS",
     "Result",
     "batches",
     "listed",
@@ -37,8 +38,10 @@ __all__ = [
 ]
 
 #: Version of the format of results, and those that can be read.
-FORMAT = 4
-READABLE = (1, 2, 3, FORMAT)
+FORMAT = 5
+READABLE = (1, 2, 3, 4, FORMAT)
+#: The first format with declared versions.
+SINCE_VERSIONS = 5
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
@@ -46,7 +49,8 @@ BATCH = 256
 #: Statuses that say nothing about the estimator.
 NO_TRIAL = ("unsuitable", "no-recording")
 
-#: Columns that older formats do not have: the format that brought them, and what stands there (not known).
+#: Columns that older formats do not have: the format that brought them, and what stands there (not known). All that was
+#: computed before versions were declared counts as version 1.
 _SINCE: dict[str, tuple[int, Any]] = {
     "time_limit": (2, 0.0),
     "memory_limit": (2, 0),
@@ -55,6 +59,8 @@ _SINCE: dict[str, tuple[int, Any]] = {
     "estimator_digest": (3, ""),
     "provenance": (3, ""),
     "draws": (4, "{}"),
+    "simulator_version": (SINCE_VERSIONS, 1),
+    "estimator_version": (SINCE_VERSIONS, 1),
 }
 
 #: Columns that take most of the memory of a file of results.
@@ -92,9 +98,11 @@ class Result:
     peak_memory : int
         Taken by the estimator at most [bytes].
     key : str
-        Digest of all that decides the result, and the seed.
+        Digest of all that decides the result, and the seed: of declared versions
+        (`simnav.leaderboard.results.versions`), or of code (`simnav.leaderboard.campaign.fingerprint`).
     recording : str
-        Digest of scenario and simulator: runs that share it and the seed share the recording.
+        Version of the simulator, or digest of scenario and simulator: runs of a scenario that share it and the seed
+        share the recording.
     simnav : str
         Version and digest of the simulator.
     time_limit : float
@@ -109,6 +117,8 @@ class Result:
         Versions, machine and day; a file names its id only.
     draws : mapping of str to object
         What was drawn for the run, by key path, in the units of the scenario's file.
+    simulator_version, estimator_version : int
+        Declared versions of the simulator and of the estimator.
     """
 
     scenario: str
@@ -133,6 +143,8 @@ class Result:
     estimator_digest: str = ""
     provenance: Provenance = field(default_factory=Provenance)
     draws: Mapping[str, Any] = field(default_factory=dict)
+    simulator_version: int = 1
+    estimator_version: int = 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reason", printable(self.reason))  # it is what an estimator's exception says
@@ -182,6 +194,8 @@ def schema() -> pa.Schema:
             ("estimator_digest", pa.string()),
             ("provenance", pa.string()),
             ("draws", pa.string()),
+            ("simulator_version", pa.int64()),
+            ("estimator_version", pa.int64()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )
