@@ -85,7 +85,7 @@ def test_what_is_written_is_read(folder: Path) -> None:
         assert len(loaded) == len(written)
         for a, b in zip(written, loaded, strict=True):
             same(a, b)
-        assert store.keys(folder) == {r.key: ("ok", 60.0, 1 << 30, "{}") for r in written}
+        assert store.keys(folder) == {r.key: ("ok", 60.0, 1 << 30, "{}", "") for r in written}
         store.compact(folder)
         assert not loose(folder)
     assert all(not r.series and r.scores for r in store.load(folder, series=False))
