@@ -418,7 +418,7 @@ def test_an_estimator_is_run_anew_when_asked_or_when_others_computed_it(
         others = ("9.9", *numerics()[1:])
         patch.setattr(campaign, "numerics", lambda p=None, *, processor=True: others if p is None else numerics(p))
         assert computed() == 3  # of another version of NumPy
-    machine = numerics()[:-1] + ("x86_64 other",)
+    machine = (*numerics()[:-1], "x86_64 other")
     with monkeypatch.context() as patch:
         patch.setattr(campaign, "numerics", lambda p=None, *, processor=True: machine if p is None else numerics(p))
         assert computed() == 3

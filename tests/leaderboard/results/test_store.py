@@ -283,7 +283,7 @@ def test_a_folder_of_another_format_is_left_alone(folder: Path) -> None:
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 99, "simnav": "9.0"}))
     before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()}
     for action in (store.create, store.load, store.compact, store.keys, lambda f: store.select(f, {})):
-        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 4"):
+        with pytest.raises(StoreError, match=r"format 99 \(simnav 9.0\), this version reads format 5"):
             action(folder)
     assert {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.rglob("*") if p.is_file()} == before
 
