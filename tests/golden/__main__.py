@@ -15,6 +15,7 @@ from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
+import tests.conftest  # noqa: F401 (it finds the logs beside the project)
 from simnav.scenario import load, names
 from tests.golden import bits
 from tests.golden.cases import CASES

@@ -45,6 +45,7 @@ def test_every_row_gives_the_numbers_of_its_version(name: str) -> None:
     assert not asked, f"\n{asked}"
 
 
+@pytest.mark.filterwarnings("ignore::simnav.log.LogWarning")
 def test_every_scenario_gives_the_recording_of_its_version() -> None:
     found = {load(name).id: entry for name in scenario_names() if (entry := of_scenario(name)) is not None}
     asked = in_scenarios(stored(), found, versions())
