@@ -412,6 +412,7 @@ def campaign(
     time_limit: float | None = None,
     memory_limit: float = 2048.0,
     retry: bool = False,
+    force: Sequence[str] = (),
     keep_trials: bool = False,
     covariance_interval: float = 0.0,
     backend: str = "loky",
@@ -424,6 +425,9 @@ def campaign(
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run estimators on scenarios and seeds. Started again, the campaign continues.
+
+    A result is computed anew if the code of simnav or of the estimator has changed since, or a numerical library, or if
+    it comes from another kind of processor.
 
     Parameters
     ----------
@@ -442,6 +446,8 @@ def campaign(
         True: run the failed runs of the folder again (errors, timeouts, out of memory, diverged, invalid output). A
         run that could not be recorded, or that ended because of a shorter time limit or a smaller memory limit, is
         always run again.
+    force : sequence of str
+        Names or labels of estimators that are run anew, even if the folder has their results.
     keep_trials : bool
         True: keep the estimates, covariances, diagnostics and flags, for `rescore`: about 190 bytes an epoch and run.
     covariance_interval : float
@@ -465,7 +471,7 @@ def campaign(
     CampaignReport
         A summary of all results in the folder.
     """
-    from simnav.leaderboard.campaign.campaign import RUNS, combined
+    from simnav.leaderboard.campaign.campaign import RUNS, combined, require_known
     from simnav.leaderboard.campaign.oracles import beside_oracles
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.profiles import load
@@ -483,13 +489,15 @@ def campaign(
     folder, summaries, seal = absolute(output), [], read_seal(sealed)
     tracks: dict[str, str] = {}
     end = None if minutes is None else time.monotonic() + 60.0 * positive("minutes", minutes)
-    for wanted, those, count in parts:
-        chosen, everyone = scenarios_of(wanted, optional=profile is not None), requests(those, parameters)
+    anew, asked = _names(force), [requests(those, parameters) for _, those, _ in parts]
+    require_known(anew, asked)
+    for (wanted, _, count), everyone in zip(parts, asked, strict=True):
+        chosen = scenarios_of(wanted, optional=profile is not None)
         tracks |= {s.id: s.track for s in chosen}
         for some, beside in beside_oracles(chosen, everyone) if oracle else [(chosen, everyone)]:
             # fmt: off
             summaries.append(_run(some, beside, seeds_of(seed, count), folder, workers, time_limit, memory_limit,
-                                  progress, retry=retry, keep_trials=keep_trials,
+                                  progress, retry=retry, force=anew, keep_trials=keep_trials,
                                   covariance_interval=covariance_interval, confinement=confinement, seal=seal,
                                   backend=backend, scheduler=scheduler, shard=shard,
                                   minutes=None if end is None else max(0.0, (end - time.monotonic()) / 60.0)))
@@ -635,6 +643,16 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
         return
     with scratch("evaluate") as home:
         yield home / "results"
+
+
+def _names(given: Sequence[str] | str) -> tuple[str, ...]:
+    """Names, one by one; a text may hold several, separated by commas.
+
+    >>> _names(["ekf, ukf", "sw-fgo"])
+    ('ekf', 'ukf', 'sw-fgo')
+    """
+    texts = [given] if isinstance(given, str) else given
+    return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())
 
 
 def _run(

@@ -21,7 +21,7 @@ from simnav.leaderboard.results.scratch import scratch
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
     from simnav.leaderboard.site.report import SiteReport
-    from simnav.leaderboard.standard.carrying import Carried
+    from simnav.leaderboard.standard.auditing import Audit
     from simnav.leaderboard.standard.currency import Outdated
     from simnav.leaderboard.standard.publication import Published
     from simnav.leaderboard.submission.bundle import Row
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Submission",
-    "carry_standard",
+    "audit_standard",
     "check_standard",
     "publish_standard",
     "run_standard",
@@ -293,11 +293,14 @@ def run_standard(
     results: str | os.PathLike[str] = "results/standard",
     shipped: str | os.PathLike[str] | None = None,
     workers: int = 2,
+    force: Sequence[str] = (),
+    shard: tuple[int, int] = (1, 1),
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run the missing and outdated parts of the standard result, for a limited time. The same call continues.
 
-    A new folder starts with the results that come with simnav. So only rows and scenarios that have changed are run.
+    A new folder starts with the results that come with simnav. So only rows and scenarios with a new version are run.
+    Results are known by their declared versions: an edit without a new version runs nothing, but for ``force``.
 
     Parameters
     ----------
@@ -311,7 +314,7 @@ def run_standard(
         The results to start with; default: those that come with simnav.
     workers : int
         Processes.
-    progress : callable, optional
+    force, shard, progress : optional
         As for `simnav.leaderboard.interface.campaign`.
 
     Returns
@@ -320,16 +323,25 @@ def run_standard(
         Its summary says how many runs are left.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.standard.publication import begin
+    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.results import requested
+    from simnav.leaderboard.standard.publication import begin, run
 
     folder = absolute(results)
     with mistakes(StoreError):
         begin(folder, standard.RESULTS if shipped is None else absolute(shipped))
-    return campaign(output=folder, profile=profile, workers=workers, minutes=minutes, oracle=False, progress=progress)
+        summary = run(
+            load(profile), folder, workers=whole("workers", workers, 1), minutes=minutes, force=force, shard=shard,
+            progress=progress,
+        )  # fmt: skip
+    found = results_of(folder)
+    return CampaignReport(found, rank(found, requested=requested.read(folder)), summary)
 
 
 def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
-    """Whether the standard result belongs to the present code, by its keys; nothing is run.
+    """Whether the standard result has the declared versions of today; nothing is run.
 
     Parameters
     ----------
@@ -362,49 +374,39 @@ def _standard_results(given: str | os.PathLike[str] | None) -> Path:
     return folder
 
 
-def carry_standard(
+def audit_standard(
     *,
-    runs: int = 1,
-    shipped: str | os.PathLike[str] | None = None,
-    record: str | os.PathLike[str] | None = None,
-    workers: int = 2,
-    progress: CampaignProgress = None,
-) -> Carried:
-    """Carry the standard result over to the code of today, where runs that are repeated give the same scores.
+    sample: int = 20,
+    results: str | os.PathLike[str] | None = None,
+    progress: Callable[..., None] | None = None,
+) -> Audit:
+    """Repeat a random sample of the standard result with the code of today, and compare the scores.
+
+    Declared versions alone say which results are up to date. The audit tests whether they are.
 
     Parameters
     ----------
-    runs : int
-        How many runs of each scenario and estimator that are out of date are repeated, drawn at random from those that
-        are stored; all where there are fewer.
-    shipped : path, optional
-        Folder of the packed results, which is replaced as a whole; default: that which comes with simnav.
-    record : path, optional
-        CSV file to which a line is added: date, commit, what was carried over, and how many runs were repeated;
-        default: that which comes with simnav.
-    workers : int
-        Processes.
+    sample : int
+        How many results are repeated. The audit says which share of wrong results such a sample would find.
+    results : path, optional
+        Folder of results; default: those that come with simnav.
     progress : callable, optional
-        As for `simnav.leaderboard.interface.campaign`.
+        Called with how many of how many runs are done, and ``note=`` the next.
 
     Returns
     -------
-    simnav.leaderboard.standard.carrying.Carried
+    simnav.leaderboard.standard.auditing.Audit
 
     Raises
     ------
     RequestError
-        If ``runs`` is below 1, there are no results, or the code differs from its commit, which the record would name.
+        If ``sample`` is below 1, or there are no results.
     """
-    from simnav.leaderboard import standard
-    from simnav.leaderboard.standard.carrying import carry
+    from simnav.leaderboard.standard.auditing import audit
 
-    folder = _standard_results(shipped)
+    folder = _standard_results(results)
     with mistakes(StoreError):
-        return carry(
-            folder, standard.CARRIED if record is None else absolute(record), runs=runs, workers=workers,
-            progress=progress,
-        )  # fmt: skip
+        return audit(folder, whole("sample", sample, 1), progress)
 
 
 def publish_standard(
@@ -466,8 +468,8 @@ def publish_standard(
             working, load(profile), folder, file, None if readme is None else absolute(readme), preliminary=preliminary
         )
     if site is not None:
-        published = {r.key for r in made.results}
-        found = [r for r in results_of(working, series=True) if r.key in published]
+        published = {(r.scenario, r.estimator, r.seed) for r in made.results}
+        found = [r for r in results_of(working, series=True) if (r.scenario, r.estimator, r.seed) in published]
         build(found, made.ranking, absolute(site), progress=progress, workers=workers, papers=find(Path("reproduced")),
               editions=pages_of(read(file)))  # fmt: skip
     return made

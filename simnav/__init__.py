@@ -41,7 +41,7 @@ if TYPE_CHECKING:
         verify,
     )
     from simnav.leaderboard.publishing import (
-        carry_standard,
+        audit_standard,
         check_standard,
         publish_standard,
         run_standard,
@@ -95,10 +95,10 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "audit_standard",
     "bench",
     "bound",
     "campaign",
-    "carry_standard",
     "check",
     "check_standard",
     "cite",
@@ -181,7 +181,7 @@ _HOMES = {
         "verify",
     ),
     "leaderboard.publishing": (
-        "carry_standard",
+        "audit_standard",
         "check_standard",
         "publish_standard",
         "run_standard",

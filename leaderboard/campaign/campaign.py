@@ -38,11 +38,15 @@ from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
 from simnav.leaderboard.results import requested, store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.provenance import numerics
+from simnav.leaderboard.results.versions import declared_recording, declared_variant, is_declared
+from simnav.simulation.version import SIMULATOR_VERSION
+from simnav.spec import closest
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["MEMORY", "RUNS", "CampaignError", "Progress", "Summary", "run_campaign"]
+__all__ = ["MEMORY", "RUNS", "CampaignError", "Progress", "Summary", "combined", "require_known", "run_campaign"]
 
 #: Seeds of a campaign, by default.
 RUNS = 50
@@ -146,6 +150,7 @@ def run_campaign(
     timeout: float | None = None,
     memory: int = MEMORY,
     retry: bool = False,
+    force: Sequence[str] = (),
     keep_trials: bool = False,
     covariance_interval: float = 0.0,
     progress: Callable[[Progress], None] | None = None,
@@ -155,6 +160,7 @@ def run_campaign(
     confinement: str = "auto",
     seal: Seal = PUBLIC,
     minutes: float | None = None,
+    by_version: bool = False,
 ) -> Summary:
     """Run estimators on scenarios and seeds, and store the results.
 
@@ -169,6 +175,8 @@ def run_campaign(
         Folder of the results; it is made if it does not exist.
     workers, retry, keep_trials, covariance_interval, confinement, minutes
         As for `simnav.leaderboard.interface.campaign`.
+    force : sequence of str
+        Labels or names of estimators that are run anew, where they are among those that are run.
     timeout : float, optional
         Wall-clock time that an estimator may take for a run [s]; default: `time_limit`.
     memory : int
@@ -185,6 +193,9 @@ def run_campaign(
         their folders together.
     seal : Seal
         May derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
+    by_version : bool
+        True: results are known by their declared versions (`simnav.leaderboard.results.versions`), as what comes with
+        simnav is. False: by digests of the code, and by the libraries and the processor that computed them.
 
     Returns
     -------
@@ -224,6 +235,9 @@ def run_campaign(
             raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
     _unique("scenario", [s.id for s in scenarios])
     _unique("estimator", [e.label for e in estimators])
+    forced = _forced(force, estimators)
+    if by_version and seal.secret:
+        raise RequestError("results with sealed seeds are known by digests of the code, not by declared versions")
     if not (isinstance(shard, Sequence) and len(shard) == 2 and all(isinstance(k, int) for k in shard)):
         raise RequestError(f"shard = {shard!r} should be a pair (k, n): part k of n")
     part, parts = shard
@@ -237,6 +251,8 @@ def run_campaign(
     with mistakes():
         chosen = chosen_confinement(confinement)
     path = store.create(Path(folder).resolve())
+    if not by_version:
+        _require_local(path, [s.id for s in scenarios])
     endings = store.keys(path)
     simulator = simulator_version()
     alone = workers == 1 and backend == "loky"
@@ -248,21 +264,31 @@ def run_campaign(
         raise CampaignError(str(error)) from None
     if not seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
         require_unseen(entrants, scenarios, seeds)
-    recordings = {s.id: seal.recording(recording_digest(s, simulator)) for s in scenarios}
-    variants = {
-        s.id: {e.label: variant_of(e, recordings[s.id]) for e in entrants} for s in scenarios
-    }  # scenario -> label -> variant
+    if by_version:
+        recordings = dict.fromkeys((s.id for s in scenarios), declared_recording(SIMULATOR_VERSION))
+    else:
+        recordings = {s.id: seal.recording(recording_digest(s, simulator)) for s in scenarios}
+
+    def variant(entrant: Entrant, scenario: str) -> str:
+        if by_version:
+            return declared_variant(
+                scenario, SIMULATOR_VERSION, entrant.label, entrant.version, entrant.parameters
+            )  # fmt: skip
+        return variant_of(entrant, recordings[scenario])
+
+    variants = {s.id: {e.label: variant(e, s.id) for e in entrants} for s in scenarios}
     current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
     store.select(path, current)
     requested.add(path, (s.id for s in scenarios), len(seeds))
 
     scores, scoring = own_scores(), scoring_code()
     plan = Plan(scenarios, entrants, seeds, variants, shard=shard)
-    stale = {
-        key
-        for key in filter(plan.asks, endings)
-        if scoring_differs(endings[key].scoring, scoring) and trials.is_kept(path, key)
-    }
+    forced_keys = frozenset(variants[s.id][label] for s in scenarios for label in forced)
+
+    def rescored(key: str) -> bool:  # the rules of scoring of what ships are those of the benchmark's version
+        return not by_version and scoring_differs(endings[key].scoring, scoring)
+
+    stale = {key for key in filter(plan.asks, endings) if rescored(key) and trials.is_kept(path, key)}
     if stale:  # a score was edited: the trials that were kept have all that it needs
         rescore_results(path, scenarios=scenarios, keys=stale, seal=seal)
         endings = store.keys(path)
@@ -271,10 +297,14 @@ def run_campaign(
         return Limits(time_limit(scenario) if timeout is None else timeout, memory)
 
     mine = set(filter(plan.asks, endings))
+    elsewhere = set[str]() if by_version else _computed_elsewhere(path, processors=backend == "loky")
     again = {
         key
         for key in mine
-        if _again(endings[key], limits(plan.scenario_of(key)), retry) or scoring_differs(endings[key].scoring, scoring)
+        if _again(endings[key], limits(plan.scenario_of(key)), retry)
+        or rescored(key)
+        or endings[key].provenance in elsewhere
+        or key.rpartition("-")[0] in forced_keys
     }
     plan = replace(plan, there=mine - again)
 
@@ -327,6 +357,39 @@ def _again(ending: store.Ending, limits: Limits, retry: bool) -> bool:
     return (ending.status == "timeout" and ending.time_limit < limits.timeout) or (
         ending.status == "out-of-memory" and ending.memory_limit < limits.memory
     )
+
+
+def require_known(names: Sequence[str], parts: Iterable[Sequence[EstimatorRequest]]) -> None:
+    """RequestError where an estimator that is to be run anew is in no part of what is run."""
+    everyone = [request for part in parts for request in part]
+    for name in names:
+        if not _forced([name], everyone):
+            known = sorted({e.label for e in everyone})
+            raise RequestError(f"force = {name!r}: no such estimator is run here{closest(name, known)}")
+
+
+def _forced(names: Sequence[str], estimators: Sequence[EstimatorRequest]) -> set[str]:
+    """Labels of the estimators that are run anew, by label, or by name with whatever parameters."""
+    return {e.label for e in estimators if {e.label, e.name, e.label.partition("(")[0]} & set(names)}
+
+
+def _require_local(path: Path, scenarios: Sequence[str]) -> None:
+    """Refuse a folder of what comes with simnav: its numbers are known by versions, not by the code of today."""
+    current = store.described(path).get("current", {})
+    shipped = [s for s in scenarios if is_declared(current.get(s, {}).get("recording", ""))]
+    if shipped:
+        raise RequestError(
+            f"{path} holds results that came with simnav, of {shipped[0]} and others: a campaign of the code of today "
+            "needs another folder, and 'simnav merge' puts the two together"
+        )
+
+
+def _computed_elsewhere(path: Path, *, processors: bool) -> set[str]:
+    """Ids of the provenances whose numerical libraries, or processor, are not those of this process."""
+    now = numerics(processor=processors)
+    return {
+        identity for identity, other in store.provenances(path).items() if numerics(other, processor=processors) != now
+    }
 
 
 def _unique(what: str, labels: list[str]) -> None:

@@ -27,6 +27,8 @@ class Entrant:
         Whether it is one of simnav's references, which receive the truth.
     source : str
         Digest of the source of the estimator.
+    version : int
+        Declared version of the estimator.
     code : bytes
         The class itself, where no other process can import it.
     point : str
@@ -47,6 +49,7 @@ class Entrant:
     search: tuple[str, ...] = ()
     learned_from: tuple[tuple[int, int], ...] = ()
     learned: Mapping[str, Any] = field(default_factory=dict)
+    version: int = 1
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

@@ -1,9 +1,13 @@
-"""Digests of all that decides a result: scenario, data, simulator, estimator. Nothing else counts.
+"""Digests of all that decides a result of a local campaign: scenario, data, simulator, estimator.
 
 A result's key is ``VARIANT-SEED``. The variant hashes the recording's digest (scenario, log files, the code of the
-simulator) and the estimator's (name, label, parameters, the files that they name, code). Code is what
-`simnav.leaderboard.campaign.sources` finds by following imports; comments and docstrings are not in it. The scores are
-not in the key: each result says with which code it was scored.
+simulator) and the estimator's (name, label, parameters, the files that they name, code). The digests are coarse: all
+code of simnav that can decide a number counts, but no comment and no docstring. Of the user's own files those count
+that `simnav.leaderboard.campaign.sources` finds by following imports. The scores are not in the key: each result says
+with which code it was scored. The versions of the numerical libraries and the kind of the processor are in its
+provenance, which a campaign compares.
+
+What ships with simnav is known by declared versions instead (`simnav.leaderboard.results.versions`).
 """
 
 from __future__ import annotations
@@ -19,8 +23,9 @@ from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.campaign import sources
 from simnav.leaderboard.campaign.session_class import is_session, source_of
-from simnav.leaderboard.campaign.sources import code_digest, digest, files_digest, followed, is_installed
+from simnav.leaderboard.campaign.sources import digest, files_digest, folder_code, followed, is_installed
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -31,30 +36,35 @@ __all__ = [
     "estimator_source",
     "has_recordings",
     "named_files",
+    "own_code",
     "recording_digest",
     "simulator_version",
     "variant",
+    "with_library",
 ]
 
-#: What makes recordings, and what runs an estimator over them: the imports are followed from here.
-SIMULATOR = ("simnav.source", "simnav.simulation.simulator", "simnav.sensors")
-RUNNER = ("simnav.trial",)
-
+#: Of simnav, what decides no recording and no estimate. What a scenario says is in the scenario's own digest.
+_NEVER = ("leaderboard", "scenarios", "scoring", "testing", "__init__.py", "__main__.py", "warmup.py")
+#: What decides no recording: that of the estimators, and what shows a run to them.
+_ESTIMATION = ("estimator", "estimators", "trial", "environment")
 #: What reads the files of real voyages. It decides the recordings of recorded scenarios, and of no other.
-_LOGS = "simnav.log"
+_LOGS = "log"
 
 _ABSENT = "absent"
 
 
+def _files_code(files: Iterable[Path]) -> str:
+    """Digest of files of the user, and of the user's own files that they import."""
+    return digest(*(part for item in followed(files).items() for part in item))
+
+
 def _package_code(folder: Path) -> str:
-    """Digest of all files of a package, but for what Python makes of them, and of what it imports of simnav."""
+    """Digest of all files of a package, but for what Python makes of them."""
     found = []
     for place, folders, names in os.walk(folder):
         folders[:] = [f for f in folders if f != "__pycache__" and not f.startswith(".")]
         found += [Path(place, n) for n in names if not n.startswith(".") and not n.endswith((".pyc", "~"))]
-    files = files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
-    code = followed(files=sorted(p for p in found if p.suffix == ".py"))
-    return digest(files, code_digest({name: c for name, c in code.items() if _in_simnav(name)}))
+    return files_digest(sorted((p.relative_to(folder).as_posix(), p) for p in found))
 
 
 def _installed_code(package: str) -> str:
@@ -67,14 +77,14 @@ def _installed_code(package: str) -> str:
     if origin is None:
         return digest(package, "no file")
     path = Path(origin)
-    return _package_code(path.parent) if path.name == "__init__.py" else code_digest(followed(files=[path]))
+    return _package_code(path.parent) if path.name == "__init__.py" else _files_code([path])
 
 
 def simulator_version() -> str:
     """Version of simnav with a digest of the code that makes recordings; what reads log files is not in it."""
     from importlib.metadata import version
 
-    return f"{version('simnav')}+{code_digest(followed(SIMULATOR, without=[_LOGS]))[:12]}"
+    return f"{version('simnav')}+{folder_code(sources.LIBRARY, (*_NEVER, *_ESTIMATION, _LOGS))[:12]}"
 
 
 def recording_digest(scenario: Scenario, simulator: str) -> str:
@@ -105,7 +115,7 @@ def _plugin_digests(scenario: Scenario) -> list[str]:
         if is_installed(path):
             found.append(_installed_code(module.partition(".")[0]))
         else:
-            found.append(code_digest(followed(files=[path], without=[_LOGS, "simnav.estimators"])))
+            found.append(_files_code([path]))
     return found
 
 
@@ -122,7 +132,7 @@ def _log_digest(scenario: Scenario) -> str:
                 files.append((f"{recording}/{file.path}", path))
     except (ValueError, OSError):  # every run says so
         return _ABSENT
-    return digest(files_digest(files), code_digest(followed([f"{_LOGS}.source"])))
+    return digest(files_digest(files), folder_code(sources.LIBRARY / _LOGS))
 
 
 def has_recordings(scenario: Scenario) -> bool:
@@ -131,39 +141,47 @@ def has_recordings(scenario: Scenario) -> bool:
 
 
 def estimator_source(cls: type[Estimator]) -> str:
-    """Digest of the code of an estimator, and of what runs it.
+    """Digest of the code of an estimator, and of all code of simnav that could decide what it estimates."""
+    return with_library(own_code(cls))
 
-    Of a class of simnav: its module, those of its bases and of the pieces that it is made of, and what these import.
-    Of a class in a file: likewise, with the files beside it that it imports. Of a class in an installed package: all
-    files of the package, and what it imports of simnav. Of a class in a session: its text, what it uses of the
-    session, and the files of the user's own that it uses. The content of a file that a default of its parameters names
-    counts, too.
+
+def with_library(own: str) -> str:
+    """Digest of the user's own code of an estimator (`own_code`), together with that of simnav.
+
+    They are apart because the process that imports a file of the user should not read all of simnav.
+    """
+    return digest(folder_code(sources.LIBRARY, _NEVER), own)
+
+
+def own_code(cls: type[Estimator]) -> str:
+    """Digest of the user's own code of an estimator; the same for all that come with simnav.
+
+    Of a class in a file: its file, those of its bases and of the pieces that it is made of, and the files beside them
+    that these import. Of a class in an installed package: all files of the package. Of a class in a session: its text,
+    what it uses of the session, and the files of the user's own that it uses. The content of a file that a default of
+    its parameters names counts, too.
     """
     from simnav.estimator.parameters import parameters_of
 
-    parts, ours = list[str](), set(RUNNER)
+    parts = list[str]()
     for module in dict.fromkeys(_homes(cls)):
-        if _in_simnav(module):
-            ours.add(module)
-            continue
         package = module.partition(".")[0]
+        if _in_simnav(module) or package in sys.stdlib_module_names or package == "numpy":
+            continue
         if is_session(module) and not module.startswith("simnav_file_"):
             continue  # below
-        if package in sys.stdlib_module_names or package == "numpy":
-            continue
         loaded = sys.modules.get(module)
         file = getattr(loaded, "__file__", None)
         if file is not None and "." not in module and not hasattr(loaded, "__path__"):
-            parts.append(code_digest(followed(files=[Path(file).resolve()])))
+            parts.append(_files_code([Path(file).resolve()]))
         elif module in {base.__module__ for base in cls.__mro__}:
             parts.append(_installed_code(package))
     for base in cls.__mro__:
         if is_session(base.__module__) and not base.__module__.startswith("simnav_file_"):
             text, modules = source_of(base)
             parts += [digest(text), *filter(None, map(_used_digest, modules))]
-            ours.update(filter(_in_simnav, modules))
     parts += [content for _, content in named_files(p.default for p in parameters_of(cls))]
-    return digest(code_digest(followed(sorted(ours))), *dict.fromkeys(parts))
+    return digest(*dict.fromkeys(parts))
 
 
 def _homes(item: Any, depth: int = 3) -> Iterator[str]:
@@ -200,7 +218,7 @@ def _used_digest(module: str) -> str:
     if file is None or _in_simnav(module):
         return ""
     path = Path(file).resolve()
-    return "" if is_installed(path) else code_digest(followed(files=[path]))
+    return "" if is_installed(path) else _files_code([path])
 
 
 def _in_simnav(module: str) -> bool:

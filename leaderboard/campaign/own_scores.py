@@ -6,8 +6,9 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from simnav.leaderboard.campaign import sources
 from simnav.leaderboard.campaign.session_class import carry, is_session, receive
-from simnav.leaderboard.campaign.sources import code_digest, followed
+from simnav.leaderboard.campaign.sources import folder_code
 from simnav.plugins import is_file_module, load_plugin, place_of
 
 __all__ = ["OwnScores", "changed_code", "own_scores", "same_code", "scoring_code", "scoring_differs"]
@@ -62,11 +63,12 @@ def own_scores() -> OwnScores:
 
 
 def scoring_code() -> str:
-    """JSON: the modules of simnav that hold scores, with digests of their code and of what they import."""
+    """JSON: the modules of simnav that hold scores, each with the digest of the code of all of them."""
     from simnav.scoring import SCORES
 
+    code = folder_code(sources.LIBRARY / "scoring")
     homes = {score.__module__ for score in SCORES.values() if score.__module__.startswith("simnav.")}
-    return json.dumps({home: code_digest(followed([home])) for home in sorted(homes)})
+    return json.dumps(dict.fromkeys(sorted(homes), code))
 
 
 def scoring_differs(before: str, now: str) -> bool:

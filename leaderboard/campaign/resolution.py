@@ -16,7 +16,7 @@ from simnav.estimator.registry import is_own_reference, point_of
 from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, variant
+from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, own_code, variant, with_library
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
 from simnav.leaderboard.campaign.session_class import carry, is_session
@@ -53,7 +53,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
             told = declared_ranges(made)
             return replace(
                 entrant, reference=is_own_reference(cls.name), source=estimator_source(cls),
-                learned_from=ranges_of(told), learned=record_of(told),
+                learned_from=ranges_of(told), learned=record_of(told), version=cls.version,
             )  # fmt: skip
         with contextlib.suppress(Exception):  # the other process says what is wrong
             source = estimator_source(cls)  # here, where the text of a session is known
@@ -80,7 +80,10 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         learned_from, learned = ranges_of(found["learned_from"]), record_of(found["learned_from"])
     except ValueError as error:
         raise RequestError(f"estimator {request.name!r}: {error}") from None
-    return replace(entrant, source=source or found["source"], learned_from=learned_from, learned=learned)
+    return replace(
+        entrant, source=source or with_library(found["source"]), learned_from=learned_from, learned=learned,
+        version=found["version"],
+    )  # fmt: skip
 
 
 def _absolute(value: Any) -> Any:
@@ -94,7 +97,10 @@ def _describe(entrant: Entrant) -> dict[str, Any]:
     """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
     made = entrant.make()
     cls = type(made)
-    return {"reference": cls.reference, "source": estimator_source(cls), "learned_from": declared_ranges(made)}
+    return {
+        "reference": cls.reference, "source": own_code(cls), "learned_from": declared_ranges(made),
+        "version": cls.version,
+    }  # fmt: skip
 
 
 def variant_of(entrant: Entrant, recording: str) -> str:

@@ -1,10 +1,8 @@
-"""The code that a module stands on: found by following its imports, digested without comments and docstrings.
+"""Digests of code, without comments and docstrings: of all of simnav that can decide a number, and of the user's files.
 
-A module of simnav brings those modules of simnav that it imports, directly or not. Where it imports a name from a
-package, only the module that the package has this name from counts, so that a package which imports everything (the
-registered estimators) does not make everything count. A module of somebody else brings the files of the user that it
-imports, too: those beside it, and those that this process has imported from elsewhere. What is installed is not
-followed.
+Of simnav whole folders count, so that no edit is missed; a campaign takes minutes to run again. A file of the user
+brings the other files of the user that it imports: those beside it, and those that this process has imported from
+elsewhere. What is installed is not followed.
 """
 
 from __future__ import annotations
@@ -15,22 +13,18 @@ import os
 import re
 import sys
 import sysconfig
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from types import MappingProxyType
 
 import simnav
 from simnav.plugins import code_text
 
-__all__ = ["LIBRARY", "code_digest", "code_of", "digest", "files_digest", "followed", "is_installed"]
+__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "folder_code", "followed", "is_installed"]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
 LIBRARY = Path(simnav.__file__).parent
-
-#: Modules that decide no number of a run: what is above the estimators.
-_ABOVE = "simnav.leaderboard"
 
 
 def digest(*parts: str) -> str:
@@ -55,6 +49,32 @@ def files_digest(files: Iterable[tuple[str, Path]]) -> str:
     return digest(*parts)
 
 
+def folder_code(folder: Path, without: Collection[str] = ()) -> str:
+    """Digest of the code in a folder, and of the data that it reads; scenarios and templates are not in it.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder, with all folders in it.
+    without : collection of str
+        Names of its own files and folders that do not count.
+    """
+    found = []
+    for place, folders, names in os.walk(folder, followlinks=True):
+        if Path(place) == folder:
+            folders[:] = [name for name in folders if name not in without]
+            names = [name for name in names if name not in without]
+        folders[:] = [name for name in folders if name != "__pycache__" and not name.startswith(".")]
+        found += [Path(place, name) for name in names if not name.startswith(".")]
+    parts = []
+    for path in sorted(found):
+        if path.suffix == ".py":
+            parts += [path.relative_to(folder).as_posix(), code_of(path).digest]
+        elif path.suffix in (".json", ".npz"):
+            parts.append(files_digest([(path.relative_to(folder).as_posix(), path)]))
+    return digest(*parts)
+
+
 @dataclass(frozen=True)
 class Code:
     """What a Python file says, as far as numbers depend on it.
@@ -63,11 +83,9 @@ class Code:
     ----------
     digest : str
         Of its syntax tree, without docstrings and positions. Of a file that is no Python: of its bytes.
-    imports : tuple of (str, str)
-        Absolute names of modules, each with the name that is taken from it; empty where the module itself is.
-        Imports for type checking only are left out.
-    origins : mapping of str to (str, str)
-        Name -> the module, and the name in it, that it is imported from at the top of the file, for type checking too.
+    imports : tuple of str
+        Names of the modules that it imports anywhere; of ``from . import name`` the name. Imports for type checking
+        only are left out.
     data : tuple of str
         Patterns of the names of files that texts in it name, like ``weights_*.json`` for ``f"weights_{kind}.json"``.
     named : tuple of str
@@ -78,22 +96,14 @@ class Code:
     """
 
     digest: str
-    imports: tuple[tuple[str, str], ...] = ()
-    origins: Mapping[str, tuple[str, str]] = field(default_factory=lambda: MappingProxyType({}))
+    imports: tuple[str, ...] = ()
     data: tuple[str, ...] = ()
     named: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()
 
 
-def code_of(path: Path, package: str) -> Code:
+def code_of(path: Path) -> Code:
     """What a file says.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    package : str
-        Package to which relative imports refer; empty for a file outside a package.
 
     Raises
     ------
@@ -101,31 +111,31 @@ def code_of(path: Path, package: str) -> Code:
         If it cannot be read.
     """
     status = path.stat()
-    return _code_of(path, package, status.st_mtime_ns, status.st_size)
+    return _code_of(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=4096)
-def _code_of(path: Path, package: str, modified: int, size: int) -> Code:
+def _code_of(path: Path, modified: int, size: int) -> Code:
     source = path.read_bytes()
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
         return Code(hashlib.blake2b(source, digest_size=16).hexdigest())
     text = code_text(tree)
-    imports, texts = tuple(dict.fromkeys(_imports(tree, package))), _texts(tree)
-    by_text = any(module.partition(".")[0] == "importlib" for module, _ in imports) or any(
+    found = hashlib.blake2b(text.encode(errors="surrogatepass"), digest_size=16).hexdigest()
+    if path.is_relative_to(LIBRARY):  # it is not followed
+        return Code(found)
+    imports, texts = tuple(dict.fromkeys(_imports(tree))), _texts(tree)
+    by_text = any(module.partition(".")[0] == "importlib" for module in imports) or any(
         isinstance(node, ast.Name) and node.id == "__import__" for node in ast.walk(tree)
     )
     return Code(
-        hashlib.blake2b(text.encode(errors="surrogatepass"), digest_size=16).hexdigest(),
+        found,
         imports,
-        MappingProxyType({
-            name: origin for statement in _top(tree) for name, origin in _taken(statement, package)
-        }),
         tuple(sorted(t for t in texts if re.fullmatch(_FILE, t) and not t.startswith("*."))),
         tuple(sorted(t.lstrip(".") for t in texts if by_text and re.fullmatch(_MODULE, t))),
         tuple(sorted(t for t in texts if re.fullmatch(_FOLDER, t))),
-    )  # fmt: skip
+    )
 
 
 _FILE = r"[\w*-]+\.[A-Za-z]\w{0,7}|(?:[\w*-]+/)+[\w*-]+\.[A-Za-z]\w{0,7}"
@@ -142,12 +152,6 @@ def _for_type_checking(node: ast.AST) -> bool:
     )
 
 
-def _top(tree: ast.Module) -> Iterator[ast.stmt]:
-    """The statements at the top of a file, and those under ``if TYPE_CHECKING``."""
-    for statement in tree.body:
-        yield from statement.body if isinstance(statement, ast.If) and _for_type_checking(statement) else [statement]
-
-
 def _running(node: ast.AST) -> Iterator[ast.AST]:
     """All nodes but those for type checking."""
     for child in ast.iter_child_nodes(node):
@@ -160,46 +164,13 @@ def _running(node: ast.AST) -> Iterator[ast.AST]:
         yield from _running(child)
 
 
-def _taken(node: ast.AST, package: str) -> Iterator[tuple[str, tuple[str, str]]]:
-    """The names that ``from ... import ...`` binds, with the module and the name in it."""
-    if isinstance(node, ast.ImportFrom):
-        module = node.module or ""
-        if node.level:
-            above = package.split(".")[: len(package.split(".")) - node.level + 1]
-            module = ".".join(filter(None, [*above, module]))
-        for alias in node.names:
-            yield alias.asname or alias.name, (module, alias.name)
-
-
-def _imports(tree: ast.Module, package: str) -> Iterator[tuple[str, str]]:
-    """What a file imports, anywhere in it, and what it uses of the modules that it imports."""
-    bound: dict[str, str] = {}
-    chains: list[str] = []
+def _imports(tree: ast.Module) -> Iterator[str]:
+    """The modules that a file imports, anywhere in it."""
     for node in _running(tree):
         if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield alias.name, ""
-                bound[alias.asname or alias.name.partition(".")[0]] = (
-                    alias.name if alias.asname else alias.name.partition(".")[0]
-                )
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            for _, (module, name) in _taken(node, package):
-                yield module, name
-        elif isinstance(node, ast.Attribute):
-            names = [node.attr]
-            inner: ast.expr = node.value
-            while isinstance(inner, ast.Attribute):
-                names.append(inner.attr)
-                inner = inner.value
-            if isinstance(inner, ast.Name):
-                chains.append(".".join([inner.id, *reversed(names)]))
-    for chain in chains:  # "simnav.estimators.ekf.Ekf": each part but the first is taken from what is before it
-        first, *names = chain.split(".")
-        module = bound.get(first, "")
-        if module.partition(".")[0] == "simnav":
-            for name in names:
-                yield module, name
-                module = f"{module}.{name}"
+            yield from [node.module] if node.module else [alias.name for alias in node.names]
 
 
 def _texts(tree: ast.Module) -> set[str]:
@@ -229,73 +200,37 @@ def _installation() -> tuple[Path, ...]:
 # --- following imports --------------------------------------------------------------------------------
 
 
-def followed(
-    modules: Iterable[str] = (), files: Iterable[Path] = (), *, without: Collection[str] = ()
-) -> dict[str, str]:
-    """Modules and files, and all that they import: name -> digest of the code.
+def followed(files: Iterable[Path]) -> dict[str, str]:
+    """Files of the user, and all files of the user's own that they import: path -> digest of the code.
 
-    Parameters
-    ----------
-    modules : iterable of str
-        Absolute names of modules of simnav.
-    files : iterable of Path
-        Python files of others; what they import of the user's own files counts, too.
-    without : collection of str
-        Packages of simnav that are not followed.
-
-    Returns
-    -------
-    dict of str to str
-        In the order of the names. A module of simnav goes by its absolute name, any other file by its path relative
-        to the folder of the file that brought it, so that a folder may be moved.
+    The paths are relative to the folder of the file that brought them, so that a folder may be moved. They are in the
+    order of the paths.
     """
-    walk = _Walk((_ABOVE, *without))
-    for module in modules:
-        walk.module(module)
+    walk = _Walk()
     for path in files:
         walk.file(path, path.parent)
     walk.run()
     return dict(sorted(walk.found.items()))
 
 
-def code_digest(code: Mapping[str, str]) -> str:
-    """Digest of all that `followed` gave."""
-    return digest(*(part for item in code.items() for part in item))
-
-
 class _Walk:
-    """Modules that were found, and those whose imports are still to be followed."""
+    """Files that were found, and those whose imports are still to be followed."""
 
-    def __init__(self, without: Iterable[str]) -> None:
-        self.without = tuple(without)
+    def __init__(self) -> None:
         self.found: dict[str, str] = {}
-        self.todo: list[tuple[Code, Path | None, Path]] = []  # code, folder of a file of others, its own folder
-        self.taken: set[tuple[str, str]] = set()
-
-    def module(self, name: str) -> bool:
-        """Take a module of simnav; returns whether there is such a module."""
-        place = _place(name)
-        if place is None or any(name == package or name.startswith(f"{package}.") for package in self.without):
-            return False
-        if name not in self.found:
-            package = name if place.name == "__init__.py" else name.rpartition(".")[0]
-            self._add(name, place, package, None)
-        return True
+        self.todo: list[tuple[Code, Path, Path]] = []  # code, folder that its name is relative to, its own folder
 
     def file(self, path: Path, start: Path) -> None:
-        """Take a file of others; ``start`` is the folder that its name is relative to."""
-        name = f"file {Path(os.path.relpath(path, start)).as_posix()}"
-        if name not in self.found:
-            try:
-                self._add(name, path, "", start)
-            except OSError:
-                self.found[name] = "absent"
-
-    def _add(self, name: str, path: Path, package: str, start: Path | None) -> None:
-        code = code_of(path, package)
-        folders = [path.parent]
-        if start is not None:  # of others, who keep their data where they like
-            folders += [place for text in code.folders if (place := path.parent / text).is_dir()]
+        """Take a file; ``start`` is the folder that its name is relative to."""
+        name = Path(os.path.relpath(path, start)).as_posix()
+        if name in self.found:
+            return
+        try:
+            code = code_of(path)
+        except OSError:
+            self.found[name] = "absent"
+            return
+        folders = [path.parent, *(place for text in code.folders if (place := path.parent / text).is_dir())]
         beside = sorted({p for place in folders for pattern in code.data for p in place.glob(pattern) if p.is_file()})
         self.found[name] = digest(code.digest, files_digest((p.name, p) for p in beside)) if beside else code.digest
         self.todo.append((code, start, path.parent))
@@ -303,33 +238,12 @@ class _Walk:
     def run(self) -> None:
         while self.todo:
             code, start, folder = self.todo.pop()
-            for module, name in code.imports:
-                if module == "simnav" or module.startswith("simnav."):
-                    self.take(module, name)
-                elif start is not None:
-                    self.others(module or name, start, folder)
-            if start is not None:
-                for text in code.named:
-                    self.others(text, start, folder)
+            for module in (*code.imports, *code.named):
+                if module.partition(".")[0] != "simnav":
+                    self.take(module, start, folder)
 
-    def take(self, module: str, name: str) -> None:
-        """Take what ``from module import name`` needs, or ``import module`` where the name is empty."""
-        if (module, name) in self.taken:
-            return
-        self.taken.add((module, name))
-        if name and self.module(f"{module}.{name}"):
-            return
-        place = _place(module)
-        if name and place is not None and place.name == "__init__.py":
-            origin = code_of(place, module).origins.get(name)
-            if origin is not None and origin != (module, name) and origin[0].partition(".")[0] == "simnav":
-                self.take(*origin)
-                return
-        if module != "simnav":  # whose own code only says where its names are
-            self.module(module)
-
-    def others(self, name: str, start: Path, folder: Path) -> None:
-        """Take a module that a file of others imports, if it is one of the user's own."""
+    def take(self, name: str, start: Path, folder: Path) -> None:
+        """Take a module that a file imports, if it is one of the user's own."""
         if not self.beside(name.partition(".")[0], start, folder) and "*" not in name:
             file = getattr(sys.modules.get(name), "__file__", None)
             path = None if file is None else Path(file).resolve()
@@ -337,7 +251,7 @@ class _Walk:
                 self.file(path, start)
 
     def beside(self, name: str, start: Path, folder: Path) -> bool:
-        """Take a module or a package that is beside a file of others; returns whether there is one."""
+        """Take a module or a package that is beside a file; returns whether there is one."""
         found: list[Path] = []
         for place in {start, folder}:
             modules = [p for p in place.glob(f"{name}.py") if p.is_file()]
@@ -346,15 +260,3 @@ class _Walk:
         for path in sorted(set(found)):
             self.file(path, start)
         return bool(found)
-
-
-def _place(module: str) -> Path | None:
-    """The file of a module of simnav; None where there is none."""
-    first, *parts = module.split(".")
-    if first != "simnav":
-        return None
-    path = LIBRARY.joinpath(*parts)
-    if (path / "__init__.py").is_file():
-        return path / "__init__.py"
-    path = path.with_name(f"{path.name}.py")
-    return path if parts and path.is_file() else None

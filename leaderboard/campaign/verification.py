@@ -21,6 +21,7 @@ from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError, sentence
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.scratch import scratch
+from simnav.leaderboard.results.versions import declared, is_declared
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
@@ -135,7 +136,7 @@ def verify_results(
             except (RequestError, ValueError) as error:
                 without.append(f"{what}: {sentence(error)}")
                 continue
-            if again.key != result.key or again.recording != result.recording:
+            if not _same_address(result, again):
                 without.append(f"{what}: simulator, scenario, estimator or parameters are not those of the result")
                 continue
             pairs.append((result, again))
@@ -176,6 +177,13 @@ def missing_seeds(results: Sequence[Result]) -> tuple[str, ...]:
             if lacking := every - mine:
                 found.append(f"{label} lacks {len(lacking)} of {len(every)} runs of {scenario}, such as {min(lacking)}")
     return tuple(found)
+
+
+def _same_address(stored: Result, again: Result) -> bool:
+    """Whether a result is that of a run: by declared versions, if it came with simnav, otherwise by its key."""
+    if not is_declared(stored.recording):
+        return stored.key == again.key
+    return [r.key for r in declared([stored])] == [r.key for r in declared([again])]
 
 
 def _repeat(

@@ -23,6 +23,7 @@ from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import named, printable
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
+from simnav.simulation.version import SIMULATOR_VERSION
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
@@ -108,6 +109,8 @@ class Unit:
             estimator_digest=entrant.source,
             provenance=here(confinement, self.seal.hash),
             learned=entrant.learned,
+            simulator_version=SIMULATOR_VERSION,
+            estimator_version=entrant.version,
         )
 
 

@@ -14,18 +14,20 @@ from simnav.leaderboard.cli.options import (
     Debug,
     Estimators,
     FirstSeed,
+    Force,
     Json,
     MemoryLimit,
     Minutes,
     Scenarios,
     Set,
+    Shard,
     TimeLimit,
     Workers,
     campaign_progress,
     parameters,
+    part_of,
 )
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.results.errors import RequestError
 
 __all__ = ["command"]
 
@@ -35,18 +37,6 @@ class Backend(StrEnum):
 
     LOKY = "loky"
     DASK = "dask"
-
-
-def _shard(text: str) -> tuple[int, int]:
-    """Which of how many parts.
-
-    >>> _shard("2/8")
-    (2, 8)
-    """
-    part, _, parts = text.partition("/")
-    if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
-        raise RequestError(f"--shard {text}: it should be K/N with K from 1 to N, like --shard 2/8")
-    return int(part), int(parts)
 
 
 def command(
@@ -65,6 +55,7 @@ def command(
     time_limit: TimeLimit = None,
     memory_limit: MemoryLimit = 2048,
     retry: Annotated[bool, typer.Option("--retry", help="Run the failed runs of the folder again.")] = False,
+    force: Force = None,
     keep_trials: Annotated[
         bool, typer.Option("--keep-trials", help="Keep the estimates, for 'simnav rescore'.")
     ] = False,
@@ -76,9 +67,7 @@ def command(
         str | None,
         typer.Option(metavar="ADDRESS", help="Address of the Dask scheduler, e.g. tcp://host:8786; implies dask."),
     ] = None,
-    shard: Annotated[
-        str, typer.Option(metavar="K/N", help="Do part K of N of the runs; 'simnav merge' puts the parts together.")
-    ] = "1/1",
+    shard: Shard = "1/1",
     confinement: Annotated[
         str, typer.Option(help="How estimators are kept from the truth: auto, bubblewrap, process, none.")
     ] = "auto",
@@ -103,10 +92,11 @@ def command(
         with out.progress("starting") as bar:
             report = interface.campaign(
                 chosen, estimator, runs=runs, seed=seed, output=output, profile=profile, parameters=parameters(set_),
-                workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, keep_trials=keep_trials,
+                workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry, force=force or (),
+                keep_trials=keep_trials,
                 covariance_interval=covariance_interval, confinement=confinement, sealed=sealed,
                 oracle=oracle,
-                backend=(Backend.DASK if scheduler else backend).value, scheduler=scheduler, shard=_shard(shard),
+                backend=(Backend.DASK if scheduler else backend).value, scheduler=scheduler, shard=part_of(shard),
                 minutes=minutes, progress=campaign_progress(bar),
             )  # fmt: skip
         summary = report.summary

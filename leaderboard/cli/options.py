@@ -21,6 +21,7 @@ __all__ = [
     "Estimators",
     "FilesOrNames",
     "FirstSeed",
+    "Force",
     "Json",
     "MemoryLimit",
     "Minutes",
@@ -29,11 +30,13 @@ __all__ = [
     "Scenarios",
     "Seed",
     "Set",
+    "Shard",
     "TimeLimit",
     "Workers",
     "absolute",
     "campaign_progress",
     "parameters",
+    "part_of",
 ]
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")]
@@ -59,6 +62,13 @@ Estimators = Annotated[
 ]
 Set = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a parameter of the estimators.")
+]
+Force = Annotated[
+    list[str] | None,
+    typer.Option("--force", metavar="NAME", help="Run this estimator anew; several are separated by commas."),
+]
+Shard = Annotated[
+    str, typer.Option(metavar="K/N", help="Do part K of N of the runs; 'simnav merge' puts the parts together.")
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the run.")]
 FirstSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the first run; the others count up.")]
@@ -90,6 +100,18 @@ def parameters(given: Sequence[str] | None) -> dict[str, str]:
             raise RequestError(f"--set {text}: it should be name=value, like --set window=10")
         values[name.strip()] = value.strip()
     return values
+
+
+def part_of(text: str) -> tuple[int, int]:
+    """Which of how many parts.
+
+    >>> part_of("2/8")
+    (2, 8)
+    """
+    part, _, parts = text.partition("/")
+    if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
+        raise RequestError(f"--shard {text}: it should be K/N with K from 1 to N, like --shard 2/8")
+    return int(part), int(parts)
 
 
 def absolute(path: Path | str) -> Path:

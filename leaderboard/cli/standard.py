@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from simnav.leaderboard.cli.console import FAILED, session
-from simnav.leaderboard.cli.options import Debug, Json, Minutes, Workers, campaign_progress
+from simnav.leaderboard.cli.options import Debug, Force, Json, Minutes, Shard, Workers, campaign_progress, part_of
 
 __all__ = ["app"]
 
@@ -26,6 +26,8 @@ def run(
     profile: _Profile = "standard",
     shipped: _Shipped = None,
     workers: Workers = 2,
+    force: Force = None,
+    shard: Shard = "1/1",
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -36,7 +38,7 @@ def run(
         with out.progress("starting") as bar:
             report = publishing.run_standard(
                 minutes=minutes, profile=profile, results=results, shipped=shipped, workers=workers,
-                progress=campaign_progress(bar),
+                force=force or (), shard=part_of(shard), progress=campaign_progress(bar),
             )  # fmt: skip
         s = report.summary
         out.document({"results": str(s.folder), "computed": s.computed, "skipped": s.skipped, "left": s.left})
@@ -54,42 +56,41 @@ def check(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Say which rows and scenarios have changed since the standard result was computed."""
+    """Say which rows and scenarios have another version than the standard result."""
     with session(json, debug) as out:
         from simnav.leaderboard import publishing
 
         found = publishing.check_standard(results)
         out.document(found.to_dict())
-        out.print(*(found.sentences() or ["the standard result is what the code of today gives"]))
+        out.print(*(found.sentences() or ["the standard result has the versions of today"]))
         out.code = FAILED if found else 0
 
 
 @app.command()
-def carry(
-    runs: Annotated[int, typer.Option(min=1, help="Runs of each scenario and row that are repeated.")] = 1,
-    shipped: _Shipped = None,
-    record: Annotated[
-        Path | None, typer.Option(help="File that says what was carried over. Default: that of simnav.")
+def audit(
+    sample: Annotated[int, typer.Option(min=1, help="Results that are repeated, drawn at random.")] = 20,
+    results: Annotated[
+        Path | None, typer.Option("--results", help="Folder of results. Default: those of simnav.")
     ] = None,
-    workers: Workers = 2,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Carry the standard result over to the code of today, if repeated runs give the same scores."""
+    """Repeat a random sample of the standard result, and compare the scores."""
     with session(json, debug) as out:
         from simnav.leaderboard import publishing
 
-        with out.progress("starting") as bar:
-            made = publishing.carry_standard(
-                runs=runs, shipped=shipped, record=record, workers=workers, progress=campaign_progress(bar)
-            )
+        with out.progress("repeating") as bar:
+            made = publishing.audit_standard(sample=sample, results=results, progress=bar)
+        found = made.verification
         out.document(made.to_dict())
         out.print(
-            f"results:   {made.folder} ({made.results} carried over, {made.repeated} runs were repeated)",
-            *(f"different: {text}" for text in made.different),
-            *(f"left:      {text}" for text in made.left),
+            f"results:   {found.folder} ({found.results}, of which {found.repeated} were repeated)",
+            *(f"close:     {text}" for text in found.close),
+            *(f"different: {text}" for text in found.different),
+            *(f"left:      {text}" for text in found.not_repeatable),
+            f"the sample: {made.sentence()}",
         )
-        out.code = FAILED if made.different or made.left else 0
+        out.code = 0 if made.passed else FAILED
 
 
 @app.command()

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.campaign.fingerprint import digest, estimator_source, recording_digest, simulator_version
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.provenance import numerics
 
 if TYPE_CHECKING:
     from simnav.estimators.reference import OracleRun
@@ -47,7 +48,9 @@ class OracleRuns:
         self.scenario = scenario
         self.path = Path(folder) / f"{scenario.id}.jsonl"
         oracle = estimator_source(find("oracle-rts"))
-        self._head = json.dumps({"key": digest(recording_digest(scenario, simulator_version()), oracle)})
+        self._head = json.dumps({
+            "key": digest(recording_digest(scenario, simulator_version()), oracle, *numerics())
+        })  # fmt: skip
         self.runs: dict[int, OracleRun] = dict(self._read())
 
     def _read(self) -> Iterator[tuple[int, OracleRun]]:

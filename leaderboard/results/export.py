@@ -49,6 +49,8 @@ _COSTS = ("seconds", "peak_memory")
 _ORIGIN = {
     "scenario_digest": "scenario_digest",
     "estimator_digest": "estimator_digest",
+    "estimator_version": "estimator_version",
+    "simulator_version": "simulator_version",
     "simulator": "simnav",
     "time_limit_s": "time_limit",
     "memory_limit_bytes": "memory_limit",
@@ -186,7 +188,8 @@ def table(results: Sequence[Result]) -> pa.Table:
     import pyarrow as pa
 
     text, real = pa.string(), pa.float64()
-    kinds = dict.fromkeys(("seed", "peak_memory", "memory_limit_bytes", "cores"), pa.int64())
+    whole = ("seed", "peak_memory", "memory_limit_bytes", "cores", "estimator_version", "simulator_version")
+    kinds = dict.fromkeys(whole, pa.int64())
     kinds |= dict.fromkeys(("reference", "dirty"), pa.bool_()) | dict.fromkeys(("seconds", "time_limit_s"), real)
     columns: dict[str, Any] = {}
     for name in (*_FACTS, *_COSTS):

@@ -21,6 +21,7 @@ from simnav.leaderboard.results.errors import StoreError
 from simnav.leaderboard.results.folder import COMPACTED, LOOSE, TRIALS, DamagedError, tables_of
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.results.versions import is_declared
 
 __all__ = ["contradiction", "gather"]
 
@@ -31,6 +32,9 @@ _FACTS = ("status", "parameters", "learned", "reference", "scenario_digest", "es
 
 def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[str]]) -> Path:
     """Put the results of several folders into one, and return its path; see `simnav.leaderboard.inspection.merge`.
+
+    Results that came with simnav go together with those of a local campaign if the declared version of the simulator is
+    the same; they are known by it from then on. One estimator on one scenario must come from one sort of folder.
 
     Raises
     ------
@@ -67,7 +71,9 @@ def _current(markers: Collection[tuple[Path, Mapping[str, Any]]]) -> dict[str, A
                 raise StoreError(f"{path}: {scenario!a:.80} is no versioned id of a scenario")
             both = current.setdefault(scenario, {"recording": entry["recording"], "estimators": {}})
             first = whence.setdefault((scenario, ""), path)
-            if both["recording"] != entry["recording"]:
+            if both["recording"] != entry["recording"] and _same_simulator(first, path, scenario):
+                both["recording"] = max(both["recording"], entry["recording"], key=is_declared)
+            elif both["recording"] != entry["recording"]:
                 raise StoreError(
                     f"{scenario}, or the simulator, differs between {first} and {path}: run one of them again"
                 )
@@ -174,6 +180,19 @@ def _free(place: Path) -> Path:
         count += 1
         found = place.with_name(f"{place.stem}-{count}{place.suffix}")
     return found
+
+
+def _same_simulator(first: Path, second: Path, scenario: str) -> bool:
+    """Whether one folder came with simnav, and the simulator of the other has the same version."""
+    if not any(is_declared(store.described(p)["current"][scenario]["recording"]) for p in (first, second)):
+        return False
+    found = {
+        r.simulator_version
+        for p in (first, second)
+        for r in store.load(p, series=False, scores=())
+        if r.scenario == scenario
+    }
+    return len(found) == 1
 
 
 def _looked_through(file: Path) -> None:

@@ -33,9 +33,6 @@ def pack(
     folder: str | os.PathLike[str],
     target: str | os.PathLike[str],
     estimators: Collection[str] | None = None,
-    *,
-    without: Collection[tuple[str, str]] = (),
-    single: bool = False,
 ) -> list[Result]:
     """Write the current results of a folder into another one, without series and trials.
 
@@ -47,10 +44,6 @@ def pack(
         New, or a folder of results, which is replaced.
     estimators : collection of str, optional
         Labels of those that are taken. Default: all.
-    without : collection of (str, str)
-        Scenarios and estimators that are left out.
-    single : bool
-        Scores in single precision, and the draws of a run with one estimator only: less than half the size.
 
     Returns
     -------
@@ -66,10 +59,8 @@ def pack(
     found = [
         replace(r, series={}, seconds=round(r.seconds, 3))
         for r in store.load(source, series=False)
-        if (estimators is None or r.estimator in estimators) and (r.scenario, r.estimator) not in without
+        if estimators is None or r.estimator in estimators
     ]
-    if single:
-        found = shortened(found)
     write_packed(found, place)
     return found
 
@@ -106,7 +97,10 @@ def write_packed(found: Iterable[Result], place: Path) -> None:
 
 
 def shortened(results: Iterable[Result]) -> list[Result]:
-    """Results with scores in single precision, and with the draws of a run at its first estimator only."""
+    """Results with scores in single precision, and with the draws of a run at its first estimator only.
+
+    They take less than half the space.
+    """
     kept, found = set[tuple[str, int]](), []
     for r in results:
         scores = {name: float(np.float32(value)) for name, value in r.scores.items()}

@@ -22,18 +22,22 @@ from typing import Any
 
 from simnav.leaderboard.results.errors import RequestError
 
-__all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here", "is_commit"]
+__all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here", "is_commit", "numerics"]
 
 #: Name and version of the benchmark: its scenarios, and the rules by which results are scored and ranked.
 #: Raised whenever results before and after a change must not stand in one table.
 BENCHMARK = "simnav-bench 1.0"
 
-_LIBRARIES = ("simnav", "numpy", "numba", "gtsam")
+#: Fields with the versions of the libraries that change numbers: another one may change the last digits of a result.
+_NUMERICAL = ("numpy", "numba", "scipy", "gtsam", "filterpy")
+
+_LIBRARIES = ("simnav", *_NUMERICAL)
+#: Fields that came later: empty ones are not in the id, so that older ids stay as they are.
+_LATER = ("seal", "scipy", "filterpy", "processor")
 #: What of a checkout can decide a result: not its docs, its tests or the results that it publishes.
 _CODE = (
     "pyproject.toml", "simnav", "estimators", "scenarios", "leaderboard",
     ":(exclude)leaderboard/standard/results", ":(exclude)leaderboard/standard/history.csv",
-    ":(exclude)leaderboard/standard/carried.csv",
 )  # fmt: skip
 
 
@@ -49,12 +53,15 @@ class Provenance:
         Commit of the checkout of simnav; empty if simnav is installed without a checkout.
     dirty : bool or None
         Whether the code of that checkout differed from the commit; None without a checkout.
-    simnav, python, numpy, numba, gtsam : str
+    simnav, python, numpy, numba, gtsam, scipy, filterpy : str
         Versions.
     system : str
         Operating system and architecture.
     cpu : str
         Model of the processor.
+    processor : str
+        Its kind, as the compiler of the kernels calls it, such as ``x86_64 skylake-avx512``: another kind rounds
+        differently.
     cores : int
         Number of cores that the process may use; 0 where it is not known.
     confinement : str
@@ -81,6 +88,9 @@ class Provenance:
     confinement: str = ""
     seal: str = ""
     date: str = ""
+    scipy: str = ""
+    filterpy: str = ""
+    processor: str = ""
     identity: str = ""
 
     @cached_property
@@ -115,8 +125,8 @@ class Provenance:
 
 
 def _identity(values: Mapping[str, Any]) -> str:
-    """Digest of all fields; a seal counts where there is one."""
-    content = {name: value for name, value in values.items() if name != "seal" or value}
+    """Digest of all fields; those that came later count where they are known."""
+    content = {name: value for name, value in values.items() if name not in _LATER or value}
     return hashlib.blake2b(json.dumps(content, sort_keys=True).encode(), digest_size=6).hexdigest()
 
 
@@ -161,6 +171,7 @@ def _on(date: str, confinement: str, seal: str) -> Provenance:
         python=platform.python_version(),
         system=f"{platform.system()} {platform.machine()}",
         cpu=_cpu(),
+        processor=_processor(),
         cores=_cores(),
         confinement=confinement,
         seal=seal,
@@ -204,6 +215,27 @@ def _cpu() -> str:
             if name.strip() in ("model name", "Model", "Hardware") and value.strip():
                 return " ".join(value.split())
     return platform.processor()
+
+
+def numerics(provenance: Provenance | None = None, *, processor: bool = True) -> tuple[str, ...]:
+    """What rounds numbers: the versions of the numerical libraries, and the kind of the processor.
+
+    Parameters
+    ----------
+    provenance : Provenance, optional
+        Of which results; default: of what this process computes.
+    processor : bool
+        False leaves the processor out.
+    """
+    names = (*_NUMERICAL, "processor") if processor else _NUMERICAL
+    return tuple(getattr(provenance or here(), name) for name in names)
+
+
+def _processor() -> str:
+    from llvmlite.binding import get_host_cpu_name
+
+    chosen = os.environ.get("NUMBA_CPU_NAME", "")  # which the kernels are compiled for, in place of what is here
+    return f"{platform.machine()} {chosen or get_host_cpu_name()}"
 
 
 def _cores() -> int:

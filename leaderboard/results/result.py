@@ -28,6 +28,7 @@ __all__ = [
     "FORMAT",
     "NO_TRIAL",
     "READABLE",
+    "SINCE_VERSIONS",
     "Result",
     "batches",
     "listed",
@@ -40,6 +41,8 @@ __all__ = [
 #: Version of the format of results, and those that can be read.
 FORMAT = 5
 READABLE = (1, 2, 3, 4, FORMAT)
+#: The first format with declared versions.
+SINCE_VERSIONS = 5
 
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
@@ -47,7 +50,8 @@ BATCH = 256
 #: Statuses that say nothing about the estimator.
 NO_TRIAL = ("unsuitable", "no-recording")
 
-#: Columns that older formats do not have: the format that brought them, and what stands there (not known).
+#: Columns that older formats do not have: the format that brought them, and what stands there (not known). All that was
+#: computed before versions were declared counts as version 1.
 _SINCE: dict[str, tuple[int, Any]] = {
     "time_limit": (2, 0.0),
     "memory_limit": (2, 0),
@@ -57,6 +61,8 @@ _SINCE: dict[str, tuple[int, Any]] = {
     "provenance": (3, ""),
     "draws": (4, "{}"),
     "learned": (5, "{}"),
+    "simulator_version": (SINCE_VERSIONS, 1),
+    "estimator_version": (SINCE_VERSIONS, 1),
 }
 
 #: Columns that take most of the memory of a file of results.
@@ -94,9 +100,11 @@ class Result:
     peak_memory : int
         Taken by the estimator at most [bytes].
     key : str
-        Digest of all that decides the result, and the seed.
+        Digest of all that decides the result, and the seed: of declared versions
+        (`simnav.leaderboard.results.versions`), or of code (`simnav.leaderboard.campaign.fingerprint`).
     recording : str
-        Digest of scenario and simulator: runs that share it and the seed share the recording.
+        Version of the simulator, or digest of scenario and simulator: runs of a scenario that share it and the seed
+        share the recording.
     simnav : str
         Version and digest of the simulator.
     time_limit : float
@@ -115,6 +123,8 @@ class Result:
         What the estimator says that it learned from: ``learned_from``, pairs of a first and a last number as of
         `simnav.estimator.Estimator`, and ``trained_on``, the record of the training. Empty where it learned nothing,
         or results are older than format 5.
+    simulator_version, estimator_version : int
+        Declared versions of the simulator and of the estimator.
     """
 
     scenario: str
@@ -140,6 +150,8 @@ class Result:
     provenance: Provenance = field(default_factory=Provenance)
     draws: Mapping[str, Any] = field(default_factory=dict)
     learned: Mapping[str, Any] = field(default_factory=dict)
+    simulator_version: int = 1
+    estimator_version: int = 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reason", printable(self.reason))  # it is what an estimator's exception says
@@ -190,6 +202,8 @@ def schema() -> pa.Schema:
             ("provenance", pa.string()),
             ("draws", pa.string()),
             ("learned", pa.string()),
+            ("simulator_version", pa.int64()),
+            ("estimator_version", pa.int64()),
         ],
         metadata={"simnav_results": str(FORMAT)},
     )

@@ -29,6 +29,7 @@ from simnav.leaderboard.results.folder import (
     FILES,
     LOOSE,
     PROVENANCE,
+    TRIALS,
     DamagedError,
     SetAsideWarning,
     StoreWarning,
@@ -70,6 +71,7 @@ __all__ = [
     "keys",
     "load",
     "provenances",
+    "readdress",
     "rescore",
     "select",
     "write",
@@ -93,12 +95,15 @@ class Ending(NamedTuple):
         [bytes]; 0 where it is not known.
     scoring : str
         Digest of the code of the scores, as in `Result`.
+    provenance : str
+        Id of the provenance; empty where it is not known.
     """
 
     status: str
     time_limit: float
     memory_limit: int
     scoring: str
+    provenance: str
 
 
 def write(folder: str | os.PathLike[str], result: Result) -> None:
@@ -231,6 +236,40 @@ def rescore(folder: str | os.PathLike[str], scores: Mapping[str, Mapping[str, fl
         return pa.concat_tables([to_table(r) for r in results]).combine_chunks()
 
     _rewrite(path, scores, changed)
+
+
+def readdress(folder: str | os.PathLike[str], address: Mapping[str, tuple[str, str]]) -> None:
+    """Give results other keys; safe to kill and to repeat, as each file is replaced as a whole.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the results. Which of them are current is not changed.
+    address : mapping of str to (str, str)
+        Key -> the new key, and the new ``Result.recording``.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written.
+    """
+
+    def changed(table: pa.Table) -> pa.Table:
+        import pyarrow as pa
+
+        keys, recordings = (table.column(name).to_pylist() for name in ("key", "recording"))
+        new = [address.get(key, (key, recording)) for key, recording in zip(keys, recordings, strict=True)]
+        for k, name in enumerate(("key", "recording")):
+            column = pa.array([pair[k] for pair in new], pa.string())
+            table = table.set_column(table.column_names.index(name), schema().field(name), column)
+        return table
+
+    path = opened(folder)
+    compact(path)  # the files with one result are named by their keys
+    _rewrite(path, address, changed)
+    for trial in (path / TRIALS).glob("*.parquet"):
+        if trial.stem in address:
+            trial.rename(trial.with_stem(address[trial.stem][0]))
 
 
 def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.Table]) -> None:

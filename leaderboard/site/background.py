@@ -204,11 +204,11 @@ def truth_of(east: Any, north: Any, time: Any) -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def _code() -> tuple[str, str]:
     """Version of the simulator, and a digest of the other code that makes a background."""
-    from simnav.leaderboard.campaign.fingerprint import simulator_version
-    from simnav.leaderboard.campaign.sources import digest, followed
+    from simnav.leaderboard.campaign.fingerprint import simulator_version, with_library
+    from simnav.leaderboard.campaign.sources import code_of, digest
+    from simnav.leaderboard.results.provenance import numerics
 
-    found = followed([__name__, "simnav.estimators.bound"])
-    return simulator_version(), digest(*(part for item in found.items() for part in item))
+    return simulator_version(), with_library(digest(code_of(Path(__file__)).digest, *numerics()))
 
 
 def _file(identity: str, seeds: Sequence[int]) -> Path | None:

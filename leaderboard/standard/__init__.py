@@ -1,16 +1,15 @@
 """The standard result: the results of the profile ``standard`` that come with simnav, and what is made of them.
 
 ``results/`` is a packed folder of results (`simnav.leaderboard.results.packing`), so that all commands can read it.
-``history.csv`` holds each edition of the board, row by row (`simnav.leaderboard.standard.history`). ``carried.csv``
-says when results were carried over to other code that gives the same numbers
-(`simnav.leaderboard.standard.carrying`).
+``history.csv`` holds each edition of the board, row by row (`simnav.leaderboard.standard.history`). Results are
+addressed by declared versions (`simnav.leaderboard.results.versions`).
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["CARRIED", "HISTORY", "PROFILE", "RESULTS", "shipped"]
+__all__ = ["HISTORY", "PROFILE", "RESULTS", "shipped"]
 
 #: The profile that is run.
 PROFILE = "standard"
@@ -18,8 +17,6 @@ PROFILE = "standard"
 RESULTS = Path(__file__).with_name("results")
 #: File of all editions.
 HISTORY = Path(__file__).with_name("history.csv")
-#: Record of results that were carried over.
-CARRIED = Path(__file__).with_name("carried.csv")
 
 
 def shipped(folder: Path = RESULTS) -> bool:

@@ -1,4 +1,7 @@
-"""Which stored results are not what the code of today would give, by the digests that are in their keys."""
+"""Which stored results are out of date: those whose declared versions are not the versions of today.
+
+Nothing is run, and no code is digested: whoever changes a number raises a version, and ``tests/golden`` demands it.
+"""
 
 from __future__ import annotations
 
@@ -11,24 +14,17 @@ from typing import Any, Literal
 
 from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
-from simnav.leaderboard.campaign.fingerprint import (
-    estimator_source,
-    has_recordings,
-    recording_digest,
-    simulator_version,
-    variant,
-)
-from simnav.leaderboard.campaign.own_scores import changed_code, scoring_code
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import Result
+from simnav.simulation.version import SIMULATOR_VERSION
 
 __all__ = ["Change", "Outdated", "changes", "outdated"]
 
-#: What may have changed: the estimator, the scenario or its simulator; or the scenario is not there any more.
-Change = Literal["row", "scenario", "gone"]
+#: What has another version: the estimator or the simulator; or the scenario is not there any more.
+Change = Literal["row", "simulator", "gone"]
 
 
 @dataclass(frozen=True)
@@ -38,20 +34,17 @@ class Outdated:
     Attributes
     ----------
     rows : tuple of str
-        Estimators that have changed, or how they are run.
+        Estimators that have another version.
     scenarios : tuple of str
-        Versioned ids of scenarios that have changed, or whose simulator has; each with all its rows.
-    scores : tuple of str
-        Modules of scores that have changed; all results need them.
+        Versioned ids of scenarios whose results are of another version of the simulator; each with all its rows.
     gone : tuple of str
-        Versioned ids of scenarios that are not there any more.
+        Versioned ids of scenarios that are not there any more, or have another version.
     benchmark : str
         Version of the benchmark of the results, where it is not that of today.
     """
 
     rows: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
-    scores: tuple[str, ...] = ()
     gone: tuple[str, ...] = ()
     benchmark: str = ""
 
@@ -63,14 +56,14 @@ class Outdated:
         said = []
         if self.benchmark:
             said.append(f"the results are of {self.benchmark}, and today's is {BENCHMARK}: run everything again")
-        if self.scores:
-            said.append(f"scores have changed ({', '.join(self.scores)}): run everything again")
         if self.scenarios:
-            said.append(f"the simulator or these scenarios have changed: run {', '.join(self.scenarios)} with all rows")
+            said.append(
+                f"the simulator now has version {SIMULATOR_VERSION}: run {', '.join(self.scenarios)} with all rows"
+            )
         if self.rows:
-            said.append(f"these rows have changed: run {', '.join(self.rows)} on all scenarios")
+            said.append(f"these rows have another version: run {', '.join(self.rows)} on all scenarios")
         if self.gone:
-            said.append(f"these scenarios are not there any more: {', '.join(self.gone)}")
+            said.append(f"these scenarios have another version or are not there any more: {', '.join(self.gone)}")
         return said
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,9 +72,7 @@ class Outdated:
 
 
 def outdated(folder: str | os.PathLike[str], without: Collection[tuple[str, str]] = ()) -> Outdated:
-    """Compare the keys of results with the code of today; nothing is run.
-
-    Of an estimator that does not come with simnav only the scenarios are compared.
+    """Compare the declared versions of results with those of today; nothing is run.
 
     Parameters
     ----------
@@ -97,61 +88,54 @@ def outdated(folder: str | os.PathLike[str], without: Collection[tuple[str, str]
     """
     path = Path(folder)
     version = str(store.described(path).get("benchmark", ""))
+    if version != BENCHMARK:
+        return Outdated(benchmark=version or "no version")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", store.StoreWarning)
         results = store.load(path, series=False, scores=())
-    if version != BENCHMARK:
-        return Outdated(benchmark=version or "no version")
-    results = [r for r in results if (r.scenario, r.estimator) not in without]
-    found: dict[Change, set[str]] = {"row": set(), "scenario": set(), "gone": set()}
+    found: dict[Change, set[str]] = {"row": set(), "simulator": set(), "gone": set()}
     for (scenario, label), change in changes(results).items():
-        found[change].add(label if change == "row" else scenario)
-    now, codes = scoring_code(), {r.scoring for r in results if r.scores or r.scoring != "{}"}
-    scores = {home for code in codes for home in changed_code(code, now)}
-    rows, scenarios, gone = (tuple(sorted(found[change])) for change in ("row", "scenario", "gone"))
-    return Outdated(rows, scenarios, tuple(sorted(scores)), gone)
+        if (scenario, label) not in without:
+            found[change].add(label if change == "row" else scenario)
+    rows, scenarios, gone = (tuple(sorted(found[change])) for change in ("row", "simulator", "gone"))
+    return Outdated(rows, scenarios, gone)
 
 
 def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
-    """What has changed since results were computed, by scenario and estimator; those of today are not in it.
+    """What has another version than results, by scenario and estimator; those of today are not in it.
 
-    Of a recorded scenario whose files are not on this machine nothing can be said: it counts as it is.
+    The version of an estimator that does not come with simnav is not compared.
     """
-    one: dict[tuple[str, str], Result] = {}
-    for result in results:
-        one.setdefault((result.scenario, result.estimator), result)
-    simulator = simulator_version()
-    recordings = {s: _recording(s, simulator) for s in {scenario for scenario, _ in one}}
-    sources: dict[str, str] = {}
+    scenarios: dict[str, bool] = {}
+    versions: dict[str, int | None] = {}
     found: dict[tuple[str, str], Change] = {}
-    for (scenario, label), result in one.items():
-        recording, name = recordings[scenario], label.partition("(")[0]
-        if name not in sources:
-            sources[name] = _source(name)
-        if recording == "":
-            continue
-        if recording is None:
+    for result in results:
+        scenario, label = result.scenario, result.estimator
+        if scenario not in scenarios:
+            scenarios[scenario] = _is_there(scenario)
+        if label not in versions:
+            versions[label] = _version(label.partition("(")[0])
+        if not scenarios[scenario]:
             found[scenario, label] = "gone"
-        elif recording != result.recording:
-            found[scenario, label] = "scenario"
-        elif sources[name] and variant(recording, label, name, result.parameters, sources[name]) != result.variant:
-            found[scenario, label] = "row"
+        elif result.simulator_version != SIMULATOR_VERSION:
+            found[scenario, label] = "simulator"
+        elif versions[label] not in (None, result.estimator_version):
+            found.setdefault((scenario, label), "row")
     return found
 
 
-def _recording(scenario: str, simulator: str) -> str | None:
-    """The digest of a scenario's recordings: None where the catalogue does not have it, empty without its files."""
+def _is_there(scenario: str) -> bool:
+    """Whether the catalogue has a scenario in this version."""
     try:
-        found = catalogued_scenario(scenario)
+        return catalogued_scenario(scenario).id == scenario
     except (ValueError, OSError):
-        return None
-    return recording_digest(found, simulator) if has_recordings(found) else ""
+        return False
 
 
-def _source(name: str) -> str:
-    """The digest of the code of an estimator of simnav; empty for all others."""
+def _version(name: str) -> int | None:
+    """The version of an estimator of simnav; None for all others."""
     try:
         cls = registered(name)
     except EstimatorError:
-        return ""
-    return estimator_source(cls) if comes_with_simnav(cls) else ""
+        return None
+    return cls.version if comes_with_simnav(cls) else None

@@ -16,7 +16,7 @@ from simnav.leaderboard.standard.history import Line, editions
 
 __all__ = ["EditionPage", "pages_of"]
 
-_COLUMNS = ("rank", "estimator", "score", "95 % interval", "runs", "failed", "version of the code")
+_COLUMNS = ("rank", "estimator", "score", "95 % interval", "runs", "failed", "version")
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def pages_of(lines: Sequence[Line]) -> list[EditionPage]:
 
 def _cells(line: Line) -> tuple[str, ...]:
     interval = f"{number(line.low)} – {number(line.high)}" if line.low == line.low else ""
-    return (line.ranks or "–", line.row, number(line.score), interval, str(line.runs), str(line.failed), line.code)
+    return (line.ranks or "–", line.row, number(line.score), interval, str(line.runs), str(line.failed), line.version)
 
 
 def _latex(caption: str, rows: Sequence[Sequence[str]]) -> str:

@@ -1,7 +1,8 @@
 """The history of rows: a CSV file with one line for each row of a track in each edition of the board.
 
 An edition is what was published at a time. Its lines stay when results are computed again, so that a figure that was
-quoted can be found. The column ``code`` is the version of a row: the digest of its code.
+quoted can be found. The column ``version`` is the declared version of a row; lines from before versions were declared
+keep the digest of the row's code that was published with them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from simnav.leaderboard.results.result import Result
 
 __all__ = ["Line", "append", "editions", "lines_of", "read"]
 
-_CODE = 12  # characters of a digest
 _COMMIT = 12
 
 
@@ -39,8 +39,8 @@ class Line:
         Version of the benchmark; commits of the row's runs, separated by blanks, with ``+`` where files differed.
     track, row : str
         Name of the track, label of the estimator.
-    code : str
-        Digest of the estimator's code; several are separated by blanks.
+    version : str
+        Version of the estimator; several are separated by blanks.
     ranks : str
         Interval of the rank, like ``2-5``; empty for a row that is not ranked.
     score, low, high : float
@@ -55,7 +55,7 @@ class Line:
     commit: str
     track: str
     row: str
-    code: str
+    version: str
     ranks: str
     score: float
     low: float
@@ -84,7 +84,7 @@ def lines_of(ranking: Ranking, results: Sequence[Result], edition: int) -> list[
                 Line(
                     edition, max((p.date for p in known), default=""), max((p.benchmark for p in known), default=""),
                     " ".join(sorted(commits)), track.track, row.estimator,
-                    " ".join(sorted({r.estimator_digest[:_CODE] for r in mine})), row.ranks if row.ranked else "",
+                    " ".join(map(str, sorted({r.estimator_version for r in mine}))), row.ranks if row.ranked else "",
                     _rounded(row.score), _rounded(row.low), _rounded(row.high), row.runs, row.failed,
                 )
             )  # fmt: skip

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
+import time
 import warnings
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from simnav.estimator import find
-from simnav.leaderboard.campaign.request import comes_with_simnav
+from simnav.leaderboard.campaign.campaign import Progress, Summary, combined, require_known, run_campaign
+from simnav.leaderboard.campaign.request import comes_with_simnav, requests
+from simnav.leaderboard.given import positive, scenarios_of
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results import requested, store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.results.gathering import gather
-from simnav.leaderboard.results.packing import pack, shortened
+from simnav.leaderboard.results.packing import shortened, write_packed
 from simnav.leaderboard.results.provenance import BENCHMARK
-from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.results.result import SINCE_VERSIONS, Result
+from simnav.leaderboard.results.versions import declared, is_declared
 from simnav.leaderboard.standard import shipped
 from simnav.leaderboard.standard.currency import changes, outdated
 from simnav.leaderboard.standard.history import append
 from simnav.leaderboard.standard.readme import PICTURE, draw, replaced, tables
 from simnav.scenario import load
 
-__all__ = ["Published", "begin", "missing", "publish"]
+__all__ = ["Published", "begin", "missing", "publish", "run"]
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,65 @@ class Published:
 
 
 def begin(working: Path, folder: Path) -> None:
-    """Let a new folder start with the results that come with simnav: what has not changed since is not run again."""
-    if shipped(folder) and not store.described(working) and store.described(folder).get("benchmark") == BENCHMARK:
-        gather(working, [folder])
+    """Let a new folder start with the results that come with simnav, as far as their versions are those of today.
+
+    Results in a folder that a campaign began before versions were declared get the address of version 1.
+
+    Raises
+    ------
+    RequestError
+        If the folder holds results of a local campaign, which are known by digests of the code.
+    """
+    before = store.described(working)
+    if before:
+        _readdress(working, before["current"])
+    elif shipped(folder) and store.described(folder).get("benchmark") == BENCHMARK:
+        found = store.load(folder, series=False)
+        old = changes(found)
+        write_packed(declared(r for r in found if (r.scenario, r.estimator) not in old), working)
+        requested.copy(working, [folder])
+
+
+def _readdress(working: Path, current: Mapping[str, Any]) -> None:
+    """Give results that are known by digests, from before versions were declared, the address of their versions."""
+    if all(is_declared(entry["recording"]) for entry in current.values()):
+        return
+    if store.described(working)["format"] >= SINCE_VERSIONS:
+        raise RequestError(
+            f"{working} holds results of a local campaign, which are known by digests of the code: name another folder"
+        )
+    found = store.load(working, series=False, scores=())
+    after: dict[str, tuple[str, dict[str, str]]] = {}
+    address = dict[str, tuple[str, str]]()
+    for old, new in zip(found, declared(found), strict=True):
+        address[old.key] = new.key, new.recording
+        after.setdefault(new.scenario, (new.recording, {}))[1][new.estimator] = new.variant
+    store.readdress(working, address)
+    store.select(working, after)
+
+
+def run(
+    profile: Profile,
+    working: Path,
+    *,
+    workers: int = 2,
+    minutes: float | None = None,
+    force: Sequence[str] = (),
+    shard: tuple[int, int] = (1, 1),
+    progress: Callable[[Progress], None] | None = None,
+) -> Summary:
+    """Run what a folder lacks of a profile, by declared versions; see `simnav.leaderboard.publishing.run_standard`."""
+    parts = [(scenarios_of(part.scenarios, optional=True), requests(part.estimators), part.runs)
+             for part in profile.parts]  # fmt: skip
+    require_known(force, [everyone for _, everyone, _ in parts])
+    end = None if minutes is None else time.monotonic() + 60.0 * positive("minutes", minutes)
+    return combined([
+        run_campaign(
+            chosen, everyone, range(runs), working, workers=workers, progress=progress, force=force, shard=shard,
+            minutes=None if end is None else max(0.0, (end - time.monotonic()) / 60.0), by_version=True,
+        )
+        for chosen, everyone, runs in parts
+    ])  # fmt: skip
 
 
 def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
@@ -117,7 +176,8 @@ def publish(
         raise RequestError(
             f"these results are out of date: {'; '.join(old.sentences())}; 'simnav standard run' does it"
         )
-    results = shortened(r for r in found if (r.scenario, r.estimator) not in without)  # as others will have them
+    kept = (replace(r, seconds=round(r.seconds, 3)) for r in found if (r.scenario, r.estimator) not in without)
+    results = shortened(declared(kept))  # as others will have them
     lacking = missing(profile, results)
     if lacking and not preliminary:
         first = next(iter(lacking))
@@ -128,8 +188,9 @@ def publish(
     ranking = rank(results, requested=requested.read(working))
     of = len(results) + sum(lacking.values())
     text = replaced(readme, tables(ranking, results, of)) if readme is not None else ""  # fails before all is written
-    if working.resolve() != folder.resolve() or without:
-        pack(working, folder, without=without, single=True)
+    same = working.resolve() == folder.resolve() and all(is_declared(r.recording) for r in found)
+    if without or not same:
+        write_packed(results, folder)
         requested.copy(folder, [working])
     edition = 0 if lacking else append(history, ranking, results)
     if readme is not None:

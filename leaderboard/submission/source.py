@@ -128,14 +128,12 @@ def _file(asked: EstimatorRequest, requires: tuple[str, ...]) -> Source:
     if not path.is_file():
         raise RequestError(f"there is no file {path}")
     folder, files = path.parent, dict[Path, None]()
-    for name in followed(files=[path]):
-        if not name.startswith("file "):
-            continue
-        part = (folder / name.removeprefix("file ")).resolve()
+    for name in followed([path]):
+        part = (folder / name).resolve()
         if not part.is_file():
             continue
         files[part] = None
-        for pattern in code_of(part, "").data:
+        for pattern in code_of(part).data:
             files |= dict.fromkeys(p.resolve() for p in part.parent.glob(pattern) if p.is_file())
     outside = [p for p in files if not p.is_relative_to(folder)]
     if outside:

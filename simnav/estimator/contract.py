@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from simnav.estimator.needs import Needs
 from simnav.plugins import PluginError
@@ -35,12 +35,21 @@ class Estimator(ABC):
     real_time_as : str
         Name of another estimator whose real-time estimates are the same bit for bit, if this one only adds smoothing;
         otherwise empty. Boards then rank this estimator by its smoothed trajectory only.
+    version : int
+        Version of its numbers, from 1. It is raised whenever a change of code alters an estimate, and is stored with
+        each result. A version after 1 has a line in the section ``Versions`` of the docstring, which says what changed.
+        A class has its own; that of its base is not inherited.
     """
 
     name: ClassVar[str] = ""
     reference: ClassVar[bool] = False
     slow: ClassVar[bool] = False
     real_time_as: ClassVar[str] = ""
+    version: ClassVar[int] = 1
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        cls.version = vars(cls).get("version", 1)
 
     @property
     def needs(self) -> Needs:

@@ -70,6 +70,10 @@ def register(name: str, aliases: Sequence[str] = ()) -> Callable[[E], E]:
     def wrap(cls: E) -> E:
         if not (isinstance(cls, type) and issubclass(cls, Estimator)):
             raise EstimatorError(f"@register({name!r}): {_label(cls)} is not a subclass of simnav.Estimator")
+        if not isinstance(cls.version, int) or cls.version < 1:
+            raise EstimatorError(
+                f"@register({name!r}) on {_label(cls)}: version = {cls.version!r} should be a whole number from 1"
+            )
         for n in (name, *aliases):
             other = _classes.get(_aliases.get(n, n))
             if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):

@@ -1,130 +1,73 @@
-"""Golden comparison: are recordings and estimates the same, bit for bit, as those of another commit?
+"""Golden numbers: ``python -m tests.golden compare`` says what has changed, ``record`` keeps the numbers of today.
 
-Run ``python -m tests.golden record FILE`` at the commit to compare with, then ``python -m tests.golden compare FILE``
-after a change that should alter no number. Both on one machine: a digest does not survive another processor.
-
-A file holds a digest of every scenario of the catalogue that needs no data of its own (cut to `LONGEST` seconds,
-seed 1): of all arrays of its recording, and for each registered estimator of all that it estimated, or why it failed.
+``record`` refuses numbers that have changed without a new version of the row, the scenario, the simulator or the
+benchmark. With ``--bits FILE`` both work on a file of their own with digests of all bits, to compare two commits on one
+machine (`tests.golden.bits`).
 """
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import hashlib
 import json
 import sys
 import warnings
-from collections.abc import Iterable
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from simnav.estimator import find, make
-from simnav.estimator import names as estimator_names
-from simnav.log import LogError
-from simnav.scenario import Scenario, load
-from simnav.scenario import names as scenario_names
-from simnav.source import record
-from simnav.trial import Trial, run_trial
-
-LONGEST, LONGEST_OF_SLOW = 120.0, 30.0
-SEED = 1
-#: Of a trial, what does not depend on the clock of the machine.
-_TRIAL = ("status", "reason", "time", "position", "velocity", "attitude", "estimated", "covariance", "diagnostics",
-          "flagged", "smoothed")  # fmt: skip
+import tests.conftest  # noqa: F401 (it finds the logs beside the project)
+from simnav.scenario import load, names
+from tests.golden import bits
+from tests.golden.cases import CASES
+from tests.golden.fingerprints import FILE, in_case, in_scenarios, of_case, of_scenario, read, versions
 
 
-def _parts(value: Any) -> Iterable[bytes]:
-    """A value as bytes, containers and arrays with their shapes included."""
-    if isinstance(value, np.ndarray):
-        yield f"{value.dtype}{value.shape}".encode()
-        yield np.ascontiguousarray(value).tobytes()
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        for field in dataclasses.fields(value):
-            yield from _parts(getattr(value, field.name))
-    elif isinstance(value, dict):
-        for key in sorted(value):
-            yield str(key).encode()
-            yield from _parts(value[key])
-    elif isinstance(value, (list, tuple)):
-        yield f"{len(value)}".encode()
-        for item in value:
-            yield from _parts(item)
-    else:
-        yield repr(value).encode()
-
-
-def digest(*values: Any) -> str:
-    """Hexadecimal digest of arrays, dataclasses, containers and plain values."""
-    h = hashlib.blake2b(digest_size=12)
-    for value in values:
-        for part in _parts(value):
-            h.update(part)
-    return h.hexdigest()
-
-
-def cut(scenario: Scenario, longest: float) -> Scenario:
-    """A scenario of at most so many seconds, a whole number of steps."""
-    duration = min(scenario.duration, int(longest / scenario.step) * scenario.step)
-    return scenario.model_copy(update={"duration": duration})
-
-
-def of_trial(trial: Trial) -> str:
-    """Digest of a trial; the place of a failure in the sources does not count."""
-    values = [getattr(trial, name) for name in _TRIAL]
-    values[1] = trial.reason.partition(" (")[0]
-    return digest(*values)
-
-
-def of_scenario(name: str) -> dict[str, Any]:
-    """The entry of one scenario: its content, its recording, and every estimator on it; empty without its data."""
+def _case(name: str) -> dict[str, Any]:
     warnings.simplefilter("ignore")
-    scenario = load(name)
-    try:
-        long, short = (record(cut(scenario, limit), SEED) for limit in (LONGEST, LONGEST_OF_SLOW))
-    except LogError:
-        return {}
-    data = [long.initial_truth, long.start, long.data, [dataclasses.astuple(f) for f in long.faults]]
-    estimates = {}
-    for estimator in estimator_names():
-        recording = short if find(estimator).slow else long
-        trial = run_trial(make(estimator), recording)
-        estimates[estimator] = f"{trial.status} {of_trial(trial)}"
-    return {"content": scenario.content_hash(), "recording": digest(*data), "estimates": estimates}
+    return of_case(CASES[name])
+
+
+def _scenario(name: str) -> dict[str, Any] | None:
+    warnings.simplefilter("ignore")
+    return of_scenario(name)
 
 
 def main() -> int:
-    """The command; 1 where something differs."""
+    """The command; 1 where a new version is asked for, or something differs."""
     parser = argparse.ArgumentParser(prog="python -m tests.golden", description=__doc__.split("\n")[0])
     parser.add_argument("what", choices=("record", "compare"))
-    parser.add_argument("file", type=Path)
-    parser.add_argument("--scenario", "-s", action="append", help="one of the catalogue; all, if none is named")
+    parser.add_argument("--bits", type=Path, metavar="FILE", help="compare all bits with those in this file")
+    parser.add_argument("--scenario", "-s", action="append", help="with --bits: one of the catalogue; default: all")
     parser.add_argument("--workers", "-j", type=int, default=1)
     given = parser.parse_args()
-    wanted = given.scenario or scenario_names()
+    if given.bits is not None:
+        return bits.run(given.what, given.bits, given.scenario or names(), given.workers)
+    stored = read() if FILE.exists() else {"scenarios": {}, "cases": {}, "versions": versions()}
+    now = versions()
     with Pool(given.workers) as pool:
-        entries = dict(zip(wanted, pool.map(of_scenario, wanted, chunksize=1)))
-    entries = {name: entry for name, entry in entries.items() if entry}
-    if given.what == "record":
-        given.file.write_text(json.dumps(entries, indent=1))
-        print(f"{len(entries)} scenarios recorded")
-        return 0
-    before = json.loads(given.file.read_text())
-    different = []
-    for name, entry in entries.items():
-        old = before.get(name, {})
-        different += [f"{name}: {what}" for what in ("content", "recording") if entry[what] != old.get(what)]
-        rows, earlier = entry["estimates"], old.get("estimates", {})
-        different += [
-            f"{name}: {row}: {earlier.get(row)} is now {rows.get(row)}"
-            for row in sorted({*rows, *earlier})
-            if rows.get(row) != earlier.get(row)
-        ]
-    print("\n".join(different) or f"{len(entries)} scenarios are the same, bit for bit")
-    return bool(different)
+        cases = dict(zip(CASES, pool.map(_case, CASES, chunksize=1)))
+        recordings = dict(zip(names(), pool.map(_scenario, names(), chunksize=4)))
+    scenarios = {load(name).id: entry for name, entry in recordings.items() if entry is not None}
+    asked = in_scenarios(stored, scenarios, now)
+    for name, found in cases.items():
+        asked += in_case(stored, name, found, now)
+    if given.what == "compare" or asked.versions:
+        print(asked or "all numbers are the stored ones")
+        return bool(asked)
+    here = {load(name).id for name, entry in recordings.items() if entry is None}  # its files are elsewhere
+    kept = {name: entry for name, entry in stored["scenarios"].items() if name in here}
+    content = {"versions": now, "scenarios": dict(sorted({**kept, **scenarios}.items())), "cases": cases}
+    FILE.write_text(_text(content) + "\n", encoding="utf-8")
+    print(f"{len(scenarios)} scenarios and {len(cases)} cases recorded")
+    return 0
+
+
+def _text(value: Any, depth: int = 0) -> str:
+    """JSON with a line for each row and each stream, so that a change of one is a change of one line."""
+    if not isinstance(value, dict) or not any(isinstance(each, (dict, list)) for each in value.values()):
+        return json.dumps(value)
+    inner = (f"{' ' * (depth + 1)}{json.dumps(key)}: {_text(each, depth + 1)}" for key, each in value.items())
+    return "{\n" + ",\n".join(inner) + "\n" + " " * depth + "}"
 
 
 if __name__ == "__main__":

@@ -276,9 +276,10 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
             session.end()
     except (StoppedError, FailureError, InvalidOutputError) as error:
         raise ValueError(str(error)) from None
-    source = facts.get("source")
-    if not isinstance(source, str) or len(source) > 200:
+    source, version = facts.get("source"), facts.get("version")
+    if not isinstance(source, str) or len(source) > 200 or not isinstance(version, int) or not 0 < version < 2**31:
         raise ValueError("it says nothing of itself that can be read")
     return {
         "reference": facts.get("reference") is True, "source": source, "learned_from": facts.get("learned_from", []),
+        "version": version,
     }  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
 from simnav.leaderboard.campaign.confinement.kinds import load_kinds
 from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, read_message, write_all
-from simnav.leaderboard.campaign.fingerprint import estimator_source
+from simnav.leaderboard.campaign.fingerprint import own_code
 from simnav.leaderboard.campaign.training_runs import declared_ranges
 from simnav.leaderboard.results.errors import named
 from simnav.trial import describe_failure
@@ -88,7 +88,10 @@ class _Session:
         try:
             entrant = _entrant(body)
             cls = entrant.find()
-            facts = {"reference": bool(cls.reference), "source": estimator_source(cls), "learned_from": []}
+            facts = {
+                "reference": bool(cls.reference), "source": own_code(cls), "learned_from": [],
+                "version": cls.version,
+            }  # fmt: skip
             try:
                 facts["learned_from"] = declared_ranges(entrant.make())
             except Exception as error:  # of its constructor: each run will say so

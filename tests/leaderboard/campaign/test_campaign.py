@@ -24,9 +24,10 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.gathering import gather
-from simnav.leaderboard.results.provenance import BENCHMARK
+from simnav.leaderboard.results.provenance import BENCHMARK, numerics
 from simnav.leaderboard.results.store import Result, StoreError
 from simnav.scenario import Scenario, load, parse
+from simnav.simulation.version import SIMULATOR_VERSION
 from simnav.warmup import warmup
 from tests.cases import ship
 
@@ -398,6 +399,43 @@ def test_failures_are_run_again_when_asked(tmp_path: Path) -> None:
     assert run(retry=False) == (0, "error")
     assert run(retry=True) == (1, "ok")
     assert run(retry=True) == (0, "ok")
+
+
+def test_an_estimator_is_run_anew_when_asked_or_when_others_computed_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "results"
+    requests = [estimator(tmp_path, "mine"), EstimatorRequest("gnss-only"), EstimatorRequest("kf")]
+
+    def computed(**options: Any) -> int:
+        return run_campaign([scenario()], requests, [0], out, workers=1, **options).computed
+
+    assert computed() == 3
+    assert computed() == 0
+    assert computed(force=["mine"]) == 1
+    assert computed(force=["kf", "gnss-only"]) == 2
+    with monkeypatch.context() as patch:
+        others = ("9.9", *numerics()[1:])
+        patch.setattr(campaign, "numerics", lambda p=None, *, processor=True: others if p is None else numerics(p))
+        assert computed() == 3  # of another version of NumPy
+    machine = (*numerics()[:-1], "x86_64 other")
+    with monkeypatch.context() as patch:
+        patch.setattr(campaign, "numerics", lambda p=None, *, processor=True: machine if p is None else numerics(p))
+        assert computed() == 3
+    assert numerics(processor=False) == numerics()[:-1]
+    with pytest.raises(RequestError, match="force = 'ekff': no such estimator is run here; did you mean 'ekf'"):
+        campaign.require_known(["ekff"], [[EstimatorRequest("ekf")]])
+
+
+def test_the_version_that_an_estimator_declares_is_in_its_results(tmp_path: Path) -> None:
+    out = tmp_path / "results"
+    mine = estimator(tmp_path, "mine")
+    path = Path(mine.name)
+    path.write_text(path.read_text().replace("class Mine(Estimator):\n", "class Mine(Estimator):\n    version = 3\n"))
+    run_campaign([scenario()], [mine, EstimatorRequest("gnss-only")], [0], out, workers=1)
+    assert {r.estimator: (r.estimator_version, r.simulator_version) for r in store.load(out)} == {
+        "mine": (3, SIMULATOR_VERSION), "gnss-only": (1, SIMULATOR_VERSION),
+    }  # fmt: skip
 
 
 def test_out_of_memory_is_run_again_under_a_larger_limit(tmp_path: Path) -> None:

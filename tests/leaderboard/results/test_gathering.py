@@ -76,3 +76,21 @@ def test_what_differs_is_not_mixed(tmp_path: Path):
         gather(tmp_path / "out", [a])
     with pytest.raises(StoreError, match="there are no results in"):
         gather(tmp_path / "out", [tmp_path / "nowhere"])
+
+
+def test_what_came_with_simnav_goes_together_with_a_local_row_of_the_same_version_of_the_simulator(tmp_path: Path):
+    shipped = part(tmp_path / "shipped", range(2), recording="simulator-1")
+    local = store.create(tmp_path / "local")
+    store.select(local, {"bay-v1": ("digest", {"mine": "m"})})
+    (example, _) = store.load(shipped)
+    store.write(local, replace(example, estimator="mine", key="m-0", recording="digest"))
+    for k, folders in enumerate(([shipped, local], [local, shipped])):
+        out = gather(tmp_path / f"out{k}", folders)
+        assert sorted((r.estimator, r.seed) for r in store.load(out)) == [("ekf", 0), ("ekf", 1), ("mine", 0)]
+        assert json.loads((out / "simnav-results.json").read_text())["current"]["bay-v1"]["recording"] == "simulator-1"
+    own = part(tmp_path / "own", range(2), recording="digest", variant="w")  # the same row, of edited code perhaps
+    with pytest.raises(StoreError, match=r"ekf on bay-v1 differs between"):
+        gather(tmp_path / "out", [shipped, own])
+    store.write(local, replace(example, estimator="mine", key="m-1", seed=1, recording="digest", simulator_version=2))
+    with pytest.raises(StoreError, match="or the simulator, differs"):
+        gather(tmp_path / "out", [shipped, local])

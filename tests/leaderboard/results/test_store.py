@@ -85,7 +85,7 @@ def test_what_is_written_is_read(folder: Path) -> None:
         assert len(loaded) == len(written)
         for a, b in zip(written, loaded, strict=True):
             same(a, b)
-        assert store.keys(folder) == {r.key: ("ok", 60.0, 1 << 30, "{}") for r in written}
+        assert store.keys(folder) == {r.key: ("ok", 60.0, 1 << 30, "{}", "") for r in written}
         store.compact(folder)
         assert not loose(folder)
     assert all(not r.series and r.scores for r in store.load(folder, series=False))
@@ -355,8 +355,8 @@ def test_results_are_dropped_wherever_they_are(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("version", "missing", "ending"),
     [
-        (1, ["time_limit", "memory_limit", "scoring"], ("ok", 0.0, 0, "")),
-        (2, [], ("ok", 60.0, 1 << 30, "{}")),
+        (1, ["time_limit", "memory_limit", "scoring"], ("ok", 0.0, 0, "", "")),
+        (2, [], ("ok", 60.0, 1 << 30, "{}", "")),
     ],
 )
 def test_results_of_older_formats_are_read(
@@ -367,8 +367,9 @@ def test_results_of_older_formats_are_read(
 
     store.write(folder, result(0))
     (path,) = loose(folder)
-    since_3, since_4 = ["scenario_digest", "estimator_digest", "provenance"], ["draws", "learned"]
-    old = pq.read_table(path).drop_columns(missing + since_3 + since_4)
+    since_3, since_4 = ["scenario_digest", "estimator_digest", "provenance"], ["draws"]
+    since_5 = ["learned", "simulator_version", "estimator_version"]
+    old = pq.read_table(path).drop_columns(missing + since_3 + since_4 + since_5)
     pq.write_table(old.replace_schema_metadata({"simnav_results": str(version)}), path)
     marker = folder / "simnav-results.json"
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": version}))
@@ -378,6 +379,7 @@ def test_results_of_older_formats_are_read(
     assert [(r.seed, r.time_limit) for r in store.load(folder)] == [(0, ending[1]), (1, 60.0)]
     assert [r.provenance.id for r in store.load(folder)] == ["", ""]
     assert [r.draws for r in store.load(folder)] == [{}, {}]
+    assert [(r.simulator_version, r.estimator_version) for r in store.load(folder)] == [(1, 1), (1, 1)]
 
 
 def test_scores_are_replaced_wherever_they_are(folder: Path) -> None:

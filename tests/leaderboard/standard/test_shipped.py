@@ -36,7 +36,7 @@ def ranking(results: list[Result]) -> Ranking:
     return rank(results)
 
 
-def test_no_code_that_decides_a_number_has_changed_since() -> None:
+def test_its_versions_are_those_of_today() -> None:
     found = outdated(standard.RESULTS)
     assert not found, "\n".join([*found.sentences(), "'simnav standard run' does it, then 'simnav standard publish'"])
 

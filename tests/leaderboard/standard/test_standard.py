@@ -10,21 +10,22 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from simnav.leaderboard import publishing
-from simnav.leaderboard.campaign import resolution
+from simnav.estimator import find
+from simnav.leaderboard import interface, publishing
+from simnav.leaderboard.campaign import campaign, resolution
 from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.packing import write_packed
-from simnav.leaderboard.results.provenance import Provenance
-from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site.content import SiteFacts
-from simnav.leaderboard.standard import carrying, currency, history, readme
+from simnav.leaderboard.standard import currency, history, readme
+from simnav.leaderboard.standard.auditing import share_found
 from simnav.leaderboard.standard.currency import outdated
 from simnav.leaderboard.standard.editions import pages_of
 
@@ -75,6 +76,7 @@ def test_what_is_published_is_small_complete_and_current(home: Path) -> None:
     assert parts == ["part-dead-reckoning.parquet", "part-gnss-only.parquet"]
     packed, worked = store.load(shipped), store.load(home / "work")
     assert [(r.key, r.scores.keys()) for r in packed] == [(r.key, r.scores.keys()) for r in worked]
+    assert {(r.recording, r.simulator_version, r.estimator_version) for r in packed} == {("simulator-1", 1, 1)}
     for a, b in zip(packed, worked, strict=True):  # in single precision
         assert np.array_equal([*a.scores.values()], np.float32([*b.scores.values()]), equal_nan=True)
     assert {(r.seed, bool(r.draws)) for r in packed} == {(0, True), (0, False), (1, True), (1, False)}
@@ -83,7 +85,7 @@ def test_what_is_published_is_small_complete_and_current(home: Path) -> None:
     assert not any(r.series for r in packed)
     assert not publishing.check_standard(shipped)
     done = CliRunner().invoke(app, ["standard", "check", "--results", str(shipped)])
-    assert (done.exit_code, done.stdout.strip()) == (0, "the standard result is what the code of today gives")
+    assert (done.exit_code, done.stdout.strip()) == (0, "the standard result has the versions of today")
 
 
 def test_the_readme_has_its_tables_and_the_rest_of_it_stays(home: Path) -> None:
@@ -100,18 +102,26 @@ def test_the_readme_has_its_tables_and_the_rest_of_it_stays(home: Path) -> None:
         readme.replaced(home / "small.toml", "")
 
 
-def test_a_change_of_one_row_runs_that_row_only(home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_edit_changes_nothing_and_a_raised_version_runs_that_row_only(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def edited(cls: type) -> str:
         return ("x" if cls.name == "gnss-only" else "") + estimator_source(cls)
 
-    for module in (currency, resolution):
-        monkeypatch.setattr(module, "estimator_source", edited)
+    monkeypatch.setattr(resolution, "estimator_source", edited)
+    monkeypatch.setattr(campaign, "simulator_version", lambda: "0.1+other")
+    assert not publishing.check_standard(home / "shipped")
+    same = run(home, tmp_path / "edited")
+    assert (same.summary.skipped, same.summary.computed, same.summary.left) == (4, 0, 0)
+    anew = run(home, tmp_path / "edited", force=["gnss-only"], minutes=0.0)
+    assert (anew.summary.skipped, anew.summary.left) == (2, 2)
+    monkeypatch.setattr(find("gnss-only"), "version", 2)
     found = publishing.check_standard(home / "shipped")
-    assert (found.rows, found.scenarios, found.scores, found.gone) == (("gnss-only",), (), (), ())
+    assert (found.rows, found.scenarios, found.gone) == (("gnss-only",), (), ())
     done = CliRunner().invoke(app, ["standard", "check", "--results", str(home / "shipped")])
     assert done.exit_code == 1
-    assert "these rows have changed: run gnss-only on all scenarios" in done.stdout
-    with pytest.raises(RequestError, match="out of date: these rows have changed: run gnss-only"):
+    assert "these rows have another version: run gnss-only on all scenarios" in done.stdout
+    with pytest.raises(RequestError, match="out of date: these rows have another version: run gnss-only"):
         publish(home, home / "shipped")
     before = {p.name: p.read_bytes() for p in (home / "shipped" / "compacted").iterdir()}
     stopped = run(home, tmp_path / "work", minutes=0.0)
@@ -133,71 +143,92 @@ def test_a_change_of_one_row_runs_that_row_only(home: Path, tmp_path: Path, monk
     assert after["part-gnss-only.parquet"] != before["part-gnss-only.parquet"]
     assert publish(home, tmp_path / "work").edition == 2  # nothing new
     lines = history.read(home / "history.csv")
-    codes = [{line.row: line.code for line in lines if line.edition == n} for n in (1, 2)]
-    assert codes[0]["gnss-only"] != codes[1]["gnss-only"]
-    assert codes[0]["dead-reckoning"] == codes[1]["dead-reckoning"]
+    versions = [{line.row: line.version for line in lines if line.edition == n} for n in (1, 2)]
+    assert versions == [{"gnss-only": "1", "dead-reckoning": "1"}, {"gnss-only": "2", "dead-reckoning": "1"}]
+    assert {r.estimator: r.estimator_version for r in store.load(home / "shipped")} == {
+        "gnss-only": 2, "dead-reckoning": 1,
+    }  # fmt: skip
+    monkeypatch.undo()  # as it was, for the tests that follow
+    run(home, home / "work")
+    publish(home, home / "work")
+
+
+def test_the_audit_repeats_a_sample_and_finds_a_wrong_score(home: Path, tmp_path: Path) -> None:
+    arguments = ["standard", "audit", "--results", str(home / "shipped"), "--sample", "2"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    assert "(4, of which 2 were repeated)" in done.stdout
+    assert (
+        "if 77.6% of the results or more were wrong, such a sample would find one with a probability of 95%"
+        in " ".join(done.stdout.split())
+    )
+    assert share_found(59) == pytest.approx(0.05, abs=1e-3)  # 0.95^59 = 0.05
+    shutil.copytree(home / "shipped", tmp_path / "shipped")
+    results = store.load(tmp_path / "shipped", series=False)
+    write_packed([replace(r, scores={**r.scores, "horizontal_rmse": 1.001 * r.scores["horizontal_rmse"]})
+                  for r in results], tmp_path / "shipped")  # fmt: skip
+    found = publishing.audit_standard(sample=1, results=tmp_path / "shipped")
+    assert not found.passed
+    assert "horizontal_rmse" in found.verification.different[0]
+    with pytest.raises(RequestError, match="sample = 0"):
+        publishing.audit_standard(sample=0, results=home / "shipped")
 
 
 @pytest.fixture
-def copied(home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the standard result, after an edit of one row."""
-
-    def edited(cls: type) -> str:
-        return ("tidied" if cls.name == "gnss-only" else "") + estimator_source(cls)
-
-    for module in (currency, resolution):
-        monkeypatch.setattr(module, "estimator_source", edited)
-    monkeypatch.setattr(carrying, "here", lambda: Provenance(commit="0123456789abcdef", dirty=False))
-    shutil.copytree(home / "shipped", tmp_path / "shipped")
-    for name in ("small.toml", "README.md", "history.csv"):
-        shutil.copy(home / name, tmp_path / name)
-    return tmp_path
-
-
-def test_results_are_carried_over_to_code_that_gives_the_same_numbers(home: Path, copied: Path) -> None:
-    before = store.load(home / "shipped", series=False)
-    arguments = ["standard", "carry", "--shipped", str(copied / "shipped"), "--record", str(copied / "carried.csv")]
-    done = CliRunner().invoke(app, [*arguments, "--workers", "1"])
-    assert done.exit_code == 0, done.output
-    assert "(2 carried over, 1 runs were repeated)" in done.stdout
-    assert not publishing.check_standard(copied / "shipped")
-    after = store.load(copied / "shipped", series=False)
-    assert {r.key for r in after} & {r.key for r in before} == {r.key for r in before if r.estimator != "gnss-only"}
-    kept = [f.name for f in fields(Result) if f.name not in ("key", "scores", "series")]
-    assert [[getattr(r, n) for n in kept] for r in after] == [[getattr(r, n) for n in kept] for r in before]
-    for a, b in zip(after, before, strict=True):
-        np.testing.assert_array_equal([*a.scores.values()], [*b.scores.values()])
-    last = max(line.edition for line in history.read(copied / "history.csv"))
-    assert publish(copied, copied / "shipped").edition == last  # nothing new
-    header, *lines = (copied / "carried.csv").read_text().splitlines()
-    assert header == "date,commit,rows,results,repeated"
-    assert [line.partition(",")[2] for line in lines] == ["0123456789ab,1,2,1"]
-    again = publishing.carry_standard(shipped=copied / "shipped", record=copied / "carried.csv", workers=1)
-    assert (again.rows, again.repeated) == (0, 0)
+def old(home: Path, tmp_path: Path) -> Path:
+    """A folder of results as a campaign left it before versions were declared, stopped in the middle."""
+    folder = tmp_path / "old"
+    made = store.create(folder)
+    results = store.load(home / "work")[:3]
+    local = [replace(r, key=f"{k:024x}-{r.seed}", recording="ab" * 12) for k, r in zip((1, 1, 2), results, strict=True)]
+    for result in local:
+        store.write(made, result)
+        if result is local[0]:
+            store.compact(made)
+    store.select(made, {local[0].scenario: ("ab" * 12, {r.estimator: r.variant for r in local})})
+    for file in [*(made / "results").glob("*.parquet"), *(made / "compacted").glob("*.parquet")]:
+        table = pq.read_table(file).drop_columns(["simulator_version", "estimator_version"])
+        pq.write_table(table.replace_schema_metadata({"simnav_results": "4"}), file)
+    marker = made / "simnav-results.json"
+    marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 4}))
+    return folder
 
 
-def test_results_that_come_out_differently_are_not_carried_over(
-    home: Path, copied: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_folder_from_before_versions_is_published_and_continued_without_running_it_again(
+    home: Path, tmp_path: Path, old: Path
 ) -> None:
-    results = store.load(copied / "shipped", series=False)
-    wrong = next(r for r in results if r.estimator == "gnss-only" and r.seed == 1)
-    others = {k: v * (1.0 + 1e-6) if k == "horizontal_rmse" else v for k, v in wrong.scores.items()}
-    write_packed([replace(r, scores=others) if r is wrong else r for r in results], copied / "shipped")
-    found = publishing.carry_standard(runs=5, shipped=copied / "shipped", record=copied / "carried.csv", workers=1)
-    assert (found.rows, found.results, found.repeated) == (0, 0, 2)
-    (text,) = found.different
-    assert text.startswith(f"gnss-only on {wrong.scenario}, run 1: horizontal_rmse ")
-    assert publishing.check_standard(copied / "shipped").rows == ("gnss-only",)
-    assert not (copied / "carried.csv").exists()
-    write_packed([replace(r, scenario_digest="another") for r in results], copied / "shipped")
-    found = publishing.carry_standard(shipped=copied / "shipped", record=copied / "carried.csv", workers=1)
-    assert found.left == (f"gnss-only on {wrong.scenario}: the scenario itself has changed",)
-    assert found.repeated == 0
-    monkeypatch.setattr(carrying, "here", lambda: Provenance(commit="0123", dirty=True))
-    with pytest.raises(RequestError, match="the code differs from its commit"):
-        publishing.carry_standard(shipped=copied / "shipped", record=copied / "carried.csv")
-    with pytest.raises(RequestError, match="runs = 0"):
-        publishing.carry_standard(runs=0, shipped=copied / "shipped", record=copied / "carried.csv")
+    shutil.copy(home / "small.toml", tmp_path)
+    (tmp_path / "README.md").write_text(README)
+    before = store.load(old)
+    series = {(r.estimator, r.seed): set(r.series) for r in before}
+    made = publish(tmp_path, old, preliminary=True)
+    assert len(made.results) == 3
+    wanted = {(r.scenario, r.estimator, r.seed): r.key for r in store.load(home / "shipped", series=False)}
+    for folder in (tmp_path / "shipped", old):
+        if folder == old:
+            done = run(home, old)
+            assert (done.summary.skipped, done.summary.computed) == (3, 1)
+        found = store.load(folder)
+        assert all(r.key == wanted[r.scenario, r.estimator, r.seed] for r in found)
+        assert {(r.recording, r.simulator_version, r.estimator_version) for r in found} == {("simulator-1", 1, 1)}
+    kept = {(r.estimator, r.seed): r for r in store.load(old)}
+    for r in before:
+        same = kept[r.estimator, r.seed]
+        np.testing.assert_array_equal([*same.scores.values()], [*r.scores.values()])
+        assert same.scores.keys() == r.scores.keys()
+        assert set(same.series) == series[r.estimator, r.seed] != set()
+
+
+def test_a_local_campaign_and_what_comes_with_simnav_do_not_take_each_others_results(
+    home: Path, tmp_path: Path, old: Path
+) -> None:
+    shutil.copytree(home / "shipped", tmp_path / "mine")
+    request = {"runs": 1, "workers": 1, "oracle": False}
+    with pytest.raises(RequestError, match="holds results that came with simnav, of clean-voyages-v1"):
+        interface.campaign("clean-voyages", "gnss-only", output=tmp_path / "mine", **request)
+    interface.campaign("clean-voyages", "gnss-only", output=tmp_path / "local", **request)
+    with pytest.raises(RequestError, match="holds results of a local campaign"):
+        run(home, tmp_path / "local")
 
 
 def test_what_the_profile_does_not_name_is_left_out_when_it_is_out_of_date(
@@ -209,35 +240,27 @@ def test_what_the_profile_does_not_name_is_left_out_when_it_is_out_of_date(
     assert {r.estimator for r in made.results} == {"dead-reckoning", "gnss-only"}  # another row is welcome
     assert not any("left out" in text for text in made.remarks)
 
-    def edited(cls: type) -> str:
-        return ("x" if cls.name == "gnss-only" else "") + estimator_source(cls)
-
-    monkeypatch.setattr(currency, "estimator_source", edited)
+    monkeypatch.setattr(find("gnss-only"), "version", 2)
     made = publish(tmp_path, home / "work")
     assert {r.estimator for r in made.results} == {r.estimator for r in store.load(made.folder)} == {"dead-reckoning"}
     assert "gnss-only on clean-voyages-v1 is left out: it is out of date" in made.remarks[0]
     assert not publishing.check_standard(made.folder)
 
 
-def test_a_change_of_simulator_scores_or_benchmark_is_said(
+def test_a_change_of_simulator_scenario_or_benchmark_is_said(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = home / "shipped"
     with monkeypatch.context() as patch:
-        patch.setattr(currency, "simulator_version", lambda: "0.1+other")
+        patch.setattr(currency, "SIMULATOR_VERSION", 2)
         assert outdated(folder).scenarios == ("clean-voyages-v1",)
+        assert "the simulator now has version 2: run clean-voyages-v1 with all rows" in outdated(folder).sentences()
     with monkeypatch.context() as patch:
-        (module, *_) = json.loads(currency.scoring_code())
-        patch.setattr(currency, "scoring_code", lambda: json.dumps({module: "other"}))
-        assert module in outdated(folder).scores
-        assert "run everything again" in outdated(folder).sentences()[0]
+        patch.setattr(currency, "_is_there", lambda scenario: False)
+        assert outdated(folder).gone == ("clean-voyages-v1",)
     with monkeypatch.context() as patch:
         patch.setattr(currency, "BENCHMARK", "simnav-bench 9.9")
         assert outdated(folder).benchmark
-    with monkeypatch.context() as patch:  # of logs that are not on this machine nothing can be said
-        patch.setattr(currency, "simulator_version", lambda: "0.1+other")
-        patch.setattr(currency, "has_recordings", lambda scenario: False)
-        assert not outdated(folder)
     with pytest.raises(RequestError, match="'simnav standard run' makes one"):
         publishing.check_standard(tmp_path)
 

@@ -188,6 +188,20 @@ def test_a_scenario_is_no_estimator():
         find("channel.toml")
 
 
+def test_a_class_has_a_version_of_its_own():
+    class Second(Plain):
+        version = 2
+
+    class Third(Second):
+        pass
+
+    assert (Plain.version, Second.version, Third.version) == (1, 2, 1)
+    for wrong in (0, "1"):
+        Third.version = wrong
+        with pytest.raises(EstimatorError, match=f"version = {wrong!r} should be a whole number from 1"):
+            register("third")(Third)
+
+
 def test_collisions_are_refused_and_placed():
     register("plain", aliases=("simple",))(Plain)
     other = type("Other", (Plain,), {})

@@ -1,0 +1,103 @@
+"""Ten short scenarios with faults of every kind, on which the golden test runs every row.
+
+Each is a scenario of the catalogue, cut after less than a minute, with faults of its own.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import simnav.scenarios
+from simnav.scenario import Scenario
+
+__all__ = ["CASES", "Case", "table_of"]
+
+_CATALOGUE = Path(simnav.scenarios.__file__).parent
+
+
+@dataclass(frozen=True)
+class Case:
+    """A short scenario.
+
+    Attributes
+    ----------
+    base : str
+        Name of a scenario of the catalogue.
+    duration : float
+        [s].
+    faults : tuple of dict
+        In place of the faults of that scenario, as in a TOML file.
+    slow : bool
+        Whether slow rows run on it, too.
+    """
+
+    base: str
+    duration: float
+    faults: tuple[dict[str, Any], ...]
+    slow: bool = False
+
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        table = table_of(self.base)
+        for name in ("draw", "dial", "fault"):
+            table.pop(name, None)
+        return Scenario.from_toml(table | {"duration_s": self.duration, "fault": list(self.faults)}, source=self.base)
+
+
+def table_of(name: str) -> dict[str, Any]:
+    """The TOML file of a scenario of the catalogue."""
+    (path,) = _CATALOGUE.rglob(f"{name}.toml")
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def _fault(kind: str, instrument: str, start: float, end: float, **more: Any) -> dict[str, Any]:
+    return {"kind": kind, "instruments": [instrument], "start_s": start, "end_s": end, **more}
+
+
+CASES = {
+    "gnss away, then noisy": Case("coastal-voyage", 32.0, (
+        _fault("outage", "gnss", 8.0, 16.0),
+        _fault("noise_step", "gnss", 20.0, 30.0, factor=6.0),
+    )),
+    "gnss reflected, with gross errors": Case("harbour-multipath", 24.0, (
+        _fault("multipath", "gnss", 4.0, 24.0, correlation_time_s=8.0, sigma_m=[4.0, 4.0, 6.0]),
+        _fault("gross_error", "gnss", 6.0, 20.0, probability=0.4, size_m=[10.0, 40.0]),
+    ), slow=True),
+    "dvl biased, then zero, while gnss repeats itself": Case("harbour-multipath", 30.0, (
+        _fault("bias_step", "dvl", 6.0, 14.0, offset_m_s=[0.4, -0.3, 0.0]),
+        _fault("frozen", "gnss", 10.0, 18.0),
+        _fault("false_zero", "dvl", 20.0, 27.0),
+    )),
+    "gnss dragged off, heading off": Case("harbour-multipath", 30.0, (
+        _fault("ramp", "gnss", 6.0, 28.0, slope_m_s=[1.0, 0.5, 0.0]),
+        _fault("bias_step", "gyrocompass", 8.0, 20.0, offset_deg=6.0),
+    )),
+    "imu disturbed": Case("mems-only", 24.0, (
+        _fault("imu_disturbance", "imu", 8.0, 14.0, specific_force_m_s2=[0.3, -0.2, 0.1], angular_rate_deg_s=0.1,
+               specific_force_noise_m_s2=0.2, angular_rate_noise_deg_s=0.2),
+    )),
+    "gnss velocity with gross errors": Case("open-sea", 24.0, (
+        _fault("gross_error", "gnss_velocity", 6.0, 20.0, probability=0.4, size_m_s=[1.0, 3.0]),
+    )),
+    "ship without imu, gnss away": Case("ship-dead-reckoning", 60.0, (
+        _fault("outage", "gnss", 15.0, 30.0),
+        _fault("frozen", "speed_log", 35.0, 45.0),
+        _fault("noise_step", "gyrocompass", 40.0, 55.0, factor=8.0),
+    ), slow=True),
+    "ship without imu, gross errors": Case("fishing-vessel", 60.0, (
+        _fault("gross_error", "gnss", 10.0, 50.0, probability=0.3, size_m=[20.0, 60.0]),
+        _fault("bias_step", "magnetic_compass", 20.0, 40.0, offset_deg=8.0),
+    )),
+    "under water, dvl away, fixes off": Case("auv-survey", 36.0, (
+        _fault("outage", "dvl", 8.0, 18.0),
+        _fault("bias_step", "terrain_fix", 15.0, 30.0, offset_m=[25.0, -15.0]),
+        _fault("noise_step", "depth", 10.0, 25.0, sigma_m=2.0),
+    )),
+    "under water without imu": Case("glider-dive", 60.0, (
+        _fault("gross_error", "speed_log", 10.0, 40.0, probability=0.3, size_m_s=[0.5, 1.5]),
+        _fault("outage", "gnss", 20.0, 60.0),
+    )),
+}  # fmt: skip
