@@ -16,6 +16,7 @@ from simnav.scoring import SCORES
 from simnav.scoring import registry as scores
 from simnav.sensors.faults import FAULTS
 from simnav.spec import UNITS
+from simnav.world import SURROUNDINGS, VESSELS
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
@@ -48,7 +49,7 @@ def clean_registry():
 @pytest.fixture
 def plugins(monkeypatch):
     """The folder of a third party's plug-in files; what a test loads from it is forgotten afterwards."""
-    classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS)]
+    classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS, SURROUNDINGS, VESSELS)]
     units = dict(UNITS)
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield Path(__file__).parent / "simnav" / "plugins"

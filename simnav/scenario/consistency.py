@@ -10,7 +10,7 @@ from simnav.scenario.catalogue import NAME
 from simnav.sensors import ImuSpec
 from simnav.spec import SpecError, closest
 from simnav.types import KINDS
-from simnav.world import Vessel
+from simnav.world.surroundings import OWN_PARTS
 
 if TYPE_CHECKING:
     from simnav.scenario.scenario import Scenario
@@ -38,6 +38,7 @@ def check(s: Scenario) -> None:
     """
     _check_head(s)
     _check_instruments(s)
+    _check_surroundings(s)
     if s.log is None:
         _check_world(s)
     else:
@@ -76,6 +77,16 @@ def _check_instruments(s: Scenario) -> None:
             raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
 
 
+def _check_surroundings(s: Scenario) -> None:
+    for name, spec in s.surroundings.items():
+        if not _INSTRUMENT.fullmatch(name):
+            raise ValueError(f"surroundings.{name}: a name is of lower-case letters, digits and underscores")
+        own = {"sea": s.sea, "current": s.current, "bottom": s.water_depth}.get(name)
+        if own is not None:
+            raise ValueError(f"surroundings.{name}: {OWN_PARTS[name]} says the same; leave out one of both")
+        _check_no_subnormal(f"surroundings.{name}", spec.model_dump())
+
+
 def _check_no_subnormal(where: str, value: Any) -> None:
     """Refuse numbers so close to zero that a division by them overflows."""
     if isinstance(value, dict):
@@ -99,22 +110,16 @@ def _check_speeds(s: Scenario) -> None:
 
 def _check_world(s: Scenario) -> None:
     """Check a simulated run: start and manoeuvres fit the vessel and the water."""
-    if s.start is None:
-        raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
     if s.imu is not None and abs(s.step * s.imu.rate - round(s.step * s.imu.rate)) > 1e-6:
         raise ValueError(
             f"step_s = {s.step:g} should be a multiple of the IMU's sample interval, 1 / {s.imu.rate:g} Hz"
         )
     _check_speeds(s)
-    vessel = s.vessel or Vessel()
-    depth = -s.start.altitude
-    if vessel.kind == "ship" and depth > 0.0:
-        raise ValueError(f"start.depth_m = {depth:g}: a ship floats; say vessel.kind = 'uuv' for a submerged vehicle")
+    s.craft.check(s.start, s.manoeuvres, tuple(s.surroundings))
+    depth = 0.0 if s.start is None else -s.start.altitude
     if s.water_depth is not None and depth >= s.water_depth:
         raise ValueError(f"start.depth_m = {depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}")
     for i, m in enumerate(s.manoeuvres):
-        if vessel.kind == "ship" and m.kind in ("dive", "surface"):
-            raise ValueError(f"manoeuvre[{i}].kind = {m.kind!r}: a ship cannot; say vessel.kind = 'uuv'")
         if m.kind == "dive" and s.water_depth is not None and m.depth >= s.water_depth:
             raise ValueError(
                 f"manoeuvre[{i}].depth_m = {m.depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}"

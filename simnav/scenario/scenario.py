@@ -22,7 +22,8 @@ from simnav.scenario.draws import Distribution, Draws, Template, has_draws, with
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
 from simnav.spec import Positive, Spec, SpecError, entries, quantity
 from simnav.types import Array, Instruments
-from simnav.world import Current, Manoeuvre, Sea, Start, Vessel
+from simnav.world import AnySurrounding, AnyVessel, Current, Manoeuvre, Sea, Ship, Start, Surroundings, Vessel, Voyage
+from simnav.world.surroundings import surround
 
 __all__ = ["TRAINING_ROOT", "Dial", "InitialError", "Scenario"]
 
@@ -115,7 +116,8 @@ class Scenario(Spec):
         False, description="parameters are chosen on it: its runs share no random stream with the board's"
     )
     plugins: tuple[str, ...] = Field(
-        (), description="Python files that register the instruments and faults of others, from the folder of this file"
+        (),
+        description="Python files that register instruments, faults, vessels or others, from this file's folder",
     )
     duration: Annotated[float, Field(gt=0.0, le=LONGEST)] = quantity(
         "s", description="length of a run; a multiple of the step"
@@ -129,10 +131,13 @@ class Scenario(Spec):
     )
     start: Start | None = Field(None, description="state of the vessel at time 0")
     initial_error: InitialError = Field(InitialError(), description="what the estimator does not know of it")
-    vessel: Vessel | None = Field(None, description="how the vessel answers")
+    vessel: AnyVessel | None = Field(None, description="what moves, and how; absent: a ship")
     manoeuvres: tuple[Manoeuvre, ...] = entries("manoeuvre", (), description="in order; the last holds to the end")
     sea: Sea | None = Field(None, description="waves; absent: flat calm")
     current: Current | None = Field(None, description="absent: none")
+    surroundings: dict[str, AnySurrounding] = Field(
+        default_factory=dict, description="more parts of the surroundings, by name, for instruments that ask them"
+    )
     instruments: dict[str, AnyInstrument] = Field(
         default_factory=dict, description="by name; the IMU, if there is one, is called imu"
     )
@@ -268,6 +273,23 @@ class Scenario(Spec):
         return round(self.duration / self.step)
 
     @property
+    def craft(self) -> Vessel:
+        """The vessel; a ship where the scenario describes none."""
+        return Ship() if self.vessel is None else self.vessel
+
+    def surround(self, seed: int) -> Surroundings:
+        """Make the surroundings of the run with this seed."""
+        parts, root = self.surroundings, self._world_root(seed)
+        return surround(self.sea, self.current, self.water_depth, parts, start=self.start, seed=root)
+
+    def voyage(self, seed: int, surroundings: Surroundings, rate: float) -> Voyage:
+        """What the vessel needs to make its trajectory, with an IMU of this sample rate [Hz]."""
+        return Voyage(self.start, self.manoeuvres, surroundings, rate, self.duration, self._world_root(seed))
+
+    def _world_root(self, seed: int) -> int:
+        return self.root(seed) if self.world_seed is None else self.world_seed
+
+    @property
     def imu(self) -> ImuSpec | None:
         """The IMU's specification, or None."""
         spec = self.instruments.get("imu")
@@ -314,19 +336,25 @@ class Scenario(Spec):
         Distributions are included as they are written.
         """
         words = {"title", "description", "source", "tags", "track", "group", "plugins", "dials"}
+        if not self.surroundings:
+            words.add("surroundings")
         content = self.model_dump(mode="python", exclude=words)
         if self._template is not None:
             content["distributions"] = _canonical(self._template.table, words)
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.
         digest = hashlib.blake2b(json.dumps(content, default=str).encode(), digest_size=16)
-        for module in sorted({type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)}):
-            if not module.startswith("simnav."):  # what others' instruments and faults do is not in simnav's version
+        for module in sorted({type(spec).__module__ for spec in self._registered()}):
+            if not module.startswith("simnav."):  # what the code of others does is not in simnav's version
                 digest.update(source_digest(module).encode())
         return digest.hexdigest()
 
+    def _registered(self) -> list[Spec]:
+        """The parts of the scenario whose classes are registered, by simnav or by others."""
+        return [*self.instruments.values(), *self.faults, *self.surroundings.values(), self.craft]
+
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
         """Pickle for another process, which must load the plug-in files before it can build their instruments."""
-        names = [type(spec).__module__ for spec in (*self.instruments.values(), *self.faults)]
+        names = [type(spec).__module__ for spec in self._registered()]
         files = [sys.modules[name].__file__ for name in names if is_file_module(name) and name in sys.modules]
         reduced = super().__reduce_ex__(protocol)
         plugins = tuple(dict.fromkeys((*self.plugins, *filter(None, files))))
