@@ -11,6 +11,7 @@ from hypothesis import settings
 
 from simnav.estimator import names, registry
 from simnav.kinds import INSTRUMENTS
+from simnav.log.reader import READERS
 from simnav.plugins import Registry, is_file_module
 from simnav.scoring import SCORES
 from simnav.scoring import registry as scores
@@ -49,7 +50,7 @@ def clean_registry():
 @pytest.fixture
 def plugins(monkeypatch):
     """The folder of a third party's plug-in files; what a test loads from it is forgotten afterwards."""
-    classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS, SURROUNDINGS, VESSELS)]
+    classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS, SURROUNDINGS, VESSELS, READERS)]
     units = dict(UNITS)
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield Path(__file__).parent / "simnav" / "plugins"
