@@ -19,7 +19,7 @@ def command(
     scenario: ScenarioName,
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="Recording to write: .npz, or the ending of another registered format."),
+        typer.Option("--output", "-o", help="Recording to write: .npz, or the ending of a plug-in's format."),
     ],
     seed: Seed = 0,
     csv: Annotated[

@@ -1,7 +1,7 @@
 """The formats in which results and recordings are written for other programs.
 
-A format is a function, registered by `writes`, that writes one thing to one place. A new one takes one file, of simnav or
-of others (``docs/how-to/add-a-format.md``)::
+A format is a function, registered by `writes`, that writes one thing to one place. A new one takes one file, of simnav
+or of others (``docs/how-to/add-a-format.md``)::
 
     @writes("recording", "mat")
     def write_mat(recording: Recording, path: Path) -> list[Path]: ...

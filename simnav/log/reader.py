@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import update_wrapper
 from pathlib import Path
 from typing import TypeAlias
 
@@ -68,10 +67,9 @@ class Reader:
         Whether an IMU may be in such a file.
     """
 
-    __qualname__: str
-
     def __init__(self, function: Read, name: str, title: str, sentences: bool, inertial: bool):
-        update_wrapper(self, function)
+        # As a registered function has them; the place of the code is found through the last.
+        self.__qualname__, self.__module__, self.__wrapped__ = function.__qualname__, function.__module__, function
         self.function, self.name, self.title = function, name, title
         self.sentences, self.inertial = sentences, inertial
 

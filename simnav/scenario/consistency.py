@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from simnav.log.spec import RecordedSpec
 from simnav.scenario.catalogue import NAME
+from simnav.scenario.description import Description
 from simnav.sensors import ImuSpec
 from simnav.spec import SpecError, closest
 from simnav.types import KINDS
 from simnav.world.surroundings import OWN_PARTS
 
-if TYPE_CHECKING:
-    from simnav.scenario.scenario import Scenario
-
-__all__ = ["LONGEST", "check"]
+__all__ = ["check"]
 
 #: Largest number of intervals of faults: the labels of a measurement have 32 bits, one for each interval.
 _MOST_BITS = 32
 
-#: Longest run [s] and highest rate of an instrument [Hz]. The limits catch mistakes that would fill the memory.
-LONGEST, _FASTEST = 1e7, 1e5
+#: Highest rate of an instrument [Hz]. The limit catches mistakes that would fill the memory.
+_FASTEST = 1e5
 #: Highest speed of a vessel and of a current [m/s], and smallest magnitude of a number other than 0.
 _HIGHEST_SPEED, _SMALLEST = 1e3, 1e-200
 
 _INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
 
 
-def check(s: Scenario) -> None:
+def check(s: Description) -> None:
     """Check that the parts of a scenario fit together.
 
     Raises
@@ -46,7 +44,7 @@ def check(s: Scenario) -> None:
     _check_faults(s)
 
 
-def _check_head(s: Scenario) -> None:
+def _check_head(s: Description) -> None:
     if not NAME.fullmatch(s.name) or re.search(r"-v\d+$", s.name):
         raise ValueError(f"name = {s.name!r} should be in kebab-case and without a version, like 'coastal-voyage'")
     if not NAME.fullmatch(s.track):
@@ -60,7 +58,7 @@ def _check_head(s: Scenario) -> None:
         )
 
 
-def _check_instruments(s: Scenario) -> None:
+def _check_instruments(s: Description) -> None:
     if not s.instruments:
         raise ValueError("there is no instrument; add at least one table [instruments.NAME]")
     for name, spec in s.instruments.items():
@@ -77,7 +75,7 @@ def _check_instruments(s: Scenario) -> None:
             raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
 
 
-def _check_surroundings(s: Scenario) -> None:
+def _check_surroundings(s: Description) -> None:
     for name, spec in s.surroundings.items():
         if not _INSTRUMENT.fullmatch(name):
             raise ValueError(f"surroundings.{name}: a name is of lower-case letters, digits and underscores")
@@ -99,7 +97,7 @@ def _check_no_subnormal(where: str, value: Any) -> None:
         raise ValueError(f"{where} = {value:g} (in SI units): should be 0, or at least {_SMALLEST:g}")
 
 
-def _check_speeds(s: Scenario) -> None:
+def _check_speeds(s: Description) -> None:
     """Refuse speeds above `_HIGHEST_SPEED`, at which the truth might not be finite."""
     speeds = {f"manoeuvre {k} ({m.kind}).speed_m_s": getattr(m, "speed", 0.0) for k, m in enumerate(s.manoeuvres, 1)}
     speeds |= {"start.speed_m_s": getattr(s.start, "speed", 0.0), "current.speed_m_s": getattr(s.current, "speed", 0.0)}
@@ -108,7 +106,7 @@ def _check_speeds(s: Scenario) -> None:
             raise ValueError(f"{key} = {speed:g}: should be at most {_HIGHEST_SPEED:g}")
 
 
-def _check_world(s: Scenario) -> None:
+def _check_world(s: Description) -> None:
     """Check a simulated run: start and manoeuvres fit the vessel and the water."""
     if s.imu is not None and abs(s.step * s.imu.rate - round(s.step * s.imu.rate)) > 1e-6:
         raise ValueError(
@@ -126,7 +124,7 @@ def _check_world(s: Scenario) -> None:
             )
 
 
-def _check_log(s: Scenario, log: RecordedSpec) -> None:
+def _check_log(s: Description, log: RecordedSpec) -> None:
     """Check a recorded run: it has no world, and a source for every instrument."""
     for key in ("start", "vessel", "manoeuvres", "sea", "current", "world_seed"):
         if getattr(s, key):
@@ -144,7 +142,7 @@ def _check_log(s: Scenario, log: RecordedSpec) -> None:
         raise ValueError(f"[{there}] needs [{missing}] beside it")
 
 
-def _check_faults(s: Scenario) -> None:
+def _check_faults(s: Description) -> None:
     kinds = {name: spec.kind for name, spec in s.aids.items()}
     for i, fault in enumerate(s.faults):
         try:
