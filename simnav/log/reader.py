@@ -81,7 +81,6 @@ class Reader:
         LogError
             If the file cannot be read. An exception in the code of a reader is one, too; the message names the reader.
         """
-        label = f"{path}: reader {self.name!r} in {Path(place_of(self.function)[0]).name}"
         try:
             rows = self.function(path, file, sentence, talker)
         except FileNotFoundError:
@@ -89,12 +88,15 @@ class Reader:
         except (LogError, MemoryError):
             raise
         except Exception as error:
-            raise LogError(f"{label}: {exception_of(self.function, error)}") from error
+            raise LogError(f"{self._label(path)}: {exception_of(self.function, error)}") from error
         if not isinstance(rows, Rows):
-            raise LogError(f"{label}: it returned {type(rows).__name__}, where Rows are wanted")
+            raise LogError(f"{self._label(path)}: it returned {type(rows).__name__}, where Rows are wanted")
         if not len(rows.table):
             raise LogError(f"{path}: there are no rows of data")
         return rows
+
+    def _label(self, path: Path) -> str:
+        return f"{path}: reader {self.name!r} in {Path(place_of(self.function)[0]).name}"
 
 
 READERS: Registry[Reader] = Registry("log reader", "simnav.log_readers", "simnav.log.formats", term="format")

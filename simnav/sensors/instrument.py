@@ -356,15 +356,15 @@ def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
 
     @wraps(build)
     def named(self: AidSpec, name: str, seed: int) -> Instrument:
-        label = _label(name, self.kind, type(self))
+        label = partial(_label, name, self.kind, type(self))  # late: it reads the source of the class
         try:
             made = build(self, name, seed)
         except (InstrumentError, MemoryError):
             raise
         except Exception as error:
-            raise _raised(label, type(self), error) from error
+            raise _raised(label(), type(self), error) from error
         if not isinstance(made, Instrument):
-            raise InstrumentError(f"{label}: build() returned {type(made).__name__}, where an Instrument is wanted")
+            raise InstrumentError(f"{label()}: build() returned {type(made).__name__}, where an Instrument is wanted")
         return made
 
     return named

@@ -116,19 +116,24 @@ def _named(make: Callable[..., Any]) -> Callable[..., Trajectory]:
 
     @wraps(make)
     def named(self: Vessel, voyage: Voyage) -> Trajectory:
-        cls = type(self)
-        label = f"vessel of kind {self.kind!r} ({cls.__qualname__} in {Path(place_of(cls)[0]).name})"
         try:
             made = make(self, voyage)
         except (SpecError, MemoryError):
             raise
         except Exception as error:
-            raise VesselError(f"{label}: {exception_of(cls, error)}") from error
+            raise VesselError(f"{_label(self)}: {exception_of(type(self), error)}") from error
         if not isinstance(made, Trajectory):
-            raise VesselError(f"{label}: trajectory() returned {type(made).__name__}, where a Trajectory is wanted")
+            raise VesselError(
+                f"{_label(self)}: trajectory() returned {type(made).__name__}, where a Trajectory is wanted"
+            )
         return made
 
     return named
+
+
+def _label(vessel: Vessel) -> str:
+    cls = type(vessel)
+    return f"vessel of kind {vessel.kind!r} ({cls.__qualname__} in {Path(place_of(cls)[0]).name})"
 
 
 class KinematicVessel(Vessel):
