@@ -307,10 +307,12 @@ class OneOf:
     ----------
     classes : callable
         Function without arguments that returns the classes that are registered at this time.
+    default : str, optional
+        The ``kind`` of a table that has none.
     """
 
-    def __init__(self, classes: Callable[[], Sequence[type[Spec]]]):
-        self.classes = classes
+    def __init__(self, classes: Callable[[], Sequence[type[Spec]]], default: str | None = None):
+        self.classes, self.default = classes, default
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         """The pydantic schema: `validate` validates, and each value is serialised by its own class."""
@@ -321,7 +323,7 @@ class OneOf:
         by_kind = {_kind(cls): cls for cls in self.classes()}
         if isinstance(value, Spec) and isinstance(value, tuple(by_kind.values())):
             return value
-        kind = value.get("kind") if isinstance(value, Mapping) else None
+        kind = value.get("kind", self.default) if isinstance(value, Mapping) else None
         if kind in by_kind:
             return by_kind[kind].model_validate(value)
         valid = [k for k in by_kind if k is not None]
@@ -341,6 +343,14 @@ def spec_types(annotation: Any) -> list[type[Spec]]:
     return [s for a in typing.get_args(annotation) for s in spec_types(a)]
 
 
+def _one_of(annotation: Any) -> OneOf | None:
+    """The `OneOf` inside an annotation."""
+    for metadata in getattr(annotation, "__metadata__", ()):
+        if isinstance(metadata, OneOf):
+            return metadata
+    return next(filter(None, map(_one_of, typing.get_args(annotation))), None)
+
+
 def _containers(annotation: Any) -> set[Any]:
     """The outermost types that the annotation allows, without None."""
     origin = typing.get_origin(annotation)
@@ -352,8 +362,8 @@ def _containers(annotation: Any) -> set[Any]:
 
 
 def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
-    specs, top = spec_types(info.annotation), _containers(info.annotation)
-    if not specs:
+    specs, top, opened = spec_types(info.annotation), _containers(info.annotation), _one_of(info.annotation)
+    if not specs and opened is None:
         _check_plain(raw, _leaves(info.annotation), _may_be_infinite(info), source, where)
         return raw
     if top & {list, tuple}:
@@ -364,7 +374,10 @@ def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
         if not isinstance(raw, Mapping):
             raise SpecError(f"{source}: {where} = {raw!r} should be a table of tables ([{where}.name])")
         # Without the key "kind", the name of the table is its kind.
-        return {k: _one(v, specs, source, f"{where}.{k}", default_kind=k) for k, v in raw.items()}
+        read = _one if opened is None else _by_kind
+        return {k: read(v, specs, source, f"{where}.{k}", k) for k, v in raw.items()}
+    if opened is not None:
+        return _by_kind(raw, specs, source, where, opened.default)
     return _one(raw, specs, source, where)
 
 
@@ -404,6 +417,11 @@ def _kind(spec: type[Spec]) -> str | None:
 def _one(raw: Any, specs: list[type[Spec]], source: str, where: str, default_kind: str | None = None) -> Spec:
     if len(specs) == 1:
         return specs[0].from_toml(raw, source=source, path=where)
+    return _by_kind(raw, specs, source, where, default_kind)
+
+
+def _by_kind(raw: Any, specs: list[type[Spec]], source: str, where: str, default_kind: str | None) -> Spec:
+    """The specification of the class that the key ``kind`` of a table names."""
     if not isinstance(raw, Mapping):
         raise SpecError(f"{source}: {where} = {raw!r} should be a table")
     by_kind = {k: s for s in specs if (k := _kind(s)) is not None}
@@ -411,7 +429,7 @@ def _one(raw: Any, specs: list[type[Spec]], source: str, where: str, default_kin
     if not isinstance(kind, (str, types.NoneType)):
         raise SpecError(f"{source}: {where}.kind = {kind!r} should be one of: {', '.join(by_kind)}")
     if kind is None:
-        raise SpecError(f"{source}: {where} has no key 'kind'; one of: {', '.join(by_kind)}")
+        raise SpecError(f"{source}: {where} has no key 'kind'; one of: {', '.join(by_kind) or 'none is registered'}")
     if kind not in by_kind:
         raise SpecError(f"{source}: {where}.kind = {kind!r} is unknown{closest(str(kind), list(by_kind))}")
     return by_kind[kind].from_toml({**raw, "kind": kind}, source=source, path=where)

@@ -381,7 +381,9 @@ def _increments(
         position[k + 1, 2] = position[k, 2] + out[8]
 
 
-def increments(time: Array, position: Array, velocity: Array, attitude: Array) -> tuple[ImuSamples, Array]:
+def increments(
+    time: Array, position: Array, velocity: Array, attitude: Array, *, memory: Array | None = None
+) -> tuple[ImuSamples, Array]:
     """The samples of ideal instruments on a trajectory: the exact inverse of `integrate`.
 
     Parameters
@@ -394,6 +396,9 @@ def increments(time: Array, position: Array, velocity: Array, attitude: Array) -
         Velocities of the states, north-east-down [m/s].
     attitude : (n + 1, 3) array
         Roll, pitch, yaw [rad]. The rotation between two times is less than 90 degrees.
+    memory : (6,) array, optional
+        Angle and velocity increments of the interval before, for a trajectory in several blocks; updated. Default:
+        zeros.
 
     Returns
     -------
@@ -419,7 +424,7 @@ def increments(time: Array, position: Array, velocity: Array, attitude: Array) -
         time,
         np.ascontiguousarray(velocity, dtype=np.float64),
         dcm_from_rpy(attitude),
-        np.zeros(6),
+        np.zeros(6) if memory is None else memory,
         positions,
         rate,
         force,

@@ -11,11 +11,13 @@ from hypothesis import settings
 
 from simnav.estimator import names, registry
 from simnav.kinds import INSTRUMENTS
+from simnav.log.reader import READERS
 from simnav.plugins import Registry, is_file_module
 from simnav.scoring import SCORES
 from simnav.scoring import registry as scores
 from simnav.sensors.faults import FAULTS
 from simnav.spec import UNITS
+from simnav.world import SURROUNDINGS, VESSELS
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
@@ -48,7 +50,7 @@ def clean_registry():
 @pytest.fixture
 def plugins(monkeypatch):
     """The folder of a third party's plug-in files; what a test loads from it is forgotten afterwards."""
-    classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS)]
+    classes = [(registry, registry.items()) for registry in (INSTRUMENTS, FAULTS, SURROUNDINGS, VESSELS, READERS)]
     units = dict(UNITS)
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield Path(__file__).parent / "simnav" / "plugins"

@@ -19,8 +19,8 @@ from pathlib import Path
 
 import simnav.scenarios
 from simnav.leaderboard.results.errors import sentence
+from simnav.log.delimited import read_csv
 from simnav.log.nmea import read_nmea
-from simnav.log.table import read_csv
 from simnav.scenario import parse
 
 __all__ = ["fuzz_logs", "fuzz_tomls"]

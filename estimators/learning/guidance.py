@@ -55,7 +55,7 @@ from simnav.scenario import Scenario, load
 from simnav.simulation.simulator import Simulator
 from simnav.simulation.steps import SteppedRuns
 from simnav.types import KINDS, Array
-from simnav.world import Vessel, motion
+from simnav.world import KinematicVessel, motion
 
 __all__ = ["GuidanceEnv", "GuidanceOptions", "GuidanceScores", "GuidedVoyages", "LineOfSight"]
 
@@ -114,8 +114,14 @@ class GuidanceOptions:
         steps: int | None, voyages: int | None, reveal_truth: bool,
     ):  # fmt: skip
         scenario = load(scenario) if isinstance(scenario, (str, Path)) else scenario
-        if scenario.recorded or scenario.start is None:
+        if scenario.recorded:
             raise ValueError(f"scenario {scenario.id} is a recorded log: its vessel cannot be steered")
+        for vessel in (s.craft for s in scenario.extremes()):
+            if not isinstance(vessel, KinematicVessel):
+                raise ValueError(
+                    f"scenario {scenario.id}: a vessel of kind {vessel.kind!r} takes no commands; "
+                    "guidance needs a vessel of simnav, like vessel.kind = 'ship'"
+                )
         if route not in ROUTES:
             raise ValueError(f"route is one of {', '.join(ROUTES)}, not {route!r}")
         if not half_width > 0.0:
@@ -171,7 +177,8 @@ class GuidedVoyages:
         """Begin a voyage with the seed of a run; its info."""
         o, runs = self.options, self.runs
         scenario = o.scenario.drawn(seed)
-        vessel = scenario.vessel or Vessel()
+        vessel = scenario.craft
+        assert isinstance(vessel, KinematicVessel)  # `GuidanceOptions`
         self._routes.put(b, o.scenario, scenario)
         self._ahead[b] = round(2.0 * vessel.turn_time_constant)
         source = Simulator(scenario.model_copy(update={"manoeuvres": (), "world_seed": None}), seed)

@@ -9,7 +9,7 @@ from simnav.estimators.learning.guidance_kernels import Tracks
 from simnav.geometry.earth import principal_radii, relative_position
 from simnav.scenario import Scenario
 from simnav.types import Array
-from simnav.world import Vessel, World
+from simnav.world import KinematicVessel, World
 from simnav.world.track import PlannedTrack
 
 __all__ = ["Routes"]
@@ -89,8 +89,10 @@ _tracks: dict[str, PlannedTrack] = {}
 
 def _planned(scenario: Scenario) -> PlannedTrack:
     """The track that the manoeuvres plan; the last ones are kept, since that of half a day takes half a second."""
+    vessel = scenario.craft
     assert scenario.start is not None
-    voyage = scenario.start, scenario.vessel or Vessel(), scenario.manoeuvres, scenario.current
+    assert isinstance(vessel, KinematicVessel)
+    voyage = scenario.start, vessel, scenario.manoeuvres, scenario.current
     key = repr((voyage, scenario.duration))
     if key not in _tracks:
         if len(_tracks) > 4:

@@ -69,7 +69,7 @@ def root(
     ] = False,
     plugin: Annotated[
         list[Path] | None,
-        typer.Option(help="Python file that registers instruments, faults or scores of others; repeatable."),
+        typer.Option(help="Python file that registers instruments, scores, formats or others; repeatable."),
     ] = None,
 ) -> None:
     """The open benchmark for marine integrated navigation: simulate, estimate, score, rank."""
@@ -112,18 +112,6 @@ app.add_typer(standard.app, name="standard")
 app.add_typer(train.app, name="train")
 
 
-def _leave_out_working_directory() -> None:
-    """A folder ``estimators/`` or ``scenarios/`` where the user stands must not hide the project's own.
-
-    Console scripts do not search the working directory, but ``python -m`` and an empty entry of PYTHONPATH
-    do. The project's own tree, where the command may be started from, stays.
-    """
-    home = Path(__file__).resolve().parents[2]
-    here = Path.cwd()
-    if here != home:
-        sys.path[:] = [p for p in sys.path if p and not (os.path.isabs(p) and Path(p) == here and p != str(home))]
-
-
 def _open_streams() -> None:
     """A stream that was closed before the start (``simnav list >&-``) takes what is printed, and keeps nothing.
 
@@ -141,7 +129,6 @@ def _open_streams() -> None:
 def main() -> None:
     """Entry point of the console script."""
     _open_streams()
-    _leave_out_working_directory()
     try:
         code = app(standalone_mode=False, prog_name="simnav")
     except Exception as error:  # of the parser: an unknown command or option, a value of the wrong type

@@ -17,7 +17,10 @@ __all__ = ["command"]
 
 def command(
     scenario: ScenarioName,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.npz).")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="Recording to write: .npz, or the ending of a plug-in's format."),
+    ],
     seed: Seed = 0,
     csv: Annotated[
         Path | None, typer.Option(help="Folder for the recording as CSV files, one for each instrument.")
@@ -29,13 +32,16 @@ def command(
     with session(json, debug) as out:
         from simnav.leaderboard.campaign.single_run import record
         from simnav.leaderboard.interface import scenario_of
-        from simnav.leaderboard.results.formats import write
+        from simnav.leaderboard.results.formats import formats, write
 
-        if output.suffix != ".npz":
-            raise RequestError(f"--output {output}: the file should end in .npz")
+        # "csv" is a folder, and has an option of its own.
+        endings = [name for name in formats("recording") if name != "csv"]
+        ending = output.suffix.removeprefix(".")
+        if ending not in endings:
+            raise RequestError(f"--output {output}: the file should end in {' or '.join('.' + e for e in endings)}")
         chosen = scenario_of(scenario)
         recording = record(chosen, seed)
-        (target,) = write("recording", "npz", recording, absolute(output))
+        target, *_ = write("recording", ending, recording, absolute(output))
         written = [] if csv is None else write("recording", "csv", recording, absolute(csv))
         data = recording.data
         out.document(

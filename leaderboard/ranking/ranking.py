@@ -340,8 +340,9 @@ def _rows(
     """The fields that all rows have, in the order of a table; which are told apart; why they cannot be ordered."""
     figures = {n: _figures(tables, c) for n, c in cells.items()}
     board = _board({n: f for n, f in figures.items() if standing[n][0] == "ranked"})
-    excess = unlucky_excess(board.values, board.strata, board.clusters) if board.names else 0.0
-    scores = {n: score(f.logs, f.strata, f.clusters, f.failed, excess) for n, f in figures.items()}
+    excess = _excess(board)
+    usual = float(np.median(list(excess.values()))) if excess else 0.0  # of a row that is not ranked
+    scores = {n: score(f.logs, f.strata, f.clusters, f.failed, excess.get(n, usual)) for n, f in figures.items()}
     ranked = sorted(board.names, key=lambda n: (scores[n].value, n))
     separation, places, why = _places(ranked, board)
     rest = sorted((n for n in cells if n not in ranked), key=lambda n: (_ORDER[standing[n][0]], scores[n].value, n))
@@ -367,7 +368,7 @@ def _rows(
             "high": scores[n].high,
             "scenarios_low": over.low,
             "scenarios_high": over.high,
-            "gain": _gain(n, tables, cells[n], excess),
+            "gain": _gain(n, tables, cells[n], excess.get(n, usual)),
             "far": float(np.mean(every > math.log(FAR))) if oracle else math.nan,
             "worst": math.exp(float(every.max())),
             "p95": math.exp(weighted_quantile(every, weights, 0.95)),
@@ -420,6 +421,13 @@ def _board(figures: Mapping[str, _Figures]) -> _Board:
     for j, f in enumerate(figures.values()):
         values[[index[k] for k in f.keys], j] = f.logs
     return _Board(list(figures), values, [k[0] for k in keys], [k[1] for k in keys])
+
+
+def _excess(board: _Board) -> dict[str, float]:
+    """By how much an unlucky run of each row is worse than its others."""
+    if not board.names:
+        return {}
+    return dict(zip(board.names, unlucky_excess(board.values, board.strata, board.clusters).tolist(), strict=True))
 
 
 def _places(ranked: Sequence[str], board: _Board) -> tuple[Separation | None, dict[str, dict[str, Any]], str]:

@@ -1,36 +1,60 @@
-"""One registry of the formats in which results and recordings are written for other programs.
+"""The formats in which results and recordings are written for other programs.
 
-A format is a function, registered by `writes`, that writes one thing to one place. A new one takes one file::
+A format is a function, registered by `writes`, that writes one thing to one place. A new one takes one file, of simnav
+or of others (``docs/how-to/add-a-format.md``)::
 
     @writes("recording", "mat")
     def write_mat(recording: Recording, path: Path) -> list[Path]: ...
+
+A file of a third party is loaded by ``simnav --plugin``, or by `simnav.load_plugin`. A package names its module in the
+entry-point group ``simnav.result_writers`` or ``simnav.recording_writers``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
+from simnav.plugins import Registry
 from simnav.spec import closest
 
-__all__ = ["Kind", "formats", "write", "writes"]
+__all__ = ["WRITERS", "Kind", "formats", "write", "writes"]
 
 #: ``results``: a `simnav.leaderboard.results.export.Document`; ``recording``: a `simnav.recording.Recording`.
 Kind = Literal["results", "recording"]
 
-Writer = TypeVar("Writer", bound=Callable[[Any, Path], list[Path]])
+Write: TypeAlias = Callable[[Any, Path], list[Path]]
+Writer = TypeVar("Writer", bound=Write)
 
-_OURS: dict[Kind, str] = {"results": "export", "recording": "recording_export"}  # modules, imported when asked for
-_writers: dict[Kind, dict[str, Callable[[Any, Path], list[Path]]]] = {"results": {}, "recording": {}}
+WRITERS: dict[Kind, Registry[Write]] = {
+    "results": Registry(
+        "writer of results", "simnav.result_writers", "simnav.leaderboard.results.export", term="format"
+    ),
+    "recording": Registry(
+        "writer of recordings", "simnav.recording_writers", "simnav.leaderboard.results.recording_export", term="format"
+    ),
+}
 
 
 def writes(kind: Kind, name: str) -> Callable[[Writer], Writer]:
-    """Decorator: register a function that takes a thing of a kind and a path, and returns the files that it wrote."""
+    """Register a function that takes a thing of a kind and a path, and returns the files that it wrote (decorator).
+
+    Parameters
+    ----------
+    kind : {"results", "recording"}
+        Kind of the data that it writes.
+    name : str
+        Name of the format in snake_case; of a file, its ending.
+
+    Raises
+    ------
+    PluginError
+        If the name is not in snake_case or another format of this kind has it.
+    """
 
     def wrap(writer: Writer) -> Writer:
-        _writers[kind][name] = writer
+        WRITERS[kind].add(name, writer)
         return writer
 
     return wrap
@@ -38,8 +62,7 @@ def writes(kind: Kind, name: str) -> Callable[[Writer], Writer]:
 
 def formats(kind: Kind) -> list[str]:
     """Names of the formats of a kind; of a file, its ending."""
-    import_module(f"simnav.leaderboard.results.{_OURS[kind]}")
-    return sorted(_writers[kind])
+    return sorted(WRITERS[kind].items())
 
 
 def write(kind: Kind, name: str, thing: Any, path: Path) -> list[Path]:
@@ -68,6 +91,7 @@ def write(kind: Kind, name: str, thing: Any, path: Path) -> list[Path]:
     OSError
         If writing fails.
     """
-    if name not in formats(kind):
+    writer = WRITERS[kind].get(name)
+    if writer is None:
         raise ValueError(f"there is no format {name!r} of {kind}{closest(name, formats(kind))}")
-    return _writers[kind][name](thing, path)
+    return writer(thing, path)

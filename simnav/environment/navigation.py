@@ -126,12 +126,19 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
                 f"scenario {scenario.id} is a recorded log: its vessel cannot steer by the estimate; "
                 "leave closed_loop out"
             )
+        # The spaces are fixed: they hold what any run of the scenario can bring.
+        possible = scenario.extremes()
+        if closed_loop:
+            for vessel in (s.craft for s in possible):
+                if not vessel.steered:
+                    raise ValueError(
+                        f"scenario {scenario.id}: a vessel of kind {vessel.kind!r} follows a given track and cannot "
+                        "steer by the estimate; leave closed_loop out"
+                    )
         self.scenario = scenario
         self.reveal_truth = reveal_truth
         self.closed_loop = closed_loop
         self._weights = _weights(reward)
-        # The spaces are fixed: they hold what any run of the scenario can bring.
-        possible = scenario.extremes()
         most = [most_samples(s) for s in possible]
         self._most = {name: max(m.get(name, 0) for m in most) for m in most for name in m}
         self._widths = {

@@ -1,4 +1,4 @@
-"""Real logs: CSV and NMEA files of a vessel, mapped by a scenario's ``[log]`` table to instruments and a reference."""
+"""Real logs: files of a vessel, mapped by a scenario's ``[log]`` table to instruments and a reference."""
 
 from __future__ import annotations
 

@@ -15,18 +15,11 @@ from numpy.typing import NDArray
 
 from simnav.geometry.rotation import wrap_angle
 from simnav.kinds import Component, Kind, geodetic_components, speed_components
-from simnav.log.nmea import read_nmea, utc_seconds
-from simnav.log.spec import (
-    DIMENSIONS,
-    LOG_UNITS,
-    ChannelSpec,
-    FileSpec,
-    LogImuSpec,
-    OriginSpec,
-    RecordedSpec,
-    dimension,
-)
-from simnav.log.table import LogError, LogWarning, Table, check_ascending, read_csv
+from simnav.log.files import FileSpec
+from simnav.log.reader import READERS
+from simnav.log.spec import ChannelSpec, LogImuSpec, OriginSpec, RecordedSpec
+from simnav.log.table import LogError, LogWarning, Table, check_ascending
+from simnav.log.units import DIMENSIONS, LOG_UNITS, dimension
 from simnav.types import KINDS, Array
 
 __all__ = ["ImuSeries", "Series", "geodetic_from_local", "list_recordings", "locate", "read_channel", "read_imu"]
@@ -171,55 +164,19 @@ def _offset(spec: RecordedSpec, file: FileSpec, recording: str) -> float:
 def _open(
     spec: RecordedSpec, key: str, recording: str, sentence: str | None = None, talker: str | None = None
 ) -> tuple[Table, Array, NDArray[np.int64]]:
-    """Table without the rows of ``skip_rows``, times of its rows, and the rows that count."""
+    """Table, times of its rows on the clock of the log, and the rows that count."""
     file = spec.files[key]
-    path = locate(spec, file, recording)
-    if file.format == "nmea":
-        table = read_nmea(path).table(sentence or "", talker)
-        column: str = file.clock
-        time = table.column(column)[1]
-        if np.isnan(time[-1]):
-            raise LogError(f"{table.source}, line {table.line[-1]}: no {file.clock} time; use the other 'clock'")
-        rows = _without_bursts(time, np.flatnonzero(np.isfinite(time)), table)
+    reader = READERS.get(file.format)
+    assert reader is not None  # `RecordedSpec`
+    found = reader.read(locate(spec, file, recording), file, sentence, talker)
+    table = found.table
+    counts = np.arange(len(table)) if found.counts is None else found.counts
+    check_ascending(found.time[counts], Table(table.source, {}, table.line[counts]), found.clock)
+    if file.spacing is not None:
+        stamps = np.arange(found.first, found.first + len(table)) * file.spacing
     else:
-        table = read_csv(path, file.comment)
-        if len(table) <= file.skip_rows:
-            raise LogError(f"{table.source}: {len(table)} rows, of which skip_rows = {file.skip_rows} leaves none")
-        table = table.without_first(file.skip_rows)  # before anything is taken for a number: it may be a row of units
-        rows = np.arange(len(table))
-        _, column = table.resolve(file.time)
-        time = _csv_time(table, file, column)
-    check_ascending(time[rows], Table(table.source, {}, table.line[rows]), column)
-    first = file.skip_rows if file.format == "csv" else 0
-    stamps = np.arange(first, first + len(table)) * file.spacing if file.spacing is not None else time * file.scale
-    return table, np.asarray(stamps + _offset(spec, file, recording), dtype=np.float64), rows
-
-
-def _without_bursts(time: Array, rows: NDArray[np.int64], table: Table) -> NDArray[np.int64]:
-    """Leave out the few sentences that a logger stamped together with the one before."""
-    late = np.flatnonzero(~(np.diff(time[rows]) > 0.0)) + 1
-    if late.size and late.size <= 0.1 * len(rows) and np.all(np.diff(time[rows]) >= 0.0):
-        first = table.line[rows[late[0]]]
-        message = f"{late.size} sentences at the time of the one before are left out, the first is line {first}"
-        warnings.warn(f"{table.source}: {message}", LogWarning, 2)
-        return np.delete(rows, late)
-    return rows
-
-
-def _csv_time(table: Table, file: FileSpec, column: str) -> Array:
-    if file.time_unit != "iso":
-        sign, values = table.column(file.time)
-        return sign * values * LOG_UNITS[file.time_unit]
-    moments = np.empty(len(table))
-    for k, cell in enumerate(table.columns[column]):
-        try:
-            moments[k] = utc_seconds(str(cell))
-        except ValueError:
-            raise LogError(
-                f"{table.source}, line {table.line[k]}, column {column!r}: {cell!r} is not a date like "
-                f"2014-08-01T00:00:00.124Z"
-            ) from None
-    return moments
+        stamps = found.time * file.scale
+    return table, np.asarray(stamps + _offset(spec, file, recording), dtype=np.float64), counts
 
 
 def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording: str) -> Series:

@@ -13,16 +13,19 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from simnav.log.table import LogError, LogWarning, Table
+from simnav.log.files import FileSpec
+from simnav.log.reader import Rows, register_reader
+from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.spec import closest
+from simnav.types import Array
 
-__all__ = ["SENTENCES", "NmeaFile", "read_nmea", "utc_seconds"]
+__all__ = ["SENTENCES", "NmeaFile", "read_nmea"]
 
 _DEG = math.pi / 180.0
 _KNOT = 1852.0 / 3600.0
@@ -262,6 +265,26 @@ class NmeaFile:
         return self.tables[found[0]]
 
 
+@register_reader("nmea", title="NMEA", sentences=True, inertial=False)
+def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -> Rows:
+    table = read_nmea(path).table(sentence or "", talker)
+    time = table.column(file.clock)[1]
+    if np.isnan(time[-1]):
+        raise LogError(f"{table.source}, line {table.line[-1]}: no {file.clock} time; use the other 'clock'")
+    return Rows(table, time, file.clock, _without_bursts(time, np.flatnonzero(np.isfinite(time)), table))
+
+
+def _without_bursts(time: Array, rows: NDArray[np.int64], table: Table) -> NDArray[np.int64]:
+    """Leave out the few sentences that a logger stamped together with the one before."""
+    late = np.flatnonzero(~(np.diff(time[rows]) > 0.0)) + 1
+    if late.size and late.size <= 0.1 * len(rows) and np.all(np.diff(time[rows]) >= 0.0):
+        first = table.line[rows[late[0]]]
+        message = f"{late.size} sentences at the time of the one before are left out, the first is line {first}"
+        warnings.warn(f"{table.source}: {message}", LogWarning, 2)
+        return np.delete(rows, late)
+    return rows
+
+
 def read_nmea(path: Path) -> NmeaFile:
     """Read an NMEA log; kept for the life of the process, as long as the file does not change.
 
@@ -289,18 +312,6 @@ def _checksum_ok(body: str, given: str) -> bool:
         return total == int(given[:2], 16)
     except ValueError:
         return False
-
-
-def utc_seconds(text: str) -> float:
-    """Seconds since 1970 of a date like ``2014-08-01T00:00:00.124Z``; UTC where it names no zone.
-
-    Raises
-    ------
-    ValueError
-        If it is not one.
-    """
-    moment = datetime.fromisoformat(text.strip())
-    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 def _stamp(text: str) -> float:

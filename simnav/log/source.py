@@ -25,6 +25,7 @@ from simnav.world.initial_state import draw_start
 if TYPE_CHECKING:
     from simnav.log.spec import RecordedSpec
     from simnav.scenario import Scenario
+    from simnav.world import Surroundings
 
 __all__ = ["LogSource"]
 
@@ -92,7 +93,7 @@ class LogSource:
         true_start, made = _start(reference, self.initial_truth, imu, begin)
         if made:
             notes.append(f"start {' and '.join(made)} not from the reference")
-        self._aids = self._measure(scenario, log, root)
+        self._aids = self._measure(scenario, log, root, scenario.surround(seed))
         simulated = [n for n, i in log.instruments.items() if i.source == "reference"]
         if simulated:
             notes.append(f"simulated from the reference: {', '.join(simulated)}")
@@ -124,7 +125,9 @@ class LogSource:
     def _states(self, time: Array) -> NavigationStates:
         return replace(self._reference.states(self._begin + time), time=time)
 
-    def _measure(self, scenario: Scenario, log: RecordedSpec, seed: int) -> dict[str, AidStream]:
+    def _measure(
+        self, scenario: Scenario, log: RecordedSpec, seed: int, surroundings: Surroundings
+    ) -> dict[str, AidStream]:
         """The streams of all aiding instruments, without faults."""
         streams = {}
         for name, spec in scenario.aids.items():
@@ -138,7 +141,7 @@ class LogSource:
                     tap = replace(self._reference.taps(self._begin + time), time=time)
                 except ValueError as error:
                     raise LogError(f"instruments.{name}: {error}") from None
-                streams[name] = spec.actual().build(name, seed, water_depth=scenario.water_depth).sense(tap)
+                streams[name] = spec.actual().install(name, seed, surroundings).sense(tap)
                 continue
             series = read_channel(log, where.channel(), spec.kind, self.recording)
             time = series.time - self._begin

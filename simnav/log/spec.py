@@ -6,17 +6,16 @@ unit; the IMU, the aiding instruments and the reference are channels. Nothing he
 
 from __future__ import annotations
 
-from collections import ChainMap
-from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from simnav.spec import UNITS, NonNegative, Positive, Spec, Vector, closest, quantity
+from simnav.log.files import Column, FileSpec
+from simnav.log.reader import READERS
+from simnav.log.units import check_dimension, check_units
+from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity
 
 __all__ = [
-    "DIMENSIONS",
-    "LOG_UNITS",
     "ChannelSpec",
     "FileSpec",
     "LogImuSpec",
@@ -24,90 +23,9 @@ __all__ = [
     "OriginSpec",
     "RecordedSpec",
     "ReferenceSpec",
-    "dimension",
 ]
 
-#: Factor to SI of every unit that a column of a log may have: those of TOML keys, and some that only logs have.
-LOG_UNITS: Mapping[str, float] = ChainMap(
-    {
-        "1": 1.0,
-        "rad": 1.0,
-        "rad_s": 1.0,
-        "ft": 0.3048,
-        "km_h": 1.0 / 3.6,
-        "ms": 1e-3,
-        "us": 1e-6,
-        "ns": 1e-9,
-    },
-    UNITS,
-)
-
-#: Units by what they measure, for those that a column may well have.
-DIMENSIONS: Mapping[str, tuple[str, ...]] = {
-    "length": ("m", "mm", "cm", "km", "ft"),
-    "speed": ("m_s", "mm_s", "cm_s", "kn", "km_h"),
-    "acceleration": ("m_s2", "g", "mg", "ug"),
-    "angle": ("deg", "rad", "arcsec"),
-    "angular rate": ("deg_s", "rad_s", "deg_min", "deg_h"),
-    "time": ("s", "ms", "us", "ns", "min", "h"),
-}
-
-
-def dimension(unit: str) -> str:
-    """What a unit measures: a key of `DIMENSIONS`, or empty where none of them."""
-    return next((name for name, units in DIMENSIONS.items() if unit in units), "")
-
-
-#: A column: its header, or its number counted from 1; a minus before it flips the sign; ``"=0.0"`` is a constant.
-Column = int | str
 _Every = Annotated[int, Field(ge=1)]
-
-
-class FileSpec(Spec):
-    """One file of a recording, and its clock.
-
-    Attributes
-    ----------
-    path : str
-        Below the folder; ``{recording}`` stands for the recording's name.
-    format : {"csv", "nmea"}
-        ``csv`` is any table of numbers, with or without a header, separated by comma, semicolon, tab or blank.
-    time : int or str
-        CSV: the column of the time.
-    time_unit : str
-        CSV: unit of the time column, or ``iso`` for dates like ``2014-08-01T00:00:00.124Z``.
-    clock : {"logger", "sentence"}
-        NMEA: the stamp that the logger put before each line, or the UTC time inside the sentence (a sentence without
-        one has that of the last sentence before it in the file that has one).
-    spacing : float or None
-        True spacing of the rows [s], where the time column is not to be trusted: row k is at k times this.
-    scale : float
-        Multiplies the times.
-    offset : float or tuple of float
-        Added to the times, after ``scale`` or ``spacing`` [s]; one for each recording, or one for all.
-    skip_rows : int
-        CSV: rows after the header to leave out at the beginning, for example one of units.
-    comment : str
-        CSV: lines that begin with it are left out, wherever they stand.
-    """
-
-    path: str
-    format: Literal["csv", "nmea"] = "csv"
-    time: Column = 1
-    time_unit: str = "s"
-    clock: Literal["logger", "sentence"] = "logger"
-    spacing: Positive | None = quantity("s", None)
-    scale: Positive = 1.0
-    offset: float | tuple[float, ...] = quantity("s", 0.0)
-    skip_rows: Annotated[int, Field(ge=0)] = 0
-    comment: str = ""
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.time_unit != "iso":
-            _check_units((self.time_unit,))
-            _check_dimension("time_unit", self.time_unit, "time")
-        return self
 
 
 class ChannelSpec(Spec):
@@ -144,7 +62,7 @@ class ChannelSpec(Spec):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_units((self.units,) if isinstance(self.units, str) else self.units)
+        check_units((self.units,) if isinstance(self.units, str) else self.units)
         if isinstance(self.units, tuple) and len(self.units) not in (0, len(self.columns)):
             raise ValueError(
                 f"{len(self.units)} units for {len(self.columns)} columns; give one unit, or one for each column"
@@ -217,10 +135,10 @@ class LogImuSpec(Spec):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_units((self.angular_rate_unit, self.specific_force_unit))
+        check_units((self.angular_rate_unit, self.specific_force_unit))
         increments = self.samples == "increments"  # "rad_s" and "m_s2" are the defaults, and in SI like "rad" and "m_s"
-        _check_dimension("angular_rate_unit", self.angular_rate_unit, "angular rate", *["angle"] * increments)
-        _check_dimension("specific_force_unit", self.specific_force_unit, "acceleration", *["speed"] * increments)
+        check_dimension("angular_rate_unit", self.angular_rate_unit, "angular rate", *["angle"] * increments)
+        check_dimension("specific_force_unit", self.specific_force_unit, "acceleration", *["speed"] * increments)
         return self
 
 
@@ -307,17 +225,22 @@ class RecordedSpec(Spec):
         ]
         if self.imu is not None:
             channels.append(("imu", self.imu))
+        for key, file in self.files.items():
+            if READERS.get(file.format) is None:
+                near = closest(file.format, list(READERS.items()))
+                raise ValueError(f"files.{key}.format = {file.format!r} is unknown{near}")
         for name, channel in channels:
             if channel.file not in self.files:
                 raise ValueError(f"{name}.file = {channel.file!r} is not in [log.files]{_near(channel.file, self)}")
+            reader = READERS.get(self.files[channel.file].format)
+            assert reader is not None
             if isinstance(channel, LogImuSpec):
-                if self.files[channel.file].format == "nmea":
-                    raise ValueError(f"{name}.file = {channel.file!r} is NMEA; an IMU needs a table (csv)")
+                if not reader.inertial:
+                    raise ValueError(f"{name}.file = {channel.file!r} is {reader.title}; an IMU needs a table (csv)")
                 continue
-            nmea = self.files[channel.file].format == "nmea"
-            if nmea and channel.sentence is None:
-                raise ValueError(f"{name}: the file {channel.file!r} is NMEA; say which 'sentence'")
-            if not nmea and not channel.columns:
+            if reader.sentences and channel.sentence is None:
+                raise ValueError(f"{name}: the file {channel.file!r} is {reader.title}; say which 'sentence'")
+            if not reader.sentences and not channel.columns:
                 raise ValueError(f"{name}: 'columns' is missing")
             if channel.frame != "geodetic" and self.origin is None:
                 raise ValueError(f"{name}.frame = {channel.frame!r} needs [log.origin]")
@@ -330,16 +253,3 @@ class RecordedSpec(Spec):
 
 def _near(name: str, spec: RecordedSpec) -> str:
     return closest(name, list(spec.files))
-
-
-def _check_dimension(key: str, unit: str, *wanted: str) -> None:
-    """ValueError where a unit is of none of these dimensions; "1" is SI and always fits."""
-    if unit != "1" and dimension(unit) not in wanted:
-        known = ", ".join(name for dimension in wanted for name in DIMENSIONS[dimension])
-        raise ValueError(f"{key} = {unit!r} is no unit of {' or '.join(wanted)} ({known})")
-
-
-def _check_units(units: tuple[str, ...]) -> None:
-    for unit in units:
-        if unit not in LOG_UNITS:
-            raise ValueError(f"unknown unit {unit!r}{closest(unit, list(LOG_UNITS))}")

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from simnav.scenario.catalogue import Header, headers
+    from simnav.scenario.description import TRAINING_ROOT, Dial, InitialError
     from simnav.scenario.reading import load, names, parse
-    from simnav.scenario.scenario import TRAINING_ROOT, Dial, InitialError, Scenario
+    from simnav.scenario.scenario import Scenario
 
 __all__ = ["TRAINING_ROOT", "Dial", "Header", "InitialError", "Scenario", "headers", "load", "names", "parse"]
 
@@ -21,7 +22,8 @@ __all__ = ["TRAINING_ROOT", "Dial", "Header", "InitialError", "Scenario", "heade
 _HOMES = {
     "catalogue": ("Header", "headers"),
     "reading": ("load", "names", "parse"),
-    "scenario": ("TRAINING_ROOT", "Dial", "InitialError", "Scenario"),
+    "description": ("TRAINING_ROOT", "Dial", "InitialError"),
+    "scenario": ("Scenario",),
 }
 
 

@@ -3,34 +3,30 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from simnav.log.spec import RecordedSpec
 from simnav.scenario.catalogue import NAME
+from simnav.scenario.description import SMALLEST, Description
 from simnav.sensors import ImuSpec
 from simnav.spec import SpecError, closest
 from simnav.types import KINDS
-from simnav.world import Vessel
+from simnav.world.surroundings import OWN_PARTS
 
-if TYPE_CHECKING:
-    from simnav.scenario.scenario import Scenario
-
-__all__ = ["LONGEST", "SMALLEST", "check"]
+__all__ = ["check"]
 
 #: Largest number of intervals of faults: the labels of a measurement have 32 bits, one for each interval.
 _MOST_BITS = 32
 
-#: Longest run [s] and highest rate of an instrument [Hz]. The limits catch mistakes that would fill the memory.
-LONGEST, _FASTEST = 1e7, 1e5
+#: Highest rate of an instrument [Hz]. The limit catches mistakes that would fill the memory.
+_FASTEST = 1e5
 #: Highest speed of a vessel and of a current [m/s].
 _HIGHEST_SPEED = 1e3
-#: Smallest magnitude of a number other than 0: its square and the inverse of its square are numbers, too.
-SMALLEST = 1e-150
 
 _INSTRUMENT = re.compile(r"[a-z][a-z0-9_]*")
 
 
-def check(s: Scenario) -> None:
+def check(s: Description) -> None:
     """Check that the parts of a scenario fit together.
 
     Raises
@@ -46,6 +42,7 @@ def check(s: Scenario) -> None:
     for key, parts in (("manoeuvre", s.manoeuvres), ("fault", s.faults)):
         for k, part in enumerate(parts):
             _check_no_subnormal(f"{key}[{k}]", part.model_dump())
+    _check_surroundings(s)
     if s.log is None:
         _check_world(s)
     else:
@@ -53,7 +50,7 @@ def check(s: Scenario) -> None:
     _check_faults(s)
 
 
-def _check_head(s: Scenario) -> None:
+def _check_head(s: Description) -> None:
     if not NAME.fullmatch(s.name) or re.search(r"-v\d+$", s.name):
         raise ValueError(f"name = {s.name!r} should be in kebab-case and without a version, like 'coastal-voyage'")
     if not NAME.fullmatch(s.track):
@@ -67,7 +64,7 @@ def _check_head(s: Scenario) -> None:
         )
 
 
-def _check_instruments(s: Scenario) -> None:
+def _check_instruments(s: Description) -> None:
     if not s.instruments:
         raise ValueError("there is no instrument; add at least one table [instruments.NAME]")
     for name, spec in s.instruments.items():
@@ -84,6 +81,16 @@ def _check_instruments(s: Scenario) -> None:
             raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
 
 
+def _check_surroundings(s: Description) -> None:
+    for name, spec in s.surroundings.items():
+        if not _INSTRUMENT.fullmatch(name):
+            raise ValueError(f"surroundings.{name}: a name is of lower-case letters, digits and underscores")
+        own = {"sea": s.sea, "current": s.current, "bottom": s.water_depth}.get(name)
+        if own is not None:
+            raise ValueError(f"surroundings.{name}: {OWN_PARTS[name]} says the same; leave out one of both")
+        _check_no_subnormal(f"surroundings.{name}", spec.model_dump())
+
+
 def _check_no_subnormal(where: str, value: Any) -> None:
     """Refuse numbers so close to zero that a division by them overflows."""
     if isinstance(value, dict):
@@ -96,7 +103,7 @@ def _check_no_subnormal(where: str, value: Any) -> None:
         raise ValueError(f"{where} = {value:g} (in SI units): should be 0, or at least {SMALLEST:g}")
 
 
-def _check_speeds(s: Scenario) -> None:
+def _check_speeds(s: Description) -> None:
     """Refuse speeds above `_HIGHEST_SPEED`, at which the truth might not be finite."""
     speeds = {f"manoeuvre {k} ({m.kind}).speed_m_s": getattr(m, "speed", 0.0) for k, m in enumerate(s.manoeuvres, 1)}
     speeds |= {"start.speed_m_s": getattr(s.start, "speed", 0.0), "current.speed_m_s": getattr(s.current, "speed", 0.0)}
@@ -105,31 +112,25 @@ def _check_speeds(s: Scenario) -> None:
             raise ValueError(f"{key} = {speed:g}: should be at most {_HIGHEST_SPEED:g}")
 
 
-def _check_world(s: Scenario) -> None:
+def _check_world(s: Description) -> None:
     """Check a simulated run: start and manoeuvres fit the vessel and the water."""
-    if s.start is None:
-        raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
     if s.imu is not None and abs(s.step * s.imu.rate - round(s.step * s.imu.rate)) > 1e-6:
         raise ValueError(
             f"step_s = {s.step:g} should be a multiple of the IMU's sample interval, 1 / {s.imu.rate:g} Hz"
         )
     _check_speeds(s)
-    vessel = s.vessel or Vessel()
-    depth = -s.start.altitude
-    if vessel.kind == "ship" and depth > 0.0:
-        raise ValueError(f"start.depth_m = {depth:g}: a ship floats; say vessel.kind = 'uuv' for a submerged vehicle")
+    s.craft.check(s.start, s.manoeuvres, tuple(s.surroundings))
+    depth = 0.0 if s.start is None else -s.start.altitude
     if s.water_depth is not None and depth >= s.water_depth:
         raise ValueError(f"start.depth_m = {depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}")
     for i, m in enumerate(s.manoeuvres):
-        if vessel.kind == "ship" and m.kind in ("dive", "surface"):
-            raise ValueError(f"manoeuvre[{i}].kind = {m.kind!r}: a ship cannot; say vessel.kind = 'uuv'")
         if m.kind == "dive" and s.water_depth is not None and m.depth >= s.water_depth:
             raise ValueError(
                 f"manoeuvre[{i}].depth_m = {m.depth:g} is below the sea bed, water_depth_m = {s.water_depth:g}"
             )
 
 
-def _check_log(s: Scenario, log: RecordedSpec) -> None:
+def _check_log(s: Description, log: RecordedSpec) -> None:
     """Check a recorded run: it has no world, and a source for every instrument."""
     for key in ("start", "vessel", "manoeuvres", "sea", "current", "world_seed"):
         if getattr(s, key):
@@ -147,7 +148,7 @@ def _check_log(s: Scenario, log: RecordedSpec) -> None:
         raise ValueError(f"[{there}] needs [{missing}] beside it")
 
 
-def _check_faults(s: Scenario) -> None:
+def _check_faults(s: Description) -> None:
     kinds = {name: spec.kind for name, spec in s.aids.items()}
     for i, fault in enumerate(s.faults):
         try:

@@ -36,7 +36,7 @@ class MagneticCompass(AidSpec):
     fixed_bias: float = quantity("deg", 0.0)
     fixed_deviation: tuple[float, float] = quantity("deg", (0.0, 0.0))
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
         return _MagneticCompass(self, name, seed)
 
@@ -67,7 +67,7 @@ class Gyrocompass(AidSpec):
     speed_error: bool = False
     fixed_bias: float = quantity("deg", 0.0)
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
         return _Gyrocompass(self, name, seed)
 

@@ -34,7 +34,7 @@ class Depth(AidSpec):
     fixed_bias: float = quantity("m", 0.0)
     fixed_scale: float = quantity("percent", 0.0)
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
         return _Depth(self, name, seed)
 

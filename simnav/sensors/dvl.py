@@ -6,8 +6,10 @@ from math import inf
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav import kinds
+from simnav.geometry.earth import displace
 from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import Kind, speed_components
 from simnav.sensors.instrument import (
@@ -28,6 +30,8 @@ from simnav.sensors.observation import (
     CompiledInstrument,
 )
 from simnav.spec import NonNegative, Positive, Vector, quantity
+from simnav.types import Array, TapStates
+from simnav.world.surroundings import FlatBottom, Surroundings
 
 __all__ = ["Dvl"]
 
@@ -53,7 +57,7 @@ class Dvl(AidSpec):
     instrument's axes are turned from the body axes by the rotation vector eta, with the rotation matrix R(eta); to
     first order R(eta)' u = u - eta x u. The white noise of a ping has the variance sigma^2 + (speed_noise |u|)^2; the
     datasheet gives sigma. The DVL has bottom lock while the altitude of the transducer is between ``minimum_altitude``
-    and ``maximum_altitude``; without a water depth it always has.
+    and ``maximum_altitude``; without a bottom (`simnav.world.surroundings`) it always has.
     """
 
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "speed_noise")
@@ -72,20 +76,35 @@ class Dvl(AidSpec):
     fixed_scale: float = quantity("percent", 0.0)
     fixed_misalignment: Vector = quantity("deg", ZERO)
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
-        return _Dvl(self, name, seed, water_depth)
+        return _Dvl(self, name, seed)
 
 
 class _Dvl(CompiledInstrument):
     code = BODY_VELOCITY
 
-    def __init__(self, spec: Dvl, name: str, seed: int, water_depth: float | None):
+    def __init__(self, spec: Dvl, name: str, seed: int):
         super().__init__(spec, name, seed)
         turn = self.drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
         self.misalignment = turn
         self.numbers[OWN : OWN + 9] = ((1.0 + self.scale) * dcm_from_rotation_vector(turn).T).ravel()
         self.numbers[SPEED_NOISE_SQUARED] = spec.speed_noise**2
-        if water_depth is not None:
-            self.numbers[DEPTH_OF_WATER] = water_depth
-            self.numbers[LOWEST], self.numbers[HIGHEST] = spec.minimum_altitude, spec.maximum_altitude
+        self.numbers[LOWEST], self.numbers[HIGHEST] = spec.minimum_altitude, spec.maximum_altitude
+
+    def enter(self, surroundings: Surroundings) -> None:
+        """See `Instrument.enter`. The kernel knows a flat bottom; any other bottom is asked here."""
+        super().enter(surroundings)
+        bottom = surroundings.get("bottom")
+        self.in_kernel = bottom is None or isinstance(bottom, FlatBottom)
+        if isinstance(bottom, FlatBottom):
+            self.numbers[DEPTH_OF_WATER] = bottom.water_depth
+
+    def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+        """See `Instrument.reading`."""
+        value, sigma, there = super().reading(tap)
+        if not self.in_kernel:
+            place = displace(tap.position, self.lever_displacement(tap))
+            altitude = place[:, 2] + self.surroundings["bottom"].depth(place, tap.time)
+            there = (self.numbers[LOWEST] <= altitude) & (altitude <= self.numbers[HIGHEST])
+        return value, sigma, there

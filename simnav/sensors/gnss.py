@@ -44,7 +44,7 @@ class GnssPosition(AidSpec):
     lever_arm: Vector = quantity("m", ZERO)
     fixed_bias: Triple = quantity("m", ZERO)
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
         return _Position(self, name, seed)
 
@@ -77,7 +77,7 @@ class GnssVelocity(AidSpec):
     lever_arm: Vector = quantity("m", ZERO)
     fixed_bias: Triple = quantity("m_s", ZERO)
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
         return _Velocity(self, name, seed)
 

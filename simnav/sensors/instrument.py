@@ -45,6 +45,7 @@ from simnav.spec import (
 )
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
+from simnav.world.surroundings import Surroundings
 
 __all__ = [
     "ZERO",
@@ -248,7 +249,7 @@ class AidSpec(Spec):
             {detail: getattr(self, detail) for detail in self.definition.datasheet},
         )
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """Make the instrument of one run.
 
         Parameters
@@ -257,10 +258,25 @@ class AidSpec(Spec):
             Name of the instrument in its scenario; its random streams are named after it.
         seed : int
             Seed of the run.
-        water_depth : float, optional
-            Depth of the bottom below the mean sea surface [m], for instruments that need it.
         """
         raise NotImplementedError(f"{type(self).__qualname__} has no build()")
+
+    def install(self, name: str, seed: int, surroundings: Surroundings) -> Instrument:
+        """Make the instrument of one run by `build`, and put it into the surroundings of the run.
+
+        Raises
+        ------
+        InstrumentError
+            If the instrument cannot be made, or the surroundings lack a part that it needs.
+        """
+        instrument = self.build(name, seed)
+        try:
+            instrument.enter(surroundings)
+        except (InstrumentError, MemoryError):
+            raise
+        except Exception as error:
+            raise _raised(_label(name, self.kind, type(self)), type(instrument), error) from error
+        return instrument
 
 
 S = TypeVar("S", bound=AidSpec)
@@ -339,16 +355,16 @@ def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
     """Wrap ``build`` of a specification, so that its errors name the instrument."""
 
     @wraps(build)
-    def named(self: AidSpec, name: str, seed: int, **rest: Any) -> Instrument:
-        label = _label(name, self.kind, type(self))
+    def named(self: AidSpec, name: str, seed: int) -> Instrument:
+        label = partial(_label, name, self.kind, type(self))  # late: it reads the source of the class
         try:
-            made = build(self, name, seed, **rest)
+            made = build(self, name, seed)
         except (InstrumentError, MemoryError):
             raise
         except Exception as error:
-            raise _raised(label, type(self), error) from error
+            raise _raised(label(), type(self), error) from error
         if not isinstance(made, Instrument):
-            raise InstrumentError(f"{label}: build() returned {type(made).__name__}, where an Instrument is wanted")
+            raise InstrumentError(f"{label()}: build() returned {type(made).__name__}, where an Instrument is wanted")
         return made
 
     return named
@@ -378,7 +394,11 @@ class Instrument(ABC):
         Vector from the IMU to the instrument in body axes (forward, starboard, down) [m].
     levered : bool
         True if the lever arm is not zero.
+    surroundings : Surroundings
+        Sea, current, bottom and other parts, which the instrument may ask at its places and times (`enter`).
     """
+
+    surroundings: Surroundings = Surroundings()
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
         self.name, self.kind, self.definition = name, spec.kind, spec.definition
@@ -400,6 +420,10 @@ class Instrument(ABC):
         if not sigma.any():
             return np.zeros(len(sigma))
         return sigma * stream(self._seed, "instrument", self.name, process).standard_normal(len(sigma))
+
+    def enter(self, surroundings: Surroundings) -> None:
+        """Enter the surroundings of the run, before the first measurement. An override calls this one first."""
+        self.surroundings = surroundings
 
     @abstractmethod
     def observe(self, tap: TapStates) -> Array:

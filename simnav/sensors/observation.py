@@ -174,9 +174,13 @@ class CompiledInstrument(Instrument):
         Code of the observed quantity.
     numbers : (24,) array
         Parameters of the instrument, in the order of `NUMBERS`.
+    in_kernel : bool
+        Whether the kernel alone computes the readings. False: the instrument also asks its surroundings, and runs step
+        by step call it in the block form.
     """
 
     code: ClassVar[int]
+    in_kernel: bool = True
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
         super().__init__(spec, name, seed)

@@ -33,7 +33,7 @@ class SpeedLog(AidSpec):
     fixed_bias: float = quantity("m_s", 0.0)
     fixed_scale: float = quantity("percent", 0.0)
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
         return _SpeedLog(self, name, seed)
 

@@ -30,7 +30,7 @@ class TerrainFix(AidSpec):
     lever_arm: Vector = quantity("m", ZERO)
     fixed_bias: Pair = quantity("m", (0.0, 0.0))
 
-    def build(self, name: str, seed: int, *, water_depth: float | None = None) -> Instrument:
+    def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
         return _TerrainFix(self, name, seed)
 

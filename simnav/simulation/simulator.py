@@ -1,8 +1,8 @@
 """The simulator: it makes the recording of a scenario and a seed, in one block or step by step.
 
-A `Simulator` is a state machine. The world, the errors of the instruments and the faults keep their state
-from block to block and draw a fixed number of variates for each sample, so that one long block and many short ones give
-the same numbers.
+A `Simulator` is a state machine. The vessel's trajectory, the errors of the instruments and the faults keep their
+state from block to block and draw a fixed number of variates for each sample, so that one long block and many short
+ones give the same numbers.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from simnav.scenario import Scenario
 from simnav.sensors.faults import build_layers, labels
 from simnav.spec import SpecError
 from simnav.types import Array, InitialState, NavigationStates
-from simnav.world import Vessel, World, WorldBlock
+from simnav.world import Steered, Surroundings, Trajectory, WorldBlock
 from simnav.world.initial_state import draw_start
 
 __all__ = ["TIME_TOLERANCE", "Simulator", "ideal", "sample_times", "simulate", "simulate_many"]
@@ -55,8 +55,7 @@ def sample_times(rate: float, phase: float, start: float, end: float) -> Array:
     return phase + np.arange(first, last + 1) / rate
 
 
-def _world(scenario: Scenario, seed: int) -> World:
-    assert scenario.start is not None  # a simulated scenario has one
+def _trajectory(scenario: Scenario, seed: int, surroundings: Surroundings) -> Trajectory:
     imu = scenario.imu
     rate = _RATE_WITHOUT_IMU if imu is None else imu.rate
     if abs(rate * scenario.step - round(rate * scenario.step)) > 1e-6:
@@ -64,15 +63,7 @@ def _world(scenario: Scenario, seed: int) -> World:
             f"{scenario.id}: step_s = {scenario.step:g} should be a multiple of the sample interval of the IMU, "
             f"{1.0 / rate:g} s"
         )
-    return World(
-        scenario.start,
-        scenario.vessel or Vessel(),
-        scenario.manoeuvres,
-        scenario.sea,
-        scenario.current,
-        rate=rate,
-        seed=scenario.root(seed) if scenario.world_seed is None else scenario.world_seed,
-    )
+    return scenario.craft.trajectory(scenario.voyage(seed, surroundings, rate))
 
 
 class Simulator:
@@ -107,6 +98,8 @@ class Simulator:
         Empty. For a log it is the name of the recording.
     imu, aids, layers : Imu or None, dict of str to Instrument, tuple of FaultLayer
         The IMU, the aiding instruments by name, and the faults.
+    surroundings : Surroundings
+        Sea, current, bottom and other parts of this run.
 
     Raises
     ------
@@ -122,33 +115,40 @@ class Simulator:
         self.draws = scenario.draws
         self.duration, self.step, self.time = scenario.duration, scenario.step, 0.0
         self.instruments = scenario.instruments_sheet()
+        self.surroundings = scenario.surround(seed)
         self._truth = None if truth is None else truth[1]
-        self._world = _world(scenario, seed) if truth is None else None
-        self.initial_truth = self._world.state() if truth is None else truth[0]  # type: ignore[union-attr]
+        self._trajectory = _trajectory(scenario, seed, self.surroundings) if truth is None else None
+        self.initial_truth = self._trajectory.state() if truth is None else truth[0]  # type: ignore[union-attr]
         root = scenario.root(seed)
         self.start = draw_start(
             self.initial_truth, scenario.initial_error.covariance(), root, scenario.initial_error.factors()
         )
         actual = scenario.actual()
         self.imu = None if actual.imu is None else actual.imu.build(root)
-        self.aids = {
-            name: spec.build(name, root, water_depth=scenario.water_depth) for name, spec in actual.aids.items()
-        }
+        self.aids = {name: spec.install(name, root, self.surroundings) for name, spec in actual.aids.items()}
         kinds = {name: spec.kind for name, spec in scenario.aids.items()}
         self.faults = labels(scenario.faults, scenario.duration, kinds)
         self.layers = build_layers(scenario.faults, root)
         self._label_imu = any("imu" in f.instruments for f in scenario.faults)
 
     def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
-        """Closed loop: set the errors of the position [m] and heading [rad] by which the vessel is steered."""
-        self.world.steer_by(north, east, heading)
+        """Closed loop: set the errors of the position [m] and heading [rad] by which the vessel is steered.
+
+        Raises
+        ------
+        ValueError
+            If the vessel cannot be steered, or several runs share one truth.
+        """
+        if not isinstance(self.trajectory, Steered):
+            raise ValueError(f"{self.scenario.id}: a vessel of kind {self.scenario.craft.kind!r} cannot be steered")
+        self.trajectory.steer_by(north, east, heading)
 
     @property
-    def world(self) -> World:
-        """The world of the run. ValueError if several runs share one truth, because then it cannot be steered."""
-        if self._world is None:
+    def trajectory(self) -> Trajectory:
+        """The trajectory of the vessel. ValueError if several runs share one truth, which nobody may steer."""
+        if self._trajectory is None:
             raise ValueError("runs that share one truth cannot be steered")
-        return self._world
+        return self._trajectory
 
     def advance(self, until: float) -> Block:
         """Simulate the run up to a time.
@@ -165,7 +165,7 @@ class Simulator:
         """
         start, until = self.time, min(until, self.duration)
         taps = self._taps(start, until)
-        block = self._shared(taps) if self._world is None else self._world.advance(until, taps)
+        block = self._shared(taps) if self._trajectory is None else self._trajectory.advance(until, taps)
         self.time = until
         imu, imu_labels = None, None
         if self.imu is not None:
@@ -243,8 +243,7 @@ def simulate_many(scenario: Scenario, seeds: Iterable[int]) -> Iterator[Recordin
     for seed in seeds:
         if truth is None and scenario.world_seed is not None and not scenario.distributions:
             first = Simulator(scenario, seed)
-            assert first._world is not None
-            truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))
+            truth = first.initial_truth, first.trajectory.advance(first.duration, first._taps(0.0, first.duration))
         yield _recording(Simulator(scenario, seed, truth=truth))
 
 
@@ -267,8 +266,7 @@ def ideal(scenario: Scenario, seed: int) -> Recording:
     """
     scenario = scenario.drawn(seed)
     first = Simulator(scenario, seed)
-    assert first._world is not None
-    truth = first.initial_truth, first._world.advance(first.duration, first._taps(0.0, first.duration))
+    truth = first.initial_truth, first.trajectory.advance(first.duration, first._taps(0.0, first.duration))
     real = _recording(Simulator(scenario, seed, truth=truth))
     instruments = {name: spec.ideal() for name, spec in scenario.instruments.items()}
     perfect = scenario.model_copy(update={"instruments": instruments, "faults": ()})

@@ -5,7 +5,8 @@ stretch), by the classes of the block form (`Simulator.advance`), from the same 
 `simnav.world.motion.advance` and `sense`, compute all that depends on the motion, for all runs. The numbers are those
 of the block form, bit for bit.
 
-Instruments and faults of third parties have the block form only. They are called for blocks of one step.
+Vessels, instruments and faults of third parties have the block form only. A run with one of them is advanced in blocks
+of one step.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from simnav.sensors.observation import CompiledInstrument
 from simnav.sensors.stepwise import HELD, UNTOUCHED, sense, sense_imu
 from simnav.simulation.simulator import TIME_TOLERANCE, Simulator
 from simnav.types import ImuSamples, Measurement, Measurements
-from simnav.world import motion
+from simnav.world import World, motion
 
 __all__ = ["SteppedRuns"]
 
@@ -40,9 +41,9 @@ class SteppedRuns:
     Attributes
     ----------
     simulators : list of Simulator
-        The simulator of each run; its world may be steered.
+        The simulator of each run; its vessel may be steered if it can.
     x : (n, 59) array
-        States of the worlds (`simnav.world.motion`).
+        States of the worlds (`simnav.world.motion`), for runs whose trajectory is a `simnav.world.World`.
     step : (n,) int array
         Number of steps of each run so far.
     truth : (n, 9) array
@@ -86,23 +87,28 @@ class SteppedRuns:
         self.names[b], self.kinds[b] = list(aids), [a.kind for a in aids.values()]
         layers = [layer for layer in simulator.layers if layer.operation != DISTURBS_IMU]
         self._imu[b] = simulator.imu is not None
-        known = all(isinstance(a, CompiledInstrument) for a in aids.values()) and all(
-            layer.operation is not None for layer in simulator.layers
+        world = simulator.trajectory
+        known = (
+            isinstance(world, World)
+            and all(isinstance(a, CompiledInstrument) and a.in_kernel for a in aids.values())
+            and all(layer.operation is not None for layer in simulator.layers)
         )
         self._compiled[b] = known
         state = simulator.initial_truth
         self.truth[b] = np.concatenate([state.position[0], state.velocity[0], state.attitude[0]])
-        for name, array in simulator.world.share_state().items():
+        if not isinstance(world, World):
+            return
+        for name, array in world.share_state().items():
             self._put(name, b, array)
         if known:
             self._put_instruments(b, simulator, layers)
-        simulator.world.use_state(self.x[b], self.index[b])
+        world.use_state(self.x[b], self.index[b])
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         for b, simulator in enumerate(self.simulators):  # a copy no longer shares its arrays with the worlds
-            if simulator is not None:
-                simulator.world.use_state(self.x[b], self.index[b])
+            if simulator is not None and isinstance(simulator.trajectory, World):
+                simulator.trajectory.use_state(self.x[b], self.index[b])
 
     def _put(self, name: str, b: int, value: Any) -> None:
         """Store an array of run b. If it does not fit, the shared array is enlarged for all runs."""
@@ -260,7 +266,9 @@ class SteppedRuns:
         self._draw_imu(b, simulator, steps, done)
 
     def _draw_imu(self, b: int, simulator: Simulator, steps: int, done: int) -> None:
-        rate = simulator.world.rate
+        world = simulator.trajectory
+        assert isinstance(world, World)  # `begin`
+        rate = world.rate
         samples = round(rate * simulator.step)
         self._put("samples_a_step", b, samples)
         first, n = done * samples, steps * samples

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from simnav.spec import OneOf
 from simnav.world.current import Current
+from simnav.world.hulls import Ship, Uuv
 from simnav.world.manoeuvres import (
     Accelerate,
     Dive,
@@ -15,23 +19,53 @@ from simnav.world.manoeuvres import (
     ZigZag,
 )
 from simnav.world.sea import Sea
-from simnav.world.vessel import Start, Vessel
-from simnav.world.world import World, WorldBlock
+from simnav.world.start import Start
+from simnav.world.surroundings import (
+    SURROUNDINGS,
+    FlatBottom,
+    Surroundings,
+    SurroundingSpec,
+    register_surrounding,
+)
+from simnav.world.trajectory import SampledTrajectory, Steered, Trajectory, Voyage, WorldBlock
+from simnav.world.vessel import VESSELS, KinematicVessel, Vessel, register_vessel
+from simnav.world.world import World
+
+#: Any registered vessel; its ``kind`` decides the class.
+AnyVessel = Annotated[Vessel, OneOf(lambda: list(VESSELS.items().values()), default="ship")]
+#: Any registered part of the surroundings; its ``kind`` decides the class.
+AnySurrounding = Annotated[SurroundingSpec, OneOf(lambda: list(SURROUNDINGS.items().values()))]
 
 __all__ = [
+    "SURROUNDINGS",
+    "VESSELS",
     "Accelerate",
+    "AnySurrounding",
+    "AnyVessel",
     "Current",
     "Dive",
+    "FlatBottom",
     "Hold",
+    "KinematicVessel",
     "LawnMower",
     "Manoeuvre",
+    "SampledTrajectory",
     "Sea",
+    "Ship",
     "Start",
+    "Steered",
     "Surface",
+    "SurroundingSpec",
+    "Surroundings",
+    "Trajectory",
     "Turn",
+    "Uuv",
     "Vessel",
+    "Voyage",
     "Waypoints",
     "World",
     "WorldBlock",
     "ZigZag",
+    "register_surrounding",
+    "register_vessel",
 ]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from simnav.geometry.earth import relative_position
 from simnav.spec import NonNegative, Positive, Spec, quantity
 from simnav.streams import stream
 from simnav.types import Array
 
-__all__ = ["Current", "eddies"]
+__all__ = ["Current", "WaterFlow", "eddies"]
 
 #: Number of plane waves of velocity whose sum is the variable part of the current.
 _EDDIES = 8
@@ -81,3 +83,51 @@ def eddies(current: Current | None, seed: int) -> Array:
     amplitude = 2.0 * current.variation / np.sqrt(n)
     north, east = np.cos(heading), np.sin(heading)
     return np.stack([number * north, number * east, omega, phase, -amplitude * east, amplitude * north], axis=1)
+
+
+class WaterFlow:
+    """The current of one run, which can be asked at any place and time.
+
+    Parameters
+    ----------
+    current : Current
+        Its description.
+    seed : int
+        Seed of the world: it fixes the variable part.
+    origin : (3,) array
+        Geodetic position from which the phases of the variable part count: that of the start, at the surface.
+    """
+
+    def __init__(self, current: Current, seed: int, origin: Array):
+        self.current, self._seed, self._origin = current, seed, origin
+
+    @cached_property
+    def _eddies(self) -> Array:
+        return eddies(self.current, self._seed)
+
+    def velocity(self, position: Array, time: Array) -> Array:
+        """Velocity of the water.
+
+        Parameters
+        ----------
+        position : (n, 3) array
+            Latitude, longitude [rad] and height [m].
+        time : (n,) array
+            Time since the start of the run [s].
+
+        Returns
+        -------
+        (n, 3) array
+            North-east-down [m/s].
+        """
+        north, east, down = relative_position(position, self._origin).T
+        c = self.current
+        flow = np.zeros((len(time), 3))
+        flow[:, 0], flow[:, 1] = c.speed * np.cos(c.direction), c.speed * np.sin(c.direction)
+        for k_north, k_east, omega, phase, a_north, a_east in self._eddies:
+            wave = np.cos(k_north * north + k_east * east - omega * time + phase)
+            flow[:, 0] += a_north * wave
+            flow[:, 1] += a_east * wave
+        if c.speed > 0.0:  # the variable part decreases with depth like the mean
+            flow *= np.maximum(0.0, 1.0 - c.shear / c.speed * np.maximum(0.0, down))[:, None]
+        return flow

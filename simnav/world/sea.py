@@ -9,16 +9,18 @@ DNV-RP-C205 section 3.5 (spectra); T. I. Fossen, *Handbook of Marine Craft Hydro
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
+from simnav.geometry.earth import relative_position
 from simnav.spec import NonNegative, Positive, Spec, quantity
 from simnav.streams import stream
 from simnav.types import Array
 
-__all__ = ["Sea", "components", "spectrum"]
+__all__ = ["Sea", "Waves", "components", "spectrum"]
 
 _G = 9.81
 #: Rows of the component table: phase rate, wave number north and east, and cosine and sine gains of seven responses.
@@ -155,3 +157,51 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     for g in gains:
         rows += [np.real(g), np.imag(g)]
     return np.stack([np.cos(phase), np.sin(phase), omega]), np.ascontiguousarray(np.stack(rows))
+
+
+class Waves:
+    """The sea of one run, which can be asked at any place and time.
+
+    Parameters
+    ----------
+    sea : Sea
+        Its description.
+    seed : int
+        Seed of the world: it fixes the components.
+    origin : (3,) array
+        Geodetic position from which the phases count: that of the start, at the surface.
+    """
+
+    def __init__(self, sea: Sea, seed: int, origin: Array):
+        self.sea, self._seed, self._origin = sea, seed, origin
+
+    @cached_property
+    def _components(self) -> tuple[Array, Array]:
+        return components(self.sea, self._seed)
+
+    def elevation(self, position: Array, time: Array) -> Array:
+        """Elevation of the surface.
+
+        The waves travel through water at rest. A current does not carry them along here.
+
+        Parameters
+        ----------
+        position : (n, 3) array
+            Latitude, longitude [rad] and height [m]; the height does not matter.
+        time : (n,) array
+            Time since the start of the run [s].
+
+        Returns
+        -------
+        (n,) array
+            Height of the surface above the mean sea surface [m].
+        """
+        start, table = self._components
+        north, east, _ = relative_position(position, self._origin).T
+        amplitude = np.sqrt(2.0 * self.sea.significant_height**2 / 16.0 / max(table.shape[1], 1))
+        elevation = np.zeros(len(time))
+        for k in range(table.shape[1]):
+            phase = np.arctan2(start[1, k], start[0, k])
+            elevation += np.cos(table[0, k] * time - table[1, k] * north - table[2, k] * east + phase)
+        elevation *= amplitude
+        return elevation

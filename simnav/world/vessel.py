@@ -1,61 +1,148 @@
-"""The vessel: its initial state and its response to commands."""
+"""Vessels: what a kind of vessel declares, the registry of kinds, and the response of a hull to its commands.
+
+A vessel is a specification that makes the trajectory of a run. `register_vessel` registers a kind of vessel, of simnav
+(`simnav.world.hulls`) or of a third party (``docs/how-to/add-a-vessel.md``).
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Callable, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from simnav.spec import NonNegative, Positive, Spec, quantity
+from simnav.plugins import PluginError, Registry, exception_of, place_of
+from simnav.spec import NonNegative, Positive, Spec, SpecError, hidden_attribute, quantity
+from simnav.world.manoeuvres import Manoeuvre
+from simnav.world.start import Start
+from simnav.world.trajectory import Trajectory, Voyage
 
-__all__ = ["Start", "Vessel"]
+__all__ = ["VESSELS", "KinematicVessel", "Vessel", "VesselError", "register_vessel"]
 
 _HALF_PI = 1.5707963267948966
 
 
-class Start(Spec):
-    """State of the vessel at time 0, on an even keel.
-
-    Attributes
-    ----------
-    latitude, longitude : float
-        Geodetic latitude and longitude [rad].
-    height : float
-        Height of the vessel's reference point above the ellipsoid [m]; the sea surface is at 0.
-    depth : float
-        Depth of the reference point, positive down [m]; instead of ``height``.
-    heading : float
-        Direction of the bow, clockwise from north [rad].
-    speed : float
-        Speed through the water [m/s].
-    """
-
-    latitude: Annotated[float, Field(gt=-1.5533, lt=1.5533)] = quantity("deg")
-    longitude: Annotated[float, Field(ge=-3.1416, le=3.1416)] = quantity("deg")
-    height: float = quantity("m", 0.0)
-    depth: float | None = quantity("m", None)
-    heading: Annotated[float, Field(ge=-6.2832, le=6.2832)] = quantity("deg", 0.0)
-    speed: NonNegative = quantity("m_s", 0.0)
-
-    @model_validator(mode="after")
-    def _one_of_height_and_depth(self) -> Self:
-        if self.depth is not None and self.height != 0.0:
-            raise ValueError("give height_m or depth_m, not both")
-        return self
-
-    @property
-    def altitude(self) -> float:
-        """Height above the ellipsoid [m], from ``height`` or ``depth``."""
-        return self.height if self.depth is None else -self.depth
+class VesselError(SpecError):
+    """A vessel whose trajectory cannot be made. The message names its kind, its file, and what is wrong."""
 
 
 class Vessel(Spec):
-    """Response of a vessel to its commands: critically damped second-order lags, so that accelerations are continuous.
+    """Base class of all vessels: the table ``[vessel]`` of a scenario.
 
     Attributes
     ----------
-    kind : str
-        ``ship`` stays on the surface; ``uuv`` follows dive commands, and its wave motion decreases with depth.
+    starts : bool
+        Whether the vessel begins at the state of the table ``[start]``. False: its trajectory says where it begins.
+    obeys : bool
+        Whether the vessel follows manoeuvres.
+    steered : bool
+        Whether the trajectory has `simnav.world.trajectory.Steered.steer_by`, which a closed loop needs.
+    """
+
+    starts: ClassVar[bool] = True
+    obeys: ClassVar[bool] = True
+    steered: ClassVar[bool] = False
+
+    kind: str
+
+    def check(self, start: Start | None, manoeuvres: Sequence[Manoeuvre], parts: Sequence[str]) -> None:
+        """Check that the vessel fits the rest of its scenario. An override calls this one first.
+
+        Parameters
+        ----------
+        start : Start or None
+            The table ``[start]``.
+        manoeuvres : sequence of Manoeuvre
+            The tables ``[[manoeuvre]]``.
+        parts : sequence of str
+            Names of the tables ``[surroundings.NAME]``.
+
+        Raises
+        ------
+        ValueError
+            One sentence that names the key, its value, and what would be right.
+        """
+        if self.starts and start is None:
+            raise ValueError("required table [start] is missing (a recorded run has a [log] instead)")
+        if not self.starts and start is not None:
+            raise ValueError(f"start: a vessel of kind {self.kind!r} says itself where it starts; leave [start] out")
+        if not self.obeys and manoeuvres:
+            raise ValueError(
+                f"manoeuvre[0].kind = {manoeuvres[0].kind!r}: a vessel of kind {self.kind!r} follows no manoeuvres; "
+                "leave them out"
+            )
+
+    def trajectory(self, voyage: Voyage) -> Trajectory:
+        """Make the trajectory of one run.
+
+        Parameters
+        ----------
+        voyage : Voyage
+            Start, manoeuvres, surroundings, IMU rate, duration and seed of the run.
+        """
+        raise NotImplementedError(f"{type(self).__qualname__} has no trajectory()")
+
+
+VESSELS: Registry[type[Vessel]] = Registry("vessel", "simnav.vessels", "simnav.world")
+
+V = TypeVar("V", bound=Vessel)
+
+
+def register_vessel(cls: type[V]) -> type[V]:
+    """Register a kind of vessel (class decorator). Its name is the default of the field ``kind``.
+
+    Raises
+    ------
+    PluginError
+        If the class is not a subclass of `Vessel`, another class has its name, or a field hides an attribute.
+    """
+    if not (isinstance(cls, type) and issubclass(cls, Vessel)):
+        raise PluginError(f"@register_vessel: {cls!r} is not a subclass of simnav.world.Vessel")
+    name = cls.model_fields["kind"].default
+    if not isinstance(name, str):
+        raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_vessel'] = 'my_vessel'")
+    hidden = hidden_attribute(cls, Vessel)
+    if hidden is not None:
+        raise PluginError(f"vessel {name!r}: the field {hidden!r} of {cls.__qualname__} hides Vessel.{hidden}")
+    VESSELS.add(name, cls)
+    cls.trajectory = _named(cls.trajectory)  # type: ignore[method-assign]
+    return cls
+
+
+def _named(make: Callable[..., Any]) -> Callable[..., Trajectory]:
+    """Wrap ``trajectory`` of a vessel, so that its errors name the vessel."""
+
+    @wraps(make)
+    def named(self: Vessel, voyage: Voyage) -> Trajectory:
+        try:
+            made = make(self, voyage)
+        except (SpecError, MemoryError):
+            raise
+        except Exception as error:
+            raise VesselError(f"{_label(self)}: {exception_of(type(self), error)}") from error
+        if not isinstance(made, Trajectory):
+            raise VesselError(
+                f"{_label(self)}: trajectory() returned {type(made).__name__}, where a Trajectory is wanted"
+            )
+        return made
+
+    return named
+
+
+def _label(vessel: Vessel) -> str:
+    cls = type(vessel)
+    return f"vessel of kind {vessel.kind!r} ({cls.__qualname__} in {Path(place_of(cls)[0]).name})"
+
+
+class KinematicVessel(Vessel):
+    """Response of a hull to its commands: critically damped second-order lags, so that accelerations are continuous.
+
+    Attributes
+    ----------
+    dives : bool
+        Whether the vessel follows dive commands, and its wave motion decreases with depth.
     speed_time_constant, turn_time_constant, climb_time_constant : float
         Time constants of speed, yaw rate and flight-path angle [s].
     turn_rate : float
@@ -65,9 +152,18 @@ class Vessel(Spec):
         of the centre of gravity above the centre of lateral resistance to the metacentric height.
     """
 
-    kind: Literal["ship", "uuv"] = "ship"
+    dives: ClassVar[bool] = False
+    steered: ClassVar[bool] = True
+
     speed_time_constant: Positive = quantity("s", 15.0)
     turn_time_constant: Positive = quantity("s", 4.0)
     climb_time_constant: Positive = quantity("s", 3.0)
     turn_rate: Annotated[float, Field(gt=0.0, lt=_HALF_PI)] = quantity("deg_s", 0.017453292519943295)
     heel: NonNegative = 0.0
+
+    def check(self, start: Start | None, manoeuvres: Sequence[Manoeuvre], parts: Sequence[str]) -> None:
+        """See `Vessel.check`."""
+        super().check(start, manoeuvres, parts)
+        for name in ("sea", "current"):
+            if name in parts:
+                raise ValueError(f"surroundings.{name}: a vessel of kind {self.kind!r} takes the table [{name}] only")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,32 +14,18 @@ from simnav.world import motion
 from simnav.world.current import Current, eddies
 from simnav.world.manoeuvres import Manoeuvre, table
 from simnav.world.sea import Sea, components
+from simnav.world.start import Start
 from simnav.world.track import PlannedTrack
-from simnav.world.vessel import Start, Vessel
+from simnav.world.trajectory import WorldBlock
+from simnav.world.vessel import KinematicVessel
 
-__all__ = ["World", "WorldBlock"]
+__all__ = ["World"]
 
 _ON = np.ones(1, np.bool_)
 _TRACK = np.array([motion.NORTH, motion.EAST, motion.PSI, motion.U])
 
 #: Lookahead distance for the return to the track: smallest distance [m], and time at the present speed [s].
 LEAST_LOOKAHEAD, LOOKAHEAD_TIME = 30.0, 20.0
-
-
-@dataclass(frozen=True, eq=False)
-class WorldBlock:
-    """The truth in an interval of time.
-
-    Attributes
-    ----------
-    imu : ImuSamples
-        The samples of an ideal IMU.
-    taps : dict of str to TapStates
-        The true states at the requested times, by the name of the request.
-    """
-
-    imu: ImuSamples
-    taps: dict[str, TapStates]
 
 
 class World:
@@ -50,7 +35,7 @@ class World:
     ----------
     start : Start
         State of the vessel at time 0.
-    vessel : Vessel
+    vessel : KinematicVessel
         Response of the vessel to commands and waves.
     manoeuvres : sequence of Manoeuvre
         Commands, one after the other.
@@ -72,7 +57,7 @@ class World:
     def __init__(
         self,
         start: Start,
-        vessel: Vessel,
+        vessel: KinematicVessel,
         manoeuvres: Sequence[Manoeuvre] = (),
         sea: Sea | None = None,
         current: Current | None = None,
@@ -89,12 +74,12 @@ class World:
         p[motion.DT] = 1.0 / rate
         p[motion.TAU_U], p[motion.TAU_R] = vessel.speed_time_constant, vessel.turn_time_constant
         p[motion.TAU_G], p[motion.TURN_RATE] = vessel.climb_time_constant, vessel.turn_rate
-        p[motion.HEEL], p[motion.DIVES] = vessel.heel, float(vessel.kind == "uuv")
+        p[motion.HEEL], p[motion.DIVES] = vessel.heel, float(vessel.dives)
         if current is not None and current.speed > 0.0:
             p[motion.CURRENT_N] = current.speed * np.cos(current.direction)
             p[motion.CURRENT_E] = current.speed * np.sin(current.direction)
             p[motion.SHEAR] = current.shear / current.speed  # the variable part decreases with depth like the mean
-        if sea is not None and vessel.kind == "uuv":
+        if sea is not None and vessel.dives:
             # Waves decrease as exp(-k z); the wave number at the peak is used for all, to keep the motion smooth.
             p[motion.ATTENUATION] = (2.0 * np.pi / sea.peak_period) ** 2 / 9.81
         x = np.zeros(motion.STATE)
@@ -104,7 +89,7 @@ class World:
         x[motion.RATE_LIMIT] = vessel.turn_rate
         x[motion.GAMMA_LIMIT] = 0.26
         x[motion.LATITUDE], x[motion.LONGITUDE], x[motion.HEIGHT] = start.latitude, start.longitude, start.altitude
-        x[motion.DEPTH_CALM] = x[motion.DEPTH_REFERENCE] = -start.altitude if vessel.kind == "uuv" else 0.0
+        x[motion.DEPTH_CALM] = x[motion.DEPTH_REFERENCE] = -start.altitude if vessel.dives else 0.0
         self._x, self._p = x, p
         self._index = np.zeros(4, dtype=np.int64)
         self._rows, self._points = table(manoeuvres)
@@ -150,7 +135,11 @@ class World:
 
     @classmethod
     def plan(
-        cls, start: Start, vessel: Vessel, manoeuvres: Sequence[Manoeuvre] = (), current: Current | None = None
+        cls,
+        start: Start,
+        vessel: KinematicVessel,
+        manoeuvres: Sequence[Manoeuvre] = (),
+        current: Current | None = None,
     ) -> PlannedTrack:
         """The planned track: without waves, in the mean current."""
         steady = None if current is None else current.model_copy(update={"variation": 0.0})

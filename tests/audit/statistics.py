@@ -187,7 +187,7 @@ def real_coverage(track: str, *, boards: int, seeds: int, seed: int = 0) -> Inte
         values, scenario, run = _drawn(rng, errors, seeds)
         excess = unlucky_excess(values, scenario, run)
         for k, value in enumerate(truth):
-            found = score(values[:, k], scenario, run, excess=excess)
+            found = score(values[:, k], scenario, run, excess=float(excess[k]))
             inside += found.low <= value * (1.0 + 1e-9) and value <= found.high * (1.0 + 1e-9)
     return share(inside, boards * len(truth))
 

@@ -7,6 +7,7 @@ import pytest
 
 from simnav.sensors import AidSpec, Dvl, GnssPosition, ImuSpec
 from simnav.types import ImuSamples, TapStates
+from simnav.world import FlatBottom, Surroundings
 
 IMU = ImuSpec.from_toml(
     {
@@ -60,5 +61,5 @@ def test_a_minute_of_an_aiding_instrument(benchmark, spec: AidSpec):
         np.arange(1.0, n + 1), row * [0.9, 0.1, -20.0], row * [5.0, 0.1, 0.0], row * [0.01, 0.02, 0.3],
         row * [0.01, 0.02, 0.03], np.zeros((n, 3)),
     )  # fmt: skip
-    stream = benchmark(lambda: spec.build("x", 1, water_depth=50.0).sense(tap))
+    stream = benchmark(lambda: spec.install("x", 1, Surroundings({"bottom": FlatBottom(50.0)})).sense(tap))
     assert len(stream) == n

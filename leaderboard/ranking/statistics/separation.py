@@ -9,12 +9,15 @@ separates such equal rows far too often.
   standard error in each draw: the studentised bootstrap (Hall, *The bootstrap and Edgeworth expansion*, Springer 1992).
 - **One cluster a seed.** Runs of one seed in several scenarios share random streams, and runs over one recording share
   the recording. They are one cluster: all of them are drawn together, in all pairs of rows.
-- **All pairs at once.** The p-value of a pair is the share of the draws in which the largest statistic of any pair
-  that is not more extreme reaches the pair's own: the step-down procedure with maxima (Romano and Wolf, *Exact and
-  approximate stepdown methods for multiple hypothesis testing*, Journal of the American Statistical Association 2005).
+- **All pairs at once.** The statistic of a pair is divided by the 95 % quantile of its own draws, so that two rows
+  that scatter do not hide the difference of two steady ones (Beran, *Balanced simultaneous confidence sets*, Journal
+  of the American Statistical Association 1988). The p-value of a pair is the share of the draws in which the largest
+  statistic of any pair that is not more extreme reaches the pair's own: the step-down procedure with maxima (Romano
+  and Wolf, *Exact and approximate stepdown methods for multiple hypothesis testing*, Journal of the American
+  Statistical Association 2005).
 - **One more unlucky run.** No test of a few runs can see a rare bad run that has not happened yet. But the other rows
-  of the board show how bad such a run is. So a difference has to hold also if the better row has one more run with the
-  excess that occurs once in four times as many runs as it has, in all rows of the board together (`unlucky_excess`).
+  of the board show how far out such a run is. So a difference has to hold also if the better row has one more run that
+  is as unlucky, for its scatter, as one in four times as many runs of all rows (`unlucky_excess`).
 - **Relevance.** A difference of less than `RELEVANT` is none, so that rounding does not rank rows.
 - **Rank intervals** follow from the pairs: a row's best possible rank is 1 plus the number of rows that are separated
   from it and better (Mogstad, Romano, Shaikh and Wilhelm, *Inference for ranks with applications to mobility across
@@ -51,6 +54,7 @@ _UNLUCKY = 0.25  # how many runs of a row, in all its runs, are as bad as the on
 _TINY = 1e-12  # of the largest difference: what is smaller is rounding
 _LEAST_VARIANCE = 0.01  # of a draw, as a share of the variance of the sample
 _FEWEST_VISIBLE = 2.0  # clusters that the scatter of a pair has to come from, to count for the others
+_LEAST_USUAL = 2.0  # quantile of the statistic of a pair: that of the normal distribution is 1.96
 _CLEAR = np.float32(1e9)  # statistic of a difference without any scatter
 
 
@@ -149,8 +153,12 @@ def _weights(clusters: int) -> NDArray[np.float32]:
 
 def unlucky_excess(
     values: ArrayLike, strata: Sequence[Hashable] | None = None, clusters: Sequence[Hashable] | None = None
-) -> float:
-    """By how much a run is worse than others, once in four times as many runs as a row has.
+) -> Array:
+    """By how much an unlucky run of each row is worse than its others.
+
+    The excess of a row in a cluster is its figure less its mean, and less the median excess of all rows, because a hard
+    run is hard for all. Divided by the row's scatter, the excesses of all rows are pooled. An unlucky run has the one
+    that n / 4 of them reach, times the scatter of the row, or of the median row where that is larger.
 
     Parameters
     ----------
@@ -161,31 +169,32 @@ def unlucky_excess(
 
     Returns
     -------
-    float
-        The largest excesses of all rows are pooled: the figure of a cluster less the mean of its row, and less the
-        median of all rows, because a hard run is hard for all. The one that n / 4 of these reach.
+    (n,) array
 
     Examples
     --------
-    >>> unlucky_excess([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 4.0], [0.0, 0.0, 2.0, 0.0], [0.0] * 4])
-    3.0
+    >>> x = np.zeros((5, 4))
+    >>> x[2, 3] = 1.0
+    >>> unlucky_excess(x).round(3).tolist()
+    [0.0, 0.0, 0.0, 0.8]
     """
     x: Array = np.asarray(values, dtype=np.float64)
-    runs = len(x)
-    found = _shares(
-        x, codes([0] * runs if strata is None else strata), codes(range(runs) if clusters is None else clusters)
-    )
-    return _excess(found)
+    stratum = codes([0] * len(x) if strata is None else strata)
+    cluster = codes(range(len(x)) if clusters is None else clusters)
+    return _excess(_shares(x, stratum, cluster))
 
 
-def _excess(shares: Array) -> float:
+def _excess(shares: Array) -> Array:
     """`unlucky_excess`, given the figures of the clusters (K, n)."""
-    if shares.size < 2:
-        return 0.0
+    count, rows = shares.shape
+    if count < 2 or not rows:
+        return np.zeros(rows)
     excess = shares - shares.mean(axis=0)
     excess -= np.median(excess, axis=1, keepdims=True)
-    reached = min(max(round(_UNLUCKY * shares.shape[1]), 1), shares.size - 1)
-    return max(float(np.sort(excess, axis=None)[-reached]), 0.0)
+    scatter = np.sqrt(np.sum(excess**2, axis=0) / (count - 1))
+    reached = min(max(round(_UNLUCKY * rows), 1), shares.size - 1)
+    far = np.sort(excess / np.maximum(scatter, 1e-300), axis=None)[-reached]
+    return np.asarray(max(float(far), 0.0) * np.maximum(scatter, np.sqrt(np.median(scatter**2))))
 
 
 def _statistics(
@@ -210,15 +219,17 @@ def _statistics(
         if len(shares) < FEWEST:
             continue
         i, j = np.searchsorted(rows, first[here]), np.searchsorted(rows, second[here])
-        observed[here], sizes[here] = _studentised(shares[:, i] - shares[:, j], _excess(shares))
+        excess = _excess(shares)
+        observed[here], sizes[here] = _studentised(shares[:, i] - shares[:, j], excess[i], excess[j])
     return observed, sizes
 
 
-def _studentised(difference: Array, excess: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _studentised(difference: Array, first: Array, second: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Statistics (P,) of differences (K, P) of pairs in K clusters, and their sizes (P, B) in each draw.
 
-    A pair whose scatter comes from one cluster alone says nothing of the distribution: it is not in the draws of the
-    others, and its own unlucky run is at least as bad as that cluster.
+    ``first`` and ``second`` (P,) are the excesses of an unlucky run of the two rows. A pair whose scatter comes from
+    one cluster alone says nothing of the distribution: it is not in the draws, and its own unlucky run is at least as
+    bad as that cluster.
     """
     count = len(difference)
     mean = difference.mean(axis=0)
@@ -227,7 +238,8 @@ def _studentised(difference: Array, excess: float) -> tuple[NDArray[np.float32],
     still = square <= (_TINY * max(float(np.abs(difference).max()), 1e-300)) ** 2 * count
     with np.errstate(invalid="ignore", divide="ignore"):
         visible = np.where(still, 0.0, square**2 / np.sum(residual**4, axis=0)) >= _FEWEST_VISIBLE
-    unlucky = np.where(visible, excess, np.maximum(excess, np.abs(residual).max(axis=0)))
+    unlucky = np.where(mean < 0.0, first, second)  # lower is better
+    unlucky = np.where(visible, unlucky, np.maximum(unlucky, np.abs(residual).max(axis=0)))
     # How far a mean is from zero, less what is not relevant; with and without the unlucky run of the better row.
     distance = np.maximum(np.abs(mean) - np.log1p(RELEVANT), 0.0)
     statistic = np.minimum(
@@ -238,14 +250,15 @@ def _studentised(difference: Array, excess: float) -> tuple[NDArray[np.float32],
             count + 1,
         ),
     )
-    observed = np.asarray(np.sign(mean) * statistic, dtype=np.float32)
-    sizes = np.zeros((difference.shape[1], DRAWS), dtype=np.float32)
-    used = residual[:, visible].astype(np.float32)
+    used = np.where(still, 0.0, residual).astype(np.float32)
     weights = _weights(count)
     means = weights @ used
     variance = np.maximum(weights @ used**2 - means**2, _LEAST_VARIANCE * used.var(axis=0))
-    sizes[visible] = (np.abs(means) * np.sqrt((count - 1) / variance)).T
-    return observed, sizes
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sizes = np.where(still, 0.0, np.abs(means) * np.sqrt((count - 1) / variance)).T
+    usual = np.maximum(np.quantile(sizes, 1.0 - ALPHA, axis=1), _LEAST_USUAL)
+    observed = np.asarray(np.sign(mean) * statistic / usual, dtype=np.float32)
+    return observed, np.asarray(np.where(visible[:, None], sizes / usual[:, None], 0.0), dtype=np.float32)
 
 
 def _ratio(distance: Array, square: Array, count: int) -> Array:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 
 from pydantic import BeforeValidator, model_validator
 from pydantic.fields import FieldInfo
@@ -22,9 +22,6 @@ from simnav.recording import FaultLabel
 from simnav.sensors.faults.sizes import QUANTITIES, QUANTITY_OF, axes_of, size_by_component
 from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, hidden_attribute, quantity, unit_of
 from simnav.types import KINDS, Array
-
-if TYPE_CHECKING:
-    from simnav.sensors.faults.layer import FaultLayer
 
 __all__ = ["FAULTS", "Effect", "FaultError", "FaultSpec", "Names", "effect_of", "register_fault"]
 
@@ -230,7 +227,7 @@ class FaultSpec(Spec):
         parameters = self.model_dump(exclude=when, exclude_none=True)
         return [FaultLabel(self.kind, names, min(a, duration), min(b, duration), parameters) for a, b in intervals]
 
-    def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
+    def build(self, index: int, seed: int, occurrence: int | None = None) -> object:
         """Make the layer of this fault for one run.
 
         Parameters
@@ -241,6 +238,11 @@ class FaultSpec(Spec):
             Seed of the run.
         occurrence : int, optional
             Number that distinguishes faults of the same name (`build_layers` counts them); by default the index.
+
+        Returns
+        -------
+        simnav.sensors.faults.FaultLayer
+            The layer; `build_layers` checks that it is one.
         """
         raise NotImplementedError(f"{type(self).__qualname__} has no build()")
 

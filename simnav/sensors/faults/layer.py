@@ -9,19 +9,16 @@ from __future__ import annotations
 
 from abc import ABC
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.plugins import exception_of, place_of
 from simnav.recording import AidStream, ImuLabels
-from simnav.sensors.faults.fault import FaultError
+from simnav.sensors.faults.fault import FaultError, FaultSpec
 from simnav.streams import stream as random_stream
 from simnav.types import KINDS, Array, ImuSamples
-
-if TYPE_CHECKING:
-    from simnav.sensors.faults.fault import FaultSpec
 
 __all__ = [
     "ADDS",

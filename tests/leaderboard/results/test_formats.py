@@ -5,15 +5,18 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
-from unittest.mock import patch
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from typer.testing import CliRunner
 
+from simnav.leaderboard.cli import app
 from simnav.leaderboard.results import formats
 from simnav.leaderboard.results.export import Document, table
 from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.results.result import Result
+from simnav.plugins import PluginError
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
@@ -53,8 +56,16 @@ def test_every_format_of_a_recording_is_written(tmp_path: Path):
     assert {p.stem for p in written} == {"truth", "imu", *recording.data.aids}
 
 
-@patch.dict("simnav.leaderboard.results.formats._writers", results={})  # a format is never forgotten in use
-def test_a_new_format_takes_one_function(tmp_path: Path):
+@pytest.fixture
+def forgotten():
+    """Formats that a test registers are gone afterwards; in use a format is never forgotten."""
+    before = {kind: registry.items() for kind, registry in formats.WRITERS.items()}
+    yield
+    for kind, registry in formats.WRITERS.items():
+        registry._classes = before[kind]
+
+
+def test_a_new_format_takes_one_function(tmp_path: Path, forgotten):
     @formats.writes("results", "txt")
     def write_txt(document: Document, path: Path) -> list[Path]:
         return [write_whole(path, str(len(document.results)))]
@@ -76,3 +87,21 @@ def test_a_file_is_whole_or_the_old_one(tmp_path: Path):
         write_whole(target, "\udc80")
     assert target.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_the_file_of_a_third_party_adds_a_format_to_the_command(tmp_path: Path, plugins, forgotten):
+    words = ["--plugin", str(plugins / "tracks.py"), "simulate", "open-sea", "-o", str(tmp_path / "run.gpx")]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "run.gpx").read_text()
+    truth = record(load("open-sea"), 0).data.truth
+    assert text.count("<trkpt") == len(truth)
+    assert f'lat="{np.degrees(truth.position[0, 0]):.9f}"' in text
+    done = CliRunner().invoke(app, ["simulate", "open-sea", "-o", str(tmp_path / "run.kml")])
+    assert done.exit_code == 2
+    assert "should end in .gpx or .npz" in done.output
+
+
+def test_a_format_of_simnav_is_not_replaced(forgotten):
+    with pytest.raises(PluginError, match=r"the name is taken by write_npz"):
+        formats.writes("recording", "npz")(lambda recording, path: [path])

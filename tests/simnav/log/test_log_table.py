@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.log.table import LogError, read_csv
+from simnav.log.delimited import read_csv
+from simnav.log.table import LogError
 
 
 def write(path, text):

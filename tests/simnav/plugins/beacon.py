@@ -67,7 +67,7 @@ class Beacon(AidSpec):
     lever_arm: Vector = quantity("m", (0.0, 0.0, 0.0))
     reach: Positive = quantity("m", inf)
 
-    def build(self, name, seed, *, water_depth=None):
+    def build(self, name, seed):
         """The beacon of one run."""
         return _Beacon(self, name, seed)
 

@@ -48,7 +48,7 @@ class Pressure(AidSpec):
     sigma: NonNegative = quantity("kpa")
     bias: NonNegative = quantity("kpa", 0.0)
 
-    def build(self, name, seed, *, water_depth=None):
+    def build(self, name, seed):
         """The sensor of one run."""
         return _Pressure(self, name, seed)
 

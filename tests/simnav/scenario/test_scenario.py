@@ -209,7 +209,7 @@ def test_a_recorded_scenario_has_no_world():
         (
             'kind = "uuv"',
             'kind = "auv"',
-            "vessel.kind = 'auv': should be 'ship' or 'uuv'; did you mean 'uuv'?",
+            "vessel.kind = 'auv' is unknown; did you mean 'uuv'?",
         ),
         ('kind = "outage"', 'kind = "outages"', "fault[0].kind = 'outages' is unknown; did you mean 'outage'?"),
         (

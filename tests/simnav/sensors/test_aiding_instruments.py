@@ -25,6 +25,7 @@ from simnav.sensors import (
 from simnav.sensors.instrument import turn_to_body, turn_to_ned
 from simnav.spec import SpecError
 from simnav.types import KINDS, Array, TapStates
+from simnav.world import FlatBottom, Surroundings
 
 LEVER_ARM = (3.0, -2.0, 4.0)
 #: One of each kind, with every error that it can have.
@@ -168,7 +169,7 @@ def test_dvl_noise_grows_with_speed():
 def test_dvl_loses_the_bottom_out_of_range_and_its_noise_goes_on():
     always = Dvl(sigma=0.01).build("dvl", 1).sense(TAP)
     spec = Dvl(sigma=0.01, minimum_altitude=29.0, maximum_altitude=31.0)
-    stream = spec.build("dvl", 1, water_depth=50.0).sense(TAP)
+    stream = spec.install("dvl", 1, Surroundings({"bottom": FlatBottom(50.0)})).sense(TAP)
     altitude = 50.0 + TAP.position[:, 2]
     lock = (altitude >= 29.0) & (altitude <= 31.0)
     assert 5 < lock.sum() < 55
@@ -180,7 +181,9 @@ def test_dvl_loses_the_bottom_out_of_range_and_its_noise_goes_on():
 
 
 def test_dvl_range_counts_from_the_transducer():
-    low = Dvl(sigma=0.01, lever_arm=(0, 0, 5.0), minimum_altitude=30.0).build("dvl", 1, water_depth=50.0)
+    low = Dvl(sigma=0.01, lever_arm=(0, 0, 5.0), minimum_altitude=30.0).install(
+        "dvl", 1, Surroundings({"bottom": FlatBottom(50.0)})
+    )
     down = np.einsum("nij,j->ni", dcm_from_rpy(TAP.attitude), np.array([0, 0, 5.0]))[:, 2]
     assert np.array_equal(low.sense(TAP).time, TIME[50.0 + TAP.position[:, 2] - down >= 30.0])
 
@@ -255,8 +258,8 @@ def test_slow_bias_is_stationary_from_the_first_measurement_and_correlated(name)
 def test_blocks_of_any_length_give_the_same_bits(cuts):
     edges = [0, *sorted(cuts), 60]
     for name, spec in FULL.items():
-        whole = spec.build(name, 9, water_depth=81.0).sense(TAP)
-        sensor = spec.build(name, 9, water_depth=81.0)
+        whole = spec.install(name, 9, Surroundings({"bottom": FlatBottom(81.0)})).sense(TAP)
+        sensor = spec.install(name, 9, Surroundings({"bottom": FlatBottom(81.0)}))
         blocks = [sensor.sense(cut(TAP, a, b)) for a, b in itertools.pairwise(edges)]
         for field in ("time", "value", "sigma", "dropped", "faults", "fault_error"):
             joined = np.concatenate([getattr(b, field) for b in blocks])

@@ -137,7 +137,7 @@ def test_a_kind_may_inherit_from_a_registered_one(plugins):
         def observe(self, tap):
             return tap.position
 
-    def build(self, name, seed, *, water_depth=None):
+    def build(self, name, seed):
         return Plain(self, name, seed)
 
     first = type("First", (AidSpec,), {"__annotations__": {"kind": str, "sigma": float}, "kind": "first_depth",

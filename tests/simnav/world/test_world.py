@@ -19,10 +19,11 @@ from simnav.world import (
     Hold,
     LawnMower,
     Sea,
+    Ship,
     Start,
     Surface,
     Turn,
-    Vessel,
+    Uuv,
     Waypoints,
     World,
     ZigZag,
@@ -34,7 +35,7 @@ SEA = Sea(significant_height=2.5, peak_period=8.0, direction=np.radians(200.0))
 
 
 def run(duration, manoeuvres=(), *, start=START, vessel=None, sea=None, current=None, rate=20.0, every=1.0):
-    world = World(start, vessel or Vessel(), manoeuvres, sea, current, rate=rate, seed=1)
+    world = World(start, vessel or Ship(), manoeuvres, sea, current, rate=rate, seed=1)
     first = world.state()
     block = world.advance(duration, {"all": np.arange(1, round(duration / every) + 1) * every})
     tap = block.taps["all"]
@@ -48,7 +49,7 @@ def test_hour_of_manoeuvring_in_a_seaway_returns_to_the_truth():
         Waypoints(points=((3000, 2000), (0, 0))), Turn(radius=500, duration=200), LawnMower(leg=500, spacing=200),
     ]  # fmt: skip
     first, block, tap, _ = run(
-        3600.0, manoeuvres, vessel=Vessel(heel=1.0), sea=SEA, current=Current(speed=0.5, direction=1.0), rate=100.0
+        3600.0, manoeuvres, vessel=Ship(heel=1.0), sea=SEA, current=Current(speed=0.5, direction=1.0), rate=100.0
     )
     states = integrate(first.position[0], first.velocity[0], first.attitude[0], block.imu)
     at = slice(99, None, 100)
@@ -62,7 +63,7 @@ def test_hour_of_manoeuvring_in_a_seaway_returns_to_the_truth():
 @given(st.lists(st.integers(1, 400), min_size=1, max_size=12), st.integers(0, 2**40))
 def test_blocks_of_any_length_give_the_same_bits(lengths, seed):
     def world():
-        return World(START, Vessel(), [ZigZag(angle=0.3, duration=30)], SEA, Current(speed=0.5), rate=50.0, seed=seed)
+        return World(START, Ship(), [ZigZag(angle=0.3, duration=30)], SEA, Current(speed=0.5), rate=50.0, seed=seed)
 
     total = sum(lengths)
     taps = 0.013 + np.arange(total * 3 // 2 - 1) / 75.0
@@ -81,9 +82,9 @@ def test_blocks_of_any_length_give_the_same_bits(lengths, seed):
 
 def test_taps_between_samples_lie_on_the_motion():
     """The 20 Hz world tapped at 100 Hz is the motion that a fine sampling of the same sea shows."""
-    world = World(START, Vessel(), [], SEA, None, rate=20.0, seed=5)
+    world = World(START, Ship(), [], SEA, None, rate=20.0, seed=5)
     coarse = world.advance(60.0, {"a": np.arange(1, 6001) * 0.01}).taps["a"]
-    world = World(START, Vessel(), [], SEA, None, rate=100.0, seed=5)
+    world = World(START, Ship(), [], SEA, None, rate=100.0, seed=5)
     fine = world.advance(60.0, {"a": np.arange(1, 6001) * 0.01}).taps["a"]
     assert np.abs(relative_position(coarse.position, fine.position)).max() < 1e-3
     assert np.abs(coarse.velocity - fine.velocity).max() < 1e-3
@@ -147,7 +148,7 @@ def test_a_waypoint_within_the_turning_circle_is_not_circled_for_ever():
 
 
 def test_lawn_mower_covers_its_legs():
-    vessel = Vessel(kind="uuv", speed_time_constant=3.0, turn_time_constant=1.0, turn_rate=np.radians(6.0))
+    vessel = Uuv(speed_time_constant=3.0, turn_time_constant=1.0, turn_rate=np.radians(6.0))
     start = Start(latitude=0.9, longitude=0.1, depth=20.0, heading=0.0, speed=2.0)
     _, _, _, xy = run(2600.0, [LawnMower(leg=800.0, spacing=60.0, legs=4)], start=start, vessel=vessel)
     for leg in range(4):
@@ -156,7 +157,7 @@ def test_lawn_mower_covers_its_legs():
 
 
 def test_dive_and_surface():
-    vessel = Vessel(kind="uuv", speed_time_constant=3.0, climb_time_constant=2.0)
+    vessel = Uuv(speed_time_constant=3.0, climb_time_constant=2.0)
     start = Start(latitude=0.9, longitude=0.1, speed=2.0)
     manoeuvres = [Dive(depth=40.0, angle=np.radians(20.0)), Hold(duration=120.0), Surface(angle=np.radians(20.0))]
     _, _, tap, xy = run(700.0, manoeuvres, start=start, vessel=vessel)
@@ -172,7 +173,7 @@ def test_dive_and_surface():
 def test_waves_die_off_with_depth():
     deep = Start(latitude=0.9, longitude=0.1, depth=40.0, speed=2.0)
     shallow = Start(latitude=0.9, longitude=0.1, depth=5.0, speed=2.0)
-    heave = [run(300.0, start=s, vessel=Vessel(kind="uuv"), sea=SEA)[2].velocity[:, 2].std() for s in (deep, shallow)]
+    heave = [run(300.0, start=s, vessel=Uuv(), sea=SEA)[2].velocity[:, 2].std() for s in (deep, shallow)]
     number = (2 * np.pi / SEA.peak_period) ** 2 / 9.81
     assert heave[0] / heave[1] == pytest.approx(np.exp(-number * 35.0), rel=0.05)
 
@@ -185,7 +186,7 @@ def test_current_carries_the_vessel_and_is_what_the_log_does_not_see():
     np.testing.assert_allclose(through, np.tile(6.0 * forward, (60, 1)), atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(tap.water_velocity, axis=1), 0.8)
     deep = Start(latitude=0.9, longitude=0.1, depth=30.0, speed=2.0)
-    _, _, tap, _ = run(10.0, start=deep, vessel=Vessel(kind="uuv"), current=current)
+    _, _, tap, _ = run(10.0, start=deep, vessel=Uuv(), current=current)
     np.testing.assert_allclose(np.linalg.norm(tap.water_velocity, axis=1), 0.5)
 
 
@@ -217,13 +218,13 @@ def test_encounter_frequency_is_the_dopplers(course):
 
 
 def test_heel_is_outward_and_proportional_to_the_centripetal_acceleration():
-    _, _, tap, _ = run(200.0, [Turn(duration=180.0, rate=np.radians(1.0))], vessel=Vessel(heel=2.0))
+    _, _, tap, _ = run(200.0, [Turn(duration=180.0, rate=np.radians(1.0))], vessel=Ship(heel=2.0))
     assert tap.attitude[150, 0] == pytest.approx(-2.0 * 6.0 * np.radians(1.0) / 9.81, rel=1e-3)
 
 
 def test_closed_loop_steers_by_the_position_it_is_given():
     def end(offset):
-        world = World(START, Vessel(), [Waypoints(points=((5000.0, 4000.0),))], rate=20.0, seed=1)
+        world = World(START, Ship(), [Waypoints(points=((5000.0, 4000.0),))], rate=20.0, seed=1)
         world.steer_by(*offset)
         tap = world.advance(900.0, {"a": np.array([900.0])}).taps["a"]
         return relative_position(tap.position, world.state().position)[0], tap
@@ -235,7 +236,7 @@ def test_closed_loop_steers_by_the_position_it_is_given():
 
 
 def test_memory_does_not_grow_with_the_run():
-    world = World(START, Vessel(), [ZigZag(angle=0.3, duration=1e6)], SEA, rate=100.0, seed=1)
+    world = World(START, Ship(), [ZigZag(angle=0.3, duration=1e6)], SEA, rate=100.0, seed=1)
     held = []
     tracemalloc.start()
     try:
@@ -249,7 +250,7 @@ def test_memory_does_not_grow_with_the_run():
 
 
 def test_time_does_not_go_back():
-    world = World(START, Vessel(), [], SEA, rate=100.0, seed=1)
+    world = World(START, Ship(), [], SEA, rate=100.0, seed=1)
     world.advance(10.0, {})
     with pytest.raises(ValueError, match="does not go back"):
         world.advance(5.0, {})
@@ -274,12 +275,12 @@ def test_a_current_changes_with_time_and_place():
     still = Start(latitude=0.9, longitude=0.1, speed=0.0)
     current = Current(speed=0.4, direction=0.5, variation=0.15, length_scale=500.0, time_scale=900.0)
     drift = np.array([
-        World(still, Vessel(), current=current, rate=1.0, seed=k).state().velocity[0] for k in range(400)
+        World(still, Ship(), current=current, rate=1.0, seed=k).state().velocity[0] for k in range(400)
     ])  # fmt: skip
     mean = 0.4 * np.array([np.cos(0.5), np.sin(0.5)])
     np.testing.assert_allclose(drift[:, :2].mean(axis=0), mean, atol=5 * 0.15 / 20.0)
     np.testing.assert_allclose(drift[:, :2].std(axis=0), 0.15, rtol=0.15)
-    world = World(Start(latitude=0.9, longitude=0.1, speed=4.0), Vessel(), current=current, rate=20.0, seed=1)
+    world = World(Start(latitude=0.9, longitude=0.1, speed=4.0), Ship(), current=current, rate=20.0, seed=1)
     tap = world.advance(600.0, {"a": np.arange(1.0, 601.0)}).taps["a"]
     through = tap.velocity - tap.water_velocity
     np.testing.assert_allclose(np.hypot(through[:, 0], through[:, 1]), 4.0, rtol=1e-6)
