@@ -9,7 +9,7 @@ separates such equal rows far too often.
   standard error in each draw: the studentised bootstrap (Hall, *The bootstrap and Edgeworth expansion*, Springer 1992).
 - **One cluster a seed.** Runs of one seed in several scenarios share random streams, and runs over one recording share
   the recording. They are one cluster: all of them are drawn together, in all pairs of rows.
-- **All pairs at once.** The statistic of a pair is divided by the 95 % quantile of its own draws, so that two rows
+- **All pairs at once.** The statistic of a pair is divided by the 99 % quantile of its own draws, so that two rows
   that scatter do not hide the difference of two steady ones (Beran, *Balanced simultaneous confidence sets*, Journal
   of the American Statistical Association 1988). The p-value of a pair is the share of the draws in which the largest
   statistic of any pair that is not more extreme reaches the pair's own: the step-down procedure with maxima (Romano
@@ -54,7 +54,7 @@ _UNLUCKY = 0.25  # how many runs of a row, in all its runs, are as bad as the on
 _TINY = 1e-12  # of the largest difference: what is smaller is rounding
 _LEAST_VARIANCE = 0.01  # of a draw, as a share of the variance of the sample
 _FEWEST_VISIBLE = 2.0  # clusters that the scatter of a pair has to come from, to count for the others
-_LEAST_USUAL = 2.0  # quantile of the statistic of a pair: that of the normal distribution is 1.96
+_USUAL, _LEAST_USUAL = 0.99, 2.5  # quantile of the statistic of a pair; that of a normal one is 2.58
 _CLEAR = np.float32(1e9)  # statistic of a difference without any scatter
 
 
@@ -256,7 +256,7 @@ def _studentised(difference: Array, first: Array, second: Array) -> tuple[NDArra
     variance = np.maximum(weights @ used**2 - means**2, _LEAST_VARIANCE * used.var(axis=0))
     with np.errstate(invalid="ignore", divide="ignore"):
         sizes = np.where(still, 0.0, np.abs(means) * np.sqrt((count - 1) / variance)).T
-    usual = np.maximum(np.quantile(sizes, 1.0 - ALPHA, axis=1), _LEAST_USUAL)
+    usual = np.maximum(np.quantile(sizes, _USUAL, axis=1), _LEAST_USUAL)
     observed = np.asarray(np.sign(mean) * statistic / usual, dtype=np.float32)
     return observed, np.asarray(np.where(visible[:, None], sizes / usual[:, None], 0.0), dtype=np.float32)
 

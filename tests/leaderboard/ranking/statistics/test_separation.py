@@ -36,7 +36,7 @@ def brute_force(x: Array) -> Array:
         d = x[:, i] - x[:, j]
         centred = d - d.mean()
         drawn = [abs(student(np.repeat(centred, k), 0.01 * float(d.var()))) for k in draws]
-        usual[i, j] = max(float(np.quantile(drawn, 0.95)), 2.0)
+        usual[i, j] = max(float(np.quantile(drawn, 0.99)), 2.5)
         sizes[i, j] = [size / usual[i, j] for size in drawn]
     observed = {}
     for i, j in pairs:
