@@ -27,7 +27,9 @@ def command(
     ] = None,
     sample: Annotated[
         int | None,
-        typer.Option(min=1, help="Runs that are repeated at most. [so many that 5 % forged ones are found, about 59]"),
+        typer.Option(
+            min=1, help="Runs that are repeated at most. Default: so many that 5 % of forged runs are found, about 59."
+        ),
     ] = None,
     row: Annotated[
         list[str] | None, typer.Option("--row", help="Of a folder: repeat runs of this row only; repeatable.")

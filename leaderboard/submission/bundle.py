@@ -103,7 +103,7 @@ class Contents(_Part):
     title: str = Field(min_length=1, max_length=200)
     benchmark: str = Field(max_length=200)
     profile: str = Field(max_length=200)
-    runs: dict[str, Annotated[int, Field(ge=0, le=MOST_RUNS)]] = Field(max_length=1000)
+    runs: dict[str, Annotated[int, Field(ge=1, le=MOST_RUNS)]] = Field(max_length=1000)
     main: str = Field(min_length=1, max_length=200)
     estimators: tuple[Row, ...] = Field(min_length=1, max_length=100)
     requires: tuple[str, ...] = Field((), max_length=100)

@@ -313,7 +313,7 @@ def test_every_table_is_written_as_csv_and_latex(visit, hostile):
     rows = list(csv.DictReader(io.StringIO(Path(waiting.value.path()).read_text())))
     assert [row["Estimator"] for row in rows] == visit.names()
     assert rows[2]["Estimator"] == hostile
-    assert float(rows[0]["× reference"]) > 1.0
+    assert float(rows[0]["× oracle"]) > 1.0
     with page.expect_download() as waiting:
         panel.get_by_role("button", name="LaTeX").click()
     text = Path(waiting.value.path()).read_text()

@@ -187,7 +187,7 @@ def old(home: Path, tmp_path: Path) -> Path:
             store.compact(made)
     store.select(made, {local[0].scenario: ("ab" * 12, {r.estimator: r.variant for r in local})})
     for file in [*(made / "results").glob("*.parquet"), *(made / "compacted").glob("*.parquet")]:
-        table = pq.read_table(file).drop_columns(["simulator_version", "estimator_version"])
+        table = pq.read_table(file).drop_columns(["learned", "simulator_version", "estimator_version"])
         pq.write_table(table.replace_schema_metadata({"simnav_results": "4"}), file)
     marker = made / "simnav-results.json"
     marker.write_text(json.dumps(json.loads(marker.read_text()) | {"format": 4}))
