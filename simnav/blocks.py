@@ -1,7 +1,7 @@
 """Blocks of states that an instrument brings along: what its reading depends on beyond the motion of the vessel.
 
-A datasheet declares its blocks (`simnav.types.Datasheet.blocks`): a receiver's clock, the iron around a magnetometer, the
-scale of a DVL, the delay of a time stamp. Estimators append them to their state, and the simulator draws their true
+A datasheet declares its blocks (`simnav.types.Datasheet.blocks`): a receiver's clock, the iron around a magnetometer,
+the scale of a DVL, the delay of a time stamp. Estimators append them to their state, and the simulator draws their true
 values. With the initial standard deviation sigma, the density q and the correlation time T of a component x, and white
 noise w of unit density, the processes are
 
@@ -10,8 +10,8 @@ noise w of unit density, the processes are
 - ``gauss_markov``: x' = -x/T + sigma sqrt(2/T) w, with the stationary standard deviation sigma
 - ``clock``, of two components, bias b and drift d: b' = d + q_b w_b, d' = q_d w_d
 
-Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., Artech House
-2013, sections 9.4.2 (clock) and 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, MIT Press 1974, section 3.6.
+Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., Artech
+House 2013, sections 9.4.2 (clock) and 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, MIT Press 1974, section 3.6.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class StateBlock:
     size : int
         Number k of components.
     units : str or sequence of str
-        Unit of the components, or of each of them: keys of `simnav.spec.UNITS`, empty for a number without a unit. Values
-        are in SI units and radians.
+        Unit of the components, or of each of them: keys of `simnav.spec.UNITS`, empty for a number without a unit.
+        Values are in SI units and radians.
     sigma : float or sequence of float
         Standard deviation of the components at the start of a run, SI units. Their mean is zero.
     process : str
@@ -99,8 +99,8 @@ class StateBlock:
             raise ValueError(f"block {self.name!r}: a clock has size = 2, bias and drift, not {self.size}")
         if self.process == "gauss_markov" and not 0.0 < self.correlation_time < inf:
             raise ValueError(
-                f"block {self.name!r}: correlation_time = {self.correlation_time!r} of a Gauss-Markov process should be "
-                "above 0 and finite"
+                f"block {self.name!r}: correlation_time = {self.correlation_time!r} of a Gauss-Markov process should "
+                "be above 0 and finite"
             )
 
     def _figures(self, field: str) -> tuple[float, ...]:
@@ -187,7 +187,8 @@ def blocks_of(declared: Iterable[tuple[str, Sequence[StateBlock]]]) -> Mapping[s
             for field in ("size", "units", "sigma", "process", "density", "correlation_time"):
                 if getattr(first, field) != getattr(block, field):
                     raise ValueError(
-                        f"instruments {owner!r} and {instrument!r} share the block {block.shared!r}, but its {field} is "
-                        f"{getattr(first, field)!r} for one and {getattr(block, field)!r} for the other; they should agree"
+                        f"instruments {owner!r} and {instrument!r} share the block {block.shared!r}, but its {field} "
+                        f"is {getattr(first, field)!r} for one and {getattr(block, field)!r} for the other; they "
+                        "should agree"
                     )
     return {label: block for label, (_, block) in found.items()}

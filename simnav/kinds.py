@@ -137,12 +137,10 @@ def _add_errors(positions: int, cyclic: int, values: Array, errors: Array) -> No
 #: An observation model. It returns the (d,) reading that an instrument with this datasheet should give at a state, in
 #: SI units, and the (d, 9) Jacobian of the reading with respect to an error of the state: position north-east-down [m],
 #: velocity [m/s] and attitude, the rotation vector about north-east-down [rad] (`simnav.types.COMPONENTS`). In place of
-#: the Jacobian it may return one by block, ``{"navigation": (d, 9) array, "clock": (d, 2) array}``. A block that is not in
-#: it is differentiated by differences; so is all if it returns the reading alone. It returns None if there is no reading
-#: at the state.
-Observation = Callable[
-    [NavigationPoint, "Datasheet"], "tuple[Array, Array | Mapping[str, Array]] | Array | None"
-]
+#: the Jacobian it may return one by block, ``{"navigation": (d, 9) array, "clock": (d, 2) array}``. A block that is not
+#: in it is differentiated by differences; so is all if it returns the reading alone. It returns None if there is no
+#: reading at the state.
+Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array | Mapping[str, Array]] | Array | None"]
 
 
 @dataclass(frozen=True)

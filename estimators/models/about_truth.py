@@ -23,8 +23,8 @@ in a recorded log), the estimate itself is the next nominal state, as in an exte
 
 If the velocity of the water is given, it is treated as known. A speed log then measures the velocity over the ground.
 
-The states that instruments bring along (`simnav.blocks`) have no known truth. Where a step begins, their estimate is the
-next nominal value, as in an extended Kalman filter.
+The states that instruments bring along (`simnav.blocks`) have no known truth. Where a step begins, their estimate is
+the next nominal value, as in an extended Kalman filter.
 """
 
 from __future__ import annotations

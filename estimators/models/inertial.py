@@ -20,8 +20,8 @@ In addition there are calibration states that depend on the datasheets: a bias f
 instrument with a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor, and
 the current, north and east, for a speed log. The current has a fixed direction over ground: when the vessel turns, its
 component along the keel changes at once, which a bias along the keel could not describe. Last come the blocks of states
-that instruments bring along (`simnav.blocks`). If all instruments have white noise only, bring no blocks, and there is no
-log, n is 15. With ``calibrate=False`` n is always 15, and these errors count as white noise.
+that instruments bring along (`simnav.blocks`). If all instruments have white noise only, bring no blocks, and there is
+no log, n is 15. With ``calibrate=False`` n is always 15, and these errors count as white noise.
 
 An IMU's scale factor and misalignment are not states. On a level vehicle the errors of the accelerometers act like a
 bias under gravity, which is added to the turn-on bias. The errors of the gyroscopes act in turns, as noise in

@@ -5,8 +5,8 @@ reading and gives its Jacobian (`simnav.kinds.Observation`; see ``docs/how-to/ad
 are used here, for every model over the inertial state, in filters and graphs; for a ship without an IMU see
 `simnav.estimators.models.ship_observation`.
 
-A reading may depend on states that the instrument brings along (`simnav.blocks`). A Jacobian, or a block of it, that the
-function does not give is computed here by central differences.
+A reading may depend on states that the instrument brings along (`simnav.blocks`). A Jacobian, or a block of it, that
+the function does not give is computed here by central differences.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ class OwnObservation:
         assert observation is not None
         self._observation = observation
         self._since = since
-        self._slices = [(b.name, slice(places[b.name], places[b.name] + b.size)) for b in sheet.blocks if b.name in places]
+        self._slices = [
+            (b.name, slice(places[b.name], places[b.name] + b.size)) for b in sheet.blocks if b.name in places
+        ]
         self._zeros = {b.name: np.zeros(b.size) for b in sheet.blocks if b.name not in places}
         sizes = [block.size for block in sheet.blocks]
         ends = _COMPONENTS + np.cumsum([0, *sizes])
@@ -77,7 +79,9 @@ class OwnObservation:
         self._places = np.array(
             [places[b.name] + k for b in sheet.blocks if b.name in places for k in range(b.size)], dtype=np.intp
         )
-        self._steps = [s * _PART_OF_SIGMA or _SMALLEST_STEP for b in sheet.blocks for s in np.atleast_1d(b.sigma).tolist()]
+        self._steps = [
+            s * _PART_OF_SIGMA or _SMALLEST_STEP for b in sheet.blocks for s in np.atleast_1d(b.sigma).tolist()
+        ]
 
     def point(
         self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, values: Array
@@ -224,7 +228,7 @@ class OwnObservation:
         return noise
 
     def place(self, own: Array, jacobian: Array, offset: int) -> None:
-        """Write the columns of the blocks' states into a (d, n) Jacobian; ``offset``: index of the first value in it."""
+        """Write the columns of the blocks into a (d, n) Jacobian; ``offset`` is the index of the first value in it."""
         if len(self._places):
             jacobian[:, self._places + offset] = own[:, self._stated]
 

@@ -110,7 +110,7 @@ class ShipModel(ErrorModel):
         self.sway = sway
 
     def observes(self, instrument: Datasheet) -> bool:
-        """Whether it is a position, velocity, speed or heading, or of a kind with an observation and without a clock."""
+        """Whether it is a position, velocity, speed or heading, or has an observation of its own and brings no clock."""
         if any(block.process == "clock" for block in instrument.blocks):
             return False  # its states have independent errors
         return instrument.equation in OBSERVED or KINDS[instrument.kind].observation is not None
@@ -159,8 +159,8 @@ class ShipModel(ErrorModel):
             if sheet.equation == kinds.WATER_SPEED and sheet.scale:
                 self.scale_at[sheet.name] = 2 + len(states)
                 states.append(GaussMarkov(sheet.scale**2, 0.0, 0.0, 0.0))
-        own = [s for s in instruments.values() if KINDS[s.kind].observation is not None and self.observes(s)]
-        self.blocks = StateBlocks(own, 2 + len(states))
+        brought = [s for s in instruments.values() if KINDS[s.kind].observation is not None and self.observes(s)]
+        self.blocks = StateBlocks(brought, 2 + len(states))
         states += [GaussMarkov(*rates, 0.0) for rates in self.blocks.states]
         self.size = n = 2 + len(states)
         self.decay = np.array([0.0, 0.0, *(s.decay for s in states)])

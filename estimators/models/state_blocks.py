@@ -1,7 +1,7 @@
 """The blocks of states that the instruments of a run bring along (`simnav.blocks`), behind the states of a model.
 
-All components but those of a clock are independent, and a model moves them like its own calibration states, by decay and
-noise density. A clock's bias is coupled to its drift, and its noise is correlated: that is done here.
+All components but those of a clock are independent, and a model moves them like its own calibration states, by decay
+and noise density. A clock's bias is coupled to its drift, and its noise is correlated: that is done here.
 """
 
 from __future__ import annotations

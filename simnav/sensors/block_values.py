@@ -1,8 +1,8 @@
 """The true values of a block of states in one run (`simnav.blocks`).
 
-The process is drawn at the nodes of a grid of its own, and is linear between them. So its value at a time depends on the
-seed and the name of the block only: two instruments that share a block see the same value at the same time, at whatever
-rates they sample it, and a run in many blocks gives the same numbers as a run in one.
+The process is drawn at the nodes of a grid of its own, and is linear between them. So its value at a time depends on
+the seed and the name of the block only: two instruments that share a block see the same value at the same time, at
+whatever rates they sample it, and a run in many blocks gives the same numbers as a run in one.
 """
 
 from __future__ import annotations

@@ -20,14 +20,14 @@ def direction(azimuth, slant):
 
 
 def observe(point, sheet):
-    """The velocity along the beam, with the scale of the speed of sound. That by the scale is left to differences."""
+    """The velocity along the beam, with the scale of the speed of sound; the Jacobian by block."""
     beam = direction(sheet.details["azimuth"], sheet.details["slant"])
     scale = 1.0 + point.blocks["sound_speed"][0]
     along, v = point.dcm @ beam, point.velocity
     navigation = np.zeros((1, 9))
     navigation[0, 3:6] = scale * along
     navigation[0, 6:9] = scale * np.cross(along, v)
-    return np.array([scale * along @ v]), {"navigation": navigation}
+    return np.array([scale * along @ v]), {"navigation": navigation, "sound_speed": np.array([[along @ v]])}
 
 
 @register_instrument(

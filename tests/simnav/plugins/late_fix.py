@@ -15,8 +15,11 @@ from simnav.spec import NonNegative, quantity
 
 
 def observe(point, sheet):
-    """The position at which the fix was made, before its time stamp; all derivatives by differences."""
-    return displace(point.position, -point.blocks["delay"][0] * point.velocity)
+    """The position at which the fix was made, before its time stamp. The derivative by the delay is left to simnav."""
+    delay = point.blocks["delay"][0]
+    identity = np.eye(3)
+    navigation = np.hstack([identity, -delay * identity, np.zeros((3, 3))])
+    return displace(point.position, -delay * point.velocity), {"navigation": navigation}
 
 
 @register_instrument(
