@@ -110,7 +110,7 @@ class ShipModel(ErrorModel):
         self.sway = sway
 
     def observes(self, instrument: Datasheet) -> bool:
-        """Whether it is a position, velocity, speed or heading, or has an observation of its own and brings no clock."""
+        """Whether it is a position, velocity, speed or heading, or has an observation of its own and no clock."""
         if any(block.process == "clock" for block in instrument.blocks):
             return False  # its states have independent errors
         return instrument.equation in OBSERVED or KINDS[instrument.kind].observation is not None

@@ -331,3 +331,14 @@ def test_a_ship_s_model_leaves_clocks_alone(plugins):
     trial = run_trial(make("ship-ekf"), record(scenario, 1))
     assert trial.status == "ok"
     assert not any("transponder" in name for name in trial.diagnostics)
+
+
+def test_a_fault_and_a_block_are_both_states_of_the_oracle(plugins):
+    fault = '[[fault]]\nkind = "bias_step"\ninstruments = "beam_1"\nstart_s = 15\noffset_m_s = 0.3\n'
+    recording = record(fjord(plugins, "beams", duration=40.0, tables=fault), 2)
+    oracle, ekf = (run_trial(make(row), recording) for row in ("oracle", "ekf"))
+    assert {oracle.status, ekf.status} == {"ok"}
+    told, plain = (np.abs(errors(t, recording)[-20:, 3:5]).mean() for t in (oracle, ekf))
+    assert told < 0.7 * plain
+    own = block_errors(oracle, true_blocks(fjord(plugins, "beams"), 2, oracle.time))
+    assert np.abs(own["sound_speed"][-1]) < 3.0
