@@ -306,7 +306,7 @@ class OwnObservation:
         attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
         rates = point.angular_rate - errors[:, 9:12]
         for k, state in enumerate(zip(positions, velocities, attitudes, rates, strict=True)):
-            there = self._reading(NavigationPoint(point.time, *state, self._blocks_at(point, errors[k], offset)))
+            there = self.read(NavigationPoint(point.time, *state, self._blocks_at(point, errors[k], offset)))
             if there is not None:
                 differences[k] = self.kind.difference(there, reading)
         if bias_at >= 0:
@@ -320,7 +320,7 @@ class OwnObservation:
         moved = {name: point.blocks[name] + error[offset + at.start : offset + at.stop] for name, at in self._slices}
         return {**self._zeros, **moved}
 
-    def _reading(self, point: NavigationPoint) -> Array | None:
+    def read(self, point: NavigationPoint) -> Array | None:
         """The reading alone, without a Jacobian by differences; a Jacobian that needs none is checked, too."""
         result = self._call(point)
         if not self.sheet.blocks and not isinstance(result, np.ndarray):

@@ -107,7 +107,7 @@ class ShipObservation(OwnObservation):
         for k, error in enumerate(errors):
             there = position.copy()
             displace_ship(there, error[N], error[E])
-            found = self._reading(self._point(time, there, x + error))
+            found = self.read(self._point(time, there, x + error))
             if found is not None:
                 differences[k] = self.kind.difference(found, reading)
         at = self._bias_at
