@@ -11,7 +11,7 @@ A subclass says in plain NumPy
 - `describe`: the state as an estimate
 
 From these come the transition matrix, the Jacobian of each measurement, sigma points, and the chain for windows and
-full graphs (`GeneralChain`). Derivatives are central differences. A subclass that overrides `transition` or `read` may give
+full graphs (`GeneralChain`). Derivatives are central differences. A subclass may override `transition` or `read` with
 faster forms. After its own states come the biases of the instruments, if their datasheets have any, and the blocks that
 instruments bring along (`simnav.blocks`). Scale factors and misalignments have no states.
 
