@@ -333,7 +333,12 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
         with INSTRUMENTS.adding(name, cls):
             source = f"the example of kind {name!r}"
             try:
-                cls.from_toml(example, source=source).datasheet("example")
+                spec = cls.from_toml(example, source=source)
+                try:
+                    spec.blocks()
+                except ValueError as error:
+                    raise SpecError(f"{source}: {error}") from None
+                spec.datasheet("example")
             except SpecError as error:
                 raise PluginError(str(error)) from None
             except ValueError as error:

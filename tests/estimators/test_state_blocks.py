@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from simnav.environment import EstimatorAgent, NavigationEnv
-from simnav.estimator import make
+from simnav.estimator import find, make, names
 from simnav.estimators.bound import bound_of_run
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
@@ -228,6 +228,14 @@ def test_other_rows_run_and_stay_honest(plugins, runs, row, case):
         e, P = errors(trial, recording), trial.covariance
         k = -1
         assert e[k, :2] @ np.linalg.solve(P[k, :2, :2], e[k, :2]) < 25.0
+
+
+@pytest.mark.parametrize("case", ["beams", "clock"])
+def test_every_estimator_meets_them_and_runs_or_says_what_it_needs(plugins, case):
+    recording = record(fjord(plugins, case, duration=6.0), 1)
+    trials = [run_trial(make(name), recording) for name in names() if not find(name).slow]
+    assert not {t.estimator: t.reason for t in trials if t.failed}
+    assert sum(t.status == "ok" for t in trials) > 40
 
 
 # --- reports, environment, contract

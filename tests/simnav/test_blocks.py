@@ -161,6 +161,9 @@ def test_a_mistake_in_the_declaration_is_named_when_it_is_registered(clean_regis
     example = {"sigma_m": 1.0, "iron_m": 2.0}
     with pytest.raises(PluginError, match=r"an ideal instrument still has sigma = \(2.0,\) .*Iron.errors should name"):
         register_instrument(kind, example=example)(Iron)
+    broken = type("Broken", (Iron,), {"blocks": lambda self: (StateBlock("iron", 1, "furlong", self.iron),)})
+    with pytest.raises(PluginError, match="the example of kind 'iron': block 'iron': units = 'furlong' should"):
+        register_instrument(kind, example=example)(broken)
     with pytest.raises(PluginError, match="kind 'iron' brings blocks of states; its equation should be a function"):
         register_instrument(replace(kind, equation=None), example=example)(Iron)
 
