@@ -26,14 +26,15 @@ from simnav.source import record
 from simnav.testing.contract_check import check
 from simnav.trial import Trial, run_trial
 from simnav.types import Instruments, Measurement
+from tests.cases.block_consistency import DURATION, ROWS, WITHIN, block_errors, consistency
 from tests.cases.derivatives import along, innovation
 from tests.cases.fjord import CASES, fjord, true_blocks
 
-SEEDS, DURATION = 20, 40.0
+#: Runs of the solvers, and of the smoothers; `tests/audit/state_blocks.py` takes more.
+RUNS, SMOOTHED_RUNS = 6, 4
 #: Steps of the finite differences: position, velocity, attitude, biases.
 STEPS = np.repeat([1.0, 1e-2, 1e-5, 1e-5, 1e-3], 3)
 OF_CASE = {"iron": ("magnetometer", 6), "delay": ("fix", 1), "beams": ("beam_2", 1), "clock": ("transponder_0", 2)}
-ROWS = ("ekf", "ukf", "iekf", "inekf", "sw-fgo", "gnc-fgo", "oracle")
 
 
 @pytest.fixture(params=CASES)
@@ -144,44 +145,39 @@ def runs() -> dict[str, list[Recording]]:
 def recordings(runs, plugins, case) -> list[Recording]:
     scenario = fjord(plugins, case, duration=DURATION)
     if case not in runs:
-        runs[case] = [record(scenario, seed) for seed in range(SEEDS)]
+        runs[case] = [record(scenario, seed) for seed in range(RUNS)]
     return runs[case]
 
 
-def block_errors(trial: Trial, truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """By label, the (T, k) errors of the reported blocks in sigmas."""
-    return {
-        label: (trial.diagnostics[f"state.{label}"] - value) / trial.diagnostics[f"sigma.{label}"]
-        for label, value in truth.items()
-    }
+def unaware(recording: Recording) -> Recording:
+    """The recording with datasheets that say that the states are zero, although they are not."""
+    given = recording.instruments
+    sheets = [
+        replace(sheet, blocks=tuple(replace(block, sigma=0.0, density=0.0) for block in sheet.blocks))
+        for sheet in given.values()
+    ]
+    return replace(recording, instruments=Instruments(sheets, given.imu, given.step))
 
 
 def test_all_solvers_are_consistent_and_filter_and_window_agree(plugins, runs, case):
     scenario, made = fjord(plugins, case, duration=DURATION), recordings(runs, plugins, case)
-    rmse = {}
-    for row in ROWS:
-        nees, blocks, square = [], [], []
-        for recording in made:
-            trial = run_trial(make(row), recording)
-            assert trial.status == "ok", trial.reason
-            e, P = errors(trial, recording), trial.covariance
-            groups = [slice(0, 3), slice(3, 6), slice(6, 9)]
-            nees.append([[e[k, a] @ np.linalg.solve(P[k, a, a], e[k, a]) / 3.0 for a in groups] for k in (19, -1)])
-            own = block_errors(trial, true_blocks(scenario, recording.seed, trial.time))
-            blocks.append([np.mean([np.mean(z[k] ** 2) for z in own.values()]) for k in (19, -1)])
-            square.append(np.mean(e[:, :2] ** 2))
-        low, high = nees_band(3, SEEDS, 0.999)
-        assert np.all((low < np.mean(nees, axis=0)) & (np.mean(nees, axis=0) < high)), (row, np.mean(nees, axis=0))
-        low, high = nees_band(1, SEEDS, 0.999)
-        assert np.all((low < np.mean(blocks, axis=0)) & (np.mean(blocks, axis=0) < high)), (row, blocks)
-        rmse[row] = np.sqrt(np.mean(square))
-    assert rmse["sw-fgo"] == pytest.approx(rmse["ekf"], rel=0.02)
-    assert rmse["ukf"] == pytest.approx(rmse["ekf"], rel=0.02)
-    assert rmse["oracle"] == pytest.approx(rmse["ekf"], rel=0.05)
+    found = {row: consistency(row, scenario, made) for row in ROWS}
+    for row, figures in found.items():
+        assert figures.motion_kept, (row, figures)
+        assert figures.blocks_kept, (row, figures)
+    for row, part in WITHIN.items():
+        assert found[row].rmse == pytest.approx(found["ekf"].rmse, rel=part), row
+
+
+@pytest.mark.parametrize("row", ["ekf", "oracle"])
+def test_a_row_that_is_not_told_of_the_states_is_not_consistent(plugins, runs, row, case):
+    """So few runs are enough to see it."""
+    scenario, made = fjord(plugins, case, duration=DURATION), recordings(runs, plugins, case)
+    assert not consistency(row, scenario, [unaware(recording) for recording in made], blocks=False).motion_kept
 
 
 def test_the_smoother_and_the_full_graph_carry_them(plugins, runs, case):
-    made = recordings(runs, plugins, case)[:6]
+    made = recordings(runs, plugins, case)[:SMOOTHED_RUNS]
     rmse = {}
     for row in ("ekf", "ekf-rts", "ekf-two-filter", "fgo-full", "oracle-rts"):
         trials = [run_trial(make(row), recording) for recording in made]
@@ -209,11 +205,7 @@ def test_the_bound_has_them(plugins, case):
     reported = np.sqrt(trial.covariance[:, range(2), range(2)].sum(axis=1))
     assert sigma[-20:] == pytest.approx(reported[-20:], rel=0.1)
     # Were the states known, the bound would be lower.
-    sheets = [
-        replace(s, blocks=tuple(replace(b, sigma=0.0, density=0.0) for b in s.blocks))
-        for s in perfect.instruments.values()
-    ]
-    told = bound_of_run(replace(perfect, instruments=Instruments(sheets, perfect.instruments.imu, scenario.step)))
+    told = bound_of_run(unaware(perfect))
     share = np.diagonal(told[-1]) / np.diagonal(covariance[-1])
     assert share.max() < 1.0 + 1e-9
     assert share.min() < 0.995
