@@ -1,4 +1,4 @@
-"""The true values of a block of states in one run (`simnav.blocks`).
+"""The true values of a block of states in one run (`simnav.blocks`), and the check of what a kind declares.
 
 The process is drawn at the nodes of a grid of its own, and is linear between them. So its value at a time depends on
 the seed and the name of the block only: two instruments that share a block see the same value at the same time, at
@@ -7,13 +7,19 @@ whatever rates they sample it, and a run in many blocks gives the same numbers a
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from simnav.blocks import StateBlock
+from simnav.spec import SpecError
 from simnav.streams import stream
 from simnav.types import Array
 
-__all__ = ["BlockValues"]
+if TYPE_CHECKING:
+    from simnav.sensors.instrument import AidSpec
+
+__all__ = ["BlockValues", "check_blocks"]
 
 #: Step of the grid [s]; that of a Gauss-Markov process is at most this part of its correlation time.
 STEP, PART = 1.0, 0.05
@@ -77,3 +83,25 @@ class BlockValues:
             last = self._transition @ last + self._root @ self._rng.standard_normal(self.block.size)
             more[k] = last
         self._nodes = np.concatenate([self._nodes, more])
+
+
+def check_blocks(spec: AidSpec, source: str) -> None:
+    """Check the blocks of an example: an observation uses them, and an ideal instrument has none of their errors.
+
+    Raises
+    ------
+    SpecError
+        If they are not valid. The message begins with ``source``.
+    """
+    try:
+        blocks = spec.blocks()
+    except ValueError as error:
+        raise SpecError(f"{source}: {error}") from None
+    if blocks and spec.definition.observation is None:
+        raise SpecError(f"{source} brings blocks of states; its equation should be a function that uses them")
+    for block in spec.ideal().blocks():
+        if block.varies:
+            raise SpecError(
+                f"{source}: an ideal instrument still has sigma = {block.sigma} and density = {block.density} of its "
+                f"block {block.name!r}; {type(spec).__qualname__}.errors should name the fields that they come from"
+            )

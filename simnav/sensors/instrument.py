@@ -31,7 +31,7 @@ from simnav.blocks import StateBlock
 from simnav.kinds import INSTRUMENTS, Kind
 from simnav.plugins import PluginError, exception_of, place_of
 from simnav.recording import AidStream
-from simnav.sensors.block_values import BlockValues
+from simnav.sensors.block_values import BlockValues, check_blocks
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import (
     UNITS,
@@ -350,10 +350,7 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
             source = f"the example of kind {name!r}"
             try:
                 spec = cls.from_toml(example, source=source)
-                try:
-                    spec.blocks()
-                except ValueError as error:
-                    raise SpecError(f"{source}: {error}") from None
+                check_blocks(spec, source)
                 spec.datasheet("example")
             except SpecError as error:
                 raise PluginError(str(error)) from None
@@ -361,24 +358,10 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
                 raise PluginError(
                     f"{source}: its figures do not fit its components ({', '.join(kind.errors)}): {error}"
                 ) from None
-            _check_blocks(cls, kind, name)
         cls.build = _named(cls.build)  # type: ignore[method-assign]
         return cls
 
     return wrap
-
-
-def _check_blocks(cls: type[AidSpec], kind: Kind, name: str) -> None:
-    """Check the blocks of the example: an observation uses them, and an ideal instrument has none of their errors."""
-    spec = cls.from_toml(cls.example, source=f"the example of kind {name!r}")
-    if spec.blocks() and kind.observation is None:
-        raise PluginError(f"kind {name!r} brings blocks of states; its equation should be a function that uses them")
-    for block in spec.ideal().blocks():
-        if block.varies:
-            raise PluginError(
-                f"kind {name!r}: an ideal instrument still has sigma = {block.sigma} and density = {block.density} of "
-                f"its block {block.name!r}; {cls.__qualname__}.errors should name the fields that they come from"
-            )
 
 
 def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:

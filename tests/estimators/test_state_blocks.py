@@ -30,8 +30,8 @@ from tests.cases.block_consistency import DURATION, ROWS, WITHIN, block_errors, 
 from tests.cases.derivatives import along, innovation
 from tests.cases.fjord import CASES, fjord, true_blocks
 
-#: Runs of the solvers, and of the smoothers; `tests/audit/state_blocks.py` takes more.
-RUNS, SMOOTHED_RUNS = 6, 4
+#: Runs of the solvers, of the smoothers and of a ship; `tests/audit/state_blocks.py` takes more.
+RUNS, SMOOTHED_RUNS, SHIP_RUNS = 5, 3, 6
 #: Steps of the finite differences: position, velocity, attitude, biases.
 STEPS = np.repeat([1.0, 1e-2, 1e-5, 1e-5, 1e-3], 3)
 OF_CASE = {"iron": ("magnetometer", 6), "delay": ("fix", 1), "beams": ("beam_2", 1), "clock": ("transponder_0", 2)}
@@ -248,6 +248,27 @@ def test_an_agent_in_the_environment_gives_the_numbers_of_the_trial(plugins, cas
         observation, *_ = env.step(action)
 
 
+def test_they_sail_on_a_trajectory_of_others(plugins):
+    """Block form and steps give the same numbers there, too."""
+    file, tables = CASES["beams"]
+    text = (plugins / "poses.toml").read_text().replace('["poses.py"]', f'["poses.py", "{file}"]')
+    text = text.replace("sigma_m = 0.0", "sigma_m = 1.0").replace("sigma_m_s = 0.0", "sigma_m_s = 0.1")
+    scenario = parse(text + tables[tables.index("[instruments.beam_0]") :], folder=plugins)
+    trial = run_trial(make("ekf"), recording := record(scenario, 1))
+    e, P = errors(trial, recording)[-1, :3], trial.covariance[-1, :3, :3]
+    assert e @ np.linalg.solve(P, e) < 16.3  # 0.999 of chi-square with three degrees of freedom
+    own = block_errors(trial, true_blocks(scenario, 1, trial.time))
+    assert np.abs(own["sound_speed"][-1]) < 3.3
+    assert trial.diagnostics["sigma.sound_speed"][-1, 0] < 0.015  # it was 0.02
+    agent, env = EstimatorAgent(make("ekf")), NavigationEnv(scenario)
+    observation, info = env.reset(seed=1)
+    agent.reset(info)
+    for k in range(5):
+        action = agent.act(observation)
+        assert np.array_equal(agent.estimate.position, trial.position[k])
+        observation, *_ = env.step(action)
+
+
 def test_a_shared_block_is_reported_once(plugins):
     trial = run_trial(make("ekf"), record(fjord(plugins, "beams", duration=5.0), 1))
     assert [name for name in trial.diagnostics if name.startswith("state.")] == ["state.sound_speed"]
@@ -311,7 +332,7 @@ def test_a_ship_s_model_carries_them(plugins, name, row):
     file, tables = CASES[name]
     scenario = parse(SHIP.format(file=file) + tables, folder=plugins)
     nees, blocks = [], []
-    for seed in range(10):
+    for seed in range(SHIP_RUNS):
         trial = run_trial(make(row), recording := record(scenario, seed))
         assert trial.status == "ok", trial.reason
         e, P = errors(trial, recording)[-1, :2], trial.covariance[-1, :2, :2]
@@ -320,7 +341,7 @@ def test_a_ship_s_model_carries_them(plugins, name, row):
         blocks.append(own["fix.delay"][-1, 0] ** 2)
     assert trial.diagnostics["sigma.fix.delay"][-1, 0] < 0.45  # it was 0.5 s
     for found, d in ((nees, 2), (blocks, 1)):
-        low, high = nees_band(d, 10, 0.999)
+        low, high = nees_band(d, SHIP_RUNS, 0.999)
         assert low < np.mean(found) < high
 
 
