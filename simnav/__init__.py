@@ -16,6 +16,7 @@ from gymnasium.envs.registration import registry as _registry
 from simnav.scenario.catalogue import headers as _headers
 
 if TYPE_CHECKING:
+    from simnav.blocks import StateBlock
     from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv
     from simnav.estimator import Estimator, UnsuitableScenario, names, register
     from simnav.kinds import Component, Kind
@@ -92,6 +93,7 @@ __all__ = [
     "Recording",
     "RequestError",
     "Scenario",
+    "StateBlock",
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
@@ -135,6 +137,7 @@ __all__ = [
 # Modules, loaded when one of their names is first used. The last one is on the third floor: it is named by a string,
 # because the library must not import a floor above it.
 _HOMES = {
+    "blocks": ("StateBlock",),
     "environment": ("EstimatorAgent", "NavigationEnv", "NavigationVectorEnv"),
     "estimator": ("Estimator", "UnsuitableScenario", "names", "register"),
     "kinds": ("Component", "Kind"),

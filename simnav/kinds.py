@@ -13,10 +13,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, nextafter, pi
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from simnav.blocks import StateBlock
 from simnav.compiled import Array, kernel
 from simnav.geometry.earth import displace_scalar, relative_position
 from simnav.geometry.rotation import wrap_angle, wrap_scalar
@@ -88,6 +90,8 @@ class NavigationPoint(NamedTuple):
         Direction cosine matrix from body axes to north-east-down.
     angular_rate : (3,) array
         Angular rate of the body relative to the Earth, body axes [rad/s].
+    blocks : mapping of str to array
+        Values of the states that the instrument brings along, by the name of their block (`simnav.blocks.StateBlock`).
     """
 
     time: float
@@ -95,6 +99,7 @@ class NavigationPoint(NamedTuple):
     velocity: Array
     dcm: Array
     angular_rate: Array
+    blocks: Mapping[str, Array] = MappingProxyType({})
 
 
 @kernel()
@@ -131,9 +136,11 @@ def _add_errors(positions: int, cyclic: int, values: Array, errors: Array) -> No
 
 #: An observation model. It returns the (d,) reading that an instrument with this datasheet should give at a state, in
 #: SI units, and the (d, 9) Jacobian of the reading with respect to an error of the state: position north-east-down [m],
-#: velocity [m/s] and attitude, the rotation vector about north-east-down [rad] (`simnav.types.COMPONENTS`). It returns
-#: None if there is no reading at the state.
-Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array] | None"]
+#: velocity [m/s] and attitude, the rotation vector about north-east-down [rad] (`simnav.types.COMPONENTS`). In place of
+#: the Jacobian it may return one by block, ``{"navigation": (d, 9) array, "clock": (d, 2) array}``. A block that is not
+#: in it is differentiated by differences; so is all if it returns the reading alone. It returns None if there is no
+#: reading at the state.
+Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array | Mapping[str, Array]] | Array | None"]
 
 
 @dataclass(frozen=True)
@@ -409,6 +416,8 @@ class Datasheet:
         From the IMU (or the vessel's reference point) to the instrument, body axes [m].
     details : mapping
         What the datasheet of this kind holds beyond the above (``KINDS[kind].datasheet``), SI units and radians.
+    blocks : tuple of StateBlock
+        The states that the instrument brings along.
     """
 
     name: str
@@ -423,6 +432,7 @@ class Datasheet:
     misalignment: Array = field(default_factory=_zeros3)
     lever_arm: Array = field(default_factory=_zeros3)
     details: Mapping[str, Any] = field(default_factory=dict)
+    blocks: tuple[StateBlock, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

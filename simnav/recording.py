@@ -28,6 +28,7 @@ from simnav.types import (
     Measurement,
     Measurements,
     NavigationStates,
+    StateBlock,
     TapStates,
     TriadDatasheet,
 )
@@ -314,8 +315,8 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
-    """A datasheet as a dictionary for JSON, without ``details`` if they are empty."""
-    return {k: _plain(v) for k, v in asdict(sheet).items() if k != "details" or v}
+    """A datasheet as a dictionary for JSON, without ``details`` and ``blocks`` if they are empty."""
+    return {k: _plain(v) for k, v in asdict(sheet).items() if k not in ("details", "blocks") or v}
 
 
 def _sheets(instruments: Instruments) -> dict[str, Any]:
@@ -377,8 +378,9 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
     aids = []
     for aid in sheets["aids"]:
         fields: dict[str, Any] = {
-            k: np.array(v, dtype=np.float64) if isinstance(v, list) else v for k, v in aid.items()
+            k: np.array(v, dtype=np.float64) if isinstance(v, list) and k != "blocks" else v for k, v in aid.items()
         }
+        fields["blocks"] = tuple(StateBlock(**block) for block in aid.get("blocks", ()))
         aids.append(Datasheet(**fields))
     return Instruments(aids, imu, step)
 

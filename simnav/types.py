@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.blocks import StateBlock
 from simnav.compiled import Array, Flags, Integers
 from simnav.kinds import KINDS, Datasheet, Kind, Role
 
@@ -35,6 +36,7 @@ __all__ = [
     "Measurement",
     "Measurements",
     "NavigationStates",
+    "StateBlock",
     "TapStates",
     "TriadDatasheet",
 ]
@@ -273,6 +275,9 @@ class Estimate:
         Named scalars or small arrays, which are recorded at each epoch.
     flagged : sequence of (instrument, time)
         The measurements of this step that the estimator considers faulty. They are scored against the true faults.
+    states : mapping of str to (array, array)
+        Further states by name, each with its value (k,) and its standard deviation (k,): those that instruments bring
+        along (`simnav.blocks`). A trial keeps them as the diagnostics ``state.NAME`` and ``sigma.NAME``.
     """
 
     time: float
@@ -283,6 +288,7 @@ class Estimate:
     estimated: NDArray[np.bool_] | None = None
     diagnostics: Mapping[str, float | Array] = field(default_factory=dict)
     flagged: Sequence[tuple[str, float]] = ()
+    states: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
     def mask(self) -> NDArray[np.bool_]:
         """(9,) bool array: the components of `COMPONENTS` that this estimate holds."""

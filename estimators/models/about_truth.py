@@ -22,6 +22,9 @@ in a recorded log), the estimate itself is the next nominal state, as in an exte
 - the scale factor of each velocity and depth, the misalignment of a DVL, the deviation of a magnetic compass
 
 If the velocity of the water is given, it is treated as known. A speed log then measures the velocity over the ground.
+
+The states that instruments bring along (`simnav.blocks`) have no known truth. Where a step begins, their estimate is
+the next nominal value, as in an extended Kalman filter.
 """
 
 from __future__ import annotations
@@ -36,6 +39,7 @@ import numpy as np
 from simnav.estimators.models.base import ErrorModel, Linearised, is_fast, stationary
 from simnav.estimators.models.inertial import CURRENT, CURRENT_TIME, InertialModel, roll_pitch_yaw
 from simnav.estimators.models.propagation import correct_inertial
+from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.earth import principal_radii
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.kinds import BODY_VELOCITY, DEPTH, WATER_SPEED
@@ -114,6 +118,11 @@ class AboutTruthModel(ErrorModel):
         self.nominal = InertialModel()
         own = self.nominal.begin(start, Instruments(sheets, imu, instruments.step))
         self.sheets, self.time = instruments, start.time
+        mine = [s for s in instruments.values() if s.name in self.nominal.own]
+        self.blocks = StateBlocks(mine, _INERTIAL + len(self._states))
+        self._states += self.blocks.states
+        #: Places of the blocks in y, and in the error of the nominal state, where their values are.
+        self._block_at = [(at, self.nominal.blocks.at[label]) for label, at in self.blocks.at.items()]
         n = self.size = _INERTIAL + len(self._states)
         variance, rate, density = np.array(self._states).reshape(-1, 3).T
         covariance = np.zeros((n, n))
@@ -191,6 +200,9 @@ class AboutTruthModel(ErrorModel):
         nominal, y = self.nominal, self.y
         if abs(self.truth.time[k] - self.time) > _SAME:
             return
+        for mine, theirs in self._block_at:
+            nominal.calibration[theirs.start - _INERTIAL : theirs.stop - _INERTIAL] += y[mine]
+            y[mine] = 0.0
         if not self._known[k]:
             position, velocity, dcm = self._navigation()
             y[:_NAV] = 0.0
@@ -251,6 +263,8 @@ class AboutTruthModel(ErrorModel):
         index = np.arange(m, self.size)
         decay = np.exp(-self._rate * elapsed)
         phi[index, index] = decay
+        for at in self.blocks.clocks:
+            phi[at, at + 1] = elapsed
         if self._imu_errors:
             measured = self._measured(self.time, until)
             factor = np.append(measured, 1.0)[self._times]  # -1, for a bias, is the last
@@ -261,6 +275,7 @@ class AboutTruthModel(ErrorModel):
         covariance[:] = phi @ covariance @ phi.T
         covariance[:m, :m] += self.nominal.process_noise
         covariance[index, index] += noise
+        self.blocks.add_noise(covariance, elapsed)
         covariance[:] = 0.5 * (covariance + covariance.T)
         self.y = phi @ self.y
         self.time = until
@@ -281,6 +296,8 @@ class AboutTruthModel(ErrorModel):
             if error.times < 0:
                 jacobian[:, m + k] = own.jacobian[:, _NAV + error.axis]
         sheet, errors = self.sheets[measurement.instrument], self._aids[measurement.instrument]
+        for mine, theirs in self._block_at:
+            jacobian[:, mine] = own.jacobian[:, theirs]
         for component, at in errors.bias:
             jacobian[component, at] = 1.0
         if sheet.equation in (BODY_VELOCITY, WATER_SPEED, DEPTH):
@@ -308,14 +325,23 @@ class AboutTruthModel(ErrorModel):
     def snapshot(self) -> list[Array]:
         """Copies of what `correct` changes, and of the nominal state that it is an error of."""
         nominal = self.nominal
-        return [self.y.copy(), nominal.position.copy(), nominal.velocity.copy(), nominal.dcm.copy()]
+        arrays = self.y, nominal.position, nominal.velocity, nominal.dcm, nominal.calibration
+        return [array.copy() for array in arrays]
 
     def restore(self, snapshot: list[Array]) -> None:
         """Take corrections back."""
         self.y[:] = snapshot[0]
-        self.nominal.position[:], self.nominal.velocity[:], self.nominal.dcm[:] = snapshot[1:]
+        nominal = self.nominal
+        nominal.position[:], nominal.velocity[:], nominal.dcm[:], nominal.calibration[:] = snapshot[1:]
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""
         position, velocity, dcm = self._navigation()
-        return Estimate(self.time, position, velocity, roll_pitch_yaw(dcm), covariance[:_NAV, :_NAV].copy())
+        estimate = Estimate(self.time, position, velocity, roll_pitch_yaw(dcm), covariance[:_NAV, :_NAV].copy())
+        if self.blocks:
+            values = np.zeros(self.size)
+            for mine, theirs in self._block_at:
+                here = slice(theirs.start - _INERTIAL, theirs.stop - _INERTIAL)
+                values[mine] = self.nominal.calibration[here] + self.y[mine]
+            estimate.states = self.blocks.report(values, 0, covariance)
+        return estimate

@@ -55,7 +55,7 @@ def through_motion(first: int, row: Integers, coupled: int, transition: Array, j
     row : (M,) int array
         Index of the fold of each aiding factor; -1 for factors without a fold.
     coupled : int
-        States from this index on are independent and only decay.
+        States from this index on are independent and only decay; each may also move by the one after it.
     transition : (K, n, n) array
         Transition matrices from the nodes to the K folds.
     jacobian : (M, 3, n) array
@@ -76,6 +76,8 @@ def through_motion(first: int, row: Integers, coupled: int, transition: Array, j
                             at_node[c] += x * transition[row[i], j, c]
                     else:
                         at_node[j] += x * transition[row[i], j, j]
+                        if j + 1 < n and transition[row[i], j, j + 1] != 0.0:
+                            at_node[j + 1] += x * transition[row[i], j, j + 1]
             for c in range(n):
                 jacobian[i, r, c] = at_node[c]
 

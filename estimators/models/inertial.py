@@ -19,8 +19,9 @@ velocity v, gravity g, the Earth's radius R, the correlation time T and the dire
 In addition there are calibration states that depend on the datasheets: a bias for every component of an aiding
 instrument with a bias or an in-run instability, a DVL's scale factor and misalignment, a speed log's scale factor, and
 the current, north and east, for a speed log. The current has a fixed direction over ground: when the vessel turns, its
-component along the keel changes at once, which a bias along the keel could not describe. If all instruments have white
-noise only and there is no log, n is 15. With ``calibrate=False`` n is always 15, and these errors count as white noise.
+component along the keel changes at once, which a bias along the keel could not describe. Last come the blocks of states
+that instruments bring along (`simnav.blocks`). If all instruments have white noise only, bring no blocks, and there is
+no log, n is 15. With ``calibrate=False`` n is always 15, and these errors count as white noise.
 
 An IMU's scale factor and misalignment are not states. On a level vehicle the errors of the accelerometers act like a
 bias under gravity, which is added to the turn-on bias. The errors of the gyroscopes act in turns, as noise in
@@ -68,6 +69,7 @@ from simnav.estimators.models.propagation import (
     propagate_covariance,
     propagate_inertial,
 )
+from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.types import (
@@ -263,10 +265,13 @@ class InertialModel(ErrorModel):
                 CODES.get(sheet.equation, OWN), np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
-            if KINDS[sheet.kind].observation is not None:
-                self.own[sheet.name] = OwnObservation(sheet)
-        self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
         self._states += self._more_states()
+        own = [s for s in self.instruments.values() if s.name in self.noise and KINDS[s.kind].observation is not None]
+        self.blocks = StateBlocks(own if self.calibrate else [], _NAV + len(self._states))
+        self._states += self.blocks.states
+        for sheet in own:
+            self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
+        self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
         self.size = _NAV + len(self._states)
         self._jacobians = {name: np.empty((len(noise), self.size)) for name, noise in self.noise.items()}
         self.calibration = np.zeros(len(self._states))
@@ -339,16 +344,21 @@ class InertialModel(ErrorModel):
         propagate_covariance(
             covariance, self.transition, self.process_noise, self.calibration, self._decay, self._density, elapsed
         )
+        if self.blocks:
+            self.blocks.carry_values(self.calibration, _NAV, elapsed)
+            self.blocks.carry_covariance(covariance, elapsed)
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error, or several in columns, through the last propagation, in place."""
         if error.ndim == 2 and error.flags.carray:
             _carry(self.transition, self._decay, elapsed, error)
-            return
-        m = len(self.transition)
-        error[:m] = self.transition @ error[:m]
-        if len(self._decay):
-            error.T[..., m:] *= np.exp(-self._decay * elapsed)
+        else:
+            m = len(self.transition)
+            error[:m] = self.transition @ error[:m]
+            if len(self._decay):
+                error.T[..., m:] *= np.exp(-self._decay * elapsed)
+        if self.blocks:
+            self.blocks.carry(error, elapsed)
 
     @property
     def held(self) -> float:
@@ -359,8 +369,11 @@ class InertialModel(ErrorModel):
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         name = measurement.instrument
         if name in self.own:
-            found = self.observe_own(name, measurement.time, measurement.value, self._state())
-            return None if found is None else Linearised(*found, self.noise[name])
+            found = self._linearise_own(name, measurement.time, measurement.value, self._state())
+            if found is None:
+                return None
+            noise = self.noise[name] if found[2] is None else self.noise[name] + found[2]
+            return Linearised(*found[:2], noise)
         jacobian, noise = self._jacobians[name], self.noise[name]
         innovation, value = np.empty(len(noise)), measurement.value.astype(np.float64)
         if not observe(self.aid_parameters[name], value, self._state(), innovation, jacobian):
@@ -374,9 +387,15 @@ class InertialModel(ErrorModel):
 
     def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is position, velocity, DCM, angular rate, bias and calibration."""
-        *moving, calibration = state
+        found = self._linearise_own(name, time, value, state)
+        return None if found is None else found[:2]
+
+    def _linearise_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...]
+    ) -> tuple[Array, Array, Array | None] | None:
+        position, velocity, dcm, rate, bias, calibration = state
         own, size = self.own[name], _NAV + len(calibration)
-        point = own.point(time, *moving)
+        point = own.point(time, position, velocity, dcm, rate, bias, calibration)
         return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
@@ -429,7 +448,10 @@ class InertialModel(ErrorModel):
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""
         attitude = roll_pitch_yaw(self.dcm)
-        return Estimate(self.time, self.position.copy(), self.velocity.copy(), attitude, covariance[:9, :9].copy())
+        estimate = Estimate(self.time, self.position.copy(), self.velocity.copy(), attitude, covariance[:9, :9].copy())
+        if self.blocks:
+            estimate.states = self.blocks.report(self.calibration, _NAV, covariance)
+        return estimate
 
 
 def roll_pitch_yaw(dcm: Array) -> Array:

@@ -71,7 +71,7 @@ def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
 
     The equations are those of the module. J must hold F, or the result of an earlier call: only the rows of position,
     velocity and attitude and the columns of attitude and biases depend on the shift. Biases and calibration states are
-    independent and only decay.
+    independent and only decay; a clock's bias also moves by the drift that follows it.
     """
     n = s.size
     m = min(n, 15)
@@ -84,6 +84,8 @@ def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
             J[i, j] = F[i, j]
     for i in range(9, n):
         moved[i] = F[i, i] * s[i]
+        if i >= 15 and i + 1 < n and F[i, i + 1] != 0.0:
+            moved[i] += F[i, i + 1] * s[i + 1]
     p0, p1, p2 = s[6], s[7], s[8]
     size = p0 * p0 + p1 * p1 + p2 * p2
     if n >= 15:

@@ -217,6 +217,8 @@ class InertialPoints(InertialModel, PointModel):
                 errors,
             )  # fmt: skip
         errors[:, 15:] *= np.exp(-self._decay * elapsed)
+        if self.blocks:
+            self.blocks.carry(errors.T, elapsed)
         return noise
 
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
@@ -224,8 +226,8 @@ class InertialPoints(InertialModel, PointModel):
         name = measurement.instrument
         if name in self.own:
             own = self.own[name]
-            point = own.point(measurement.time, self.position, self.velocity, self.dcm, self.raw_rate, self.bias)
-            found = own.differences(point, errors, self.bias_at.get(name, -1))
+            point = own.point(measurement.time, *self._state())
+            found = own.differences(point, errors, self.bias_at.get(name, -1), NAVIGATION_STATES)
             assert found is not None  # `measure` says something of it
             return found
         differences = np.empty((len(errors), len(self.noise[name])))

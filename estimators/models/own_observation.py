@@ -4,15 +4,22 @@ A kind may name one of the compiled equations (`simnav.kinds.EQUATIONS`), or be 
 reading and gives its Jacobian (`simnav.kinds.Observation`; see ``docs/how-to/add-an-instrument.md``). Such functions
 are used here, for every model over the inertial state, in filters and graphs; for a ship without an IMU see
 `simnav.estimators.models.ship_observation`.
+
+A reading may depend on states that the instrument brings along (`simnav.blocks`). A Jacobian, or a block of it, that
+the function does not give is computed here by central differences.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
+from simnav.blocks import NAVIGATION
 from simnav.geometry.earth import earth_rate, principal_radii
 from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import NavigationPoint
@@ -23,6 +30,11 @@ __all__ = ["OwnObservation"]
 
 #: Number of columns of an observation's Jacobian: position, velocity, attitude.
 _COMPONENTS = 9
+#: Steps of the differences: position [m], velocity [m/s], attitude [rad]; of a block, as a part of its sigma, and where
+#: that is zero.
+_STEPS = np.repeat([0.1, 1e-3, 1e-5], 3)
+_PART_OF_SIGMA, _SMALLEST_STEP = 1e-3, 1e-6
+_NONE: Mapping[str, Array] = MappingProxyType({})
 
 
 class OwnObservation:
@@ -32,6 +44,11 @@ class OwnObservation:
     ----------
     sheet : Datasheet
         Datasheet of an instrument whose kind has an observation function.
+    places : mapping of str to int, optional
+        Index of the first state of each of its blocks in the array of values that `point` receives. A block without a
+        place has no state: it is zero, and its uncertainty counts as noise.
+    since : float
+        Time of the start of the run [s].
 
     Raises
     ------
@@ -39,47 +56,150 @@ class OwnObservation:
         During a run, if the function of the kind raises, or does not return finite arrays of the right shapes.
     """
 
-    def __init__(self, sheet: Datasheet):
+    def __init__(self, sheet: Datasheet, places: Mapping[str, int] = MappingProxyType({}), since: float = 0.0):
         self.sheet, self.kind = sheet, KINDS[sheet.kind]
         observation = self.kind.observation
         assert observation is not None
         self._observation = observation
+        self._since = since
+        self._slices = [
+            (b.name, slice(places[b.name], places[b.name] + b.size)) for b in sheet.blocks if b.name in places
+        ]
+        self._zeros = {b.name: np.zeros(b.size) for b in sheet.blocks if b.name not in places}
+        sizes = [block.size for block in sheet.blocks]
+        ends = _COMPONENTS + np.cumsum([0, *sizes])
+        #: Columns of the function's own Jacobian, by block.
+        self._columns = {NAVIGATION: slice(0, _COMPONENTS)}
+        self._columns |= {b.name: slice(int(i), int(i) + b.size) for b, i in zip(sheet.blocks, ends)}
+        self._width = int(ends[-1])
+        #: Of the columns after navigation: those with a state, and the places of these states.
+        stated = [b.name in places for b in sheet.blocks for _ in range(b.size)]
+        self._stated = _COMPONENTS + np.flatnonzero(stated)
+        self._free = _COMPONENTS + np.flatnonzero(np.logical_not(stated))
+        self._places = np.array(
+            [places[b.name] + k for b in sheet.blocks if b.name in places for k in range(b.size)], dtype=np.intp
+        )
+        self._steps = [
+            s * _PART_OF_SIGMA or _SMALLEST_STEP for b in sheet.blocks for s in np.atleast_1d(b.sigma).tolist()
+        ]
 
     def point(
-        self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array
+        self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, values: Array
     ) -> NavigationPoint:
-        """The state for the function; ``rate`` is the output of the gyroscopes and ``bias`` their bias."""
+        """The state for the function.
+
+        Parameters
+        ----------
+        time : float
+            Time of validity [s].
+        position, velocity, dcm
+            As of `simnav.kinds.NavigationPoint`.
+        rate : (3,) array
+            Output of the gyroscopes [rad/s].
+        bias : (3 or more,) array
+            Their bias first [rad/s].
+        values : (m,) array
+            The states among which those of the blocks are.
+        """
         turning = rate - bias[:3] - dcm.T @ earth_rate(position[0])
-        return NavigationPoint(time, position, velocity, dcm, turning)
+        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(values))
+
+    def blocks(self, values: Array) -> Mapping[str, Array]:
+        """The values of the blocks, by name."""
+        if not self.sheet.blocks:
+            return _NONE
+        return {**self._zeros, **{name: values[at] for name, at in self._slices}}
 
     def predict(self, point: NavigationPoint) -> tuple[Array, Array] | None:
-        """The (d,) reading at a state and its (d, 9) Jacobian; None if there is no reading at the state."""
-        try:
-            result = self._observation(point, self.sheet)
-        except Exception as error:
-            raise ValueError(f"{self._label()} raised {type(error).__name__}: {error}") from error
+        """The (d,) reading at a state and its Jacobian; None if there is no reading at the state.
+
+        The Jacobian has nine columns for navigation, then those of the blocks in the order of the datasheet.
+        """
+        return self._checked(point, self._call(point))
+
+    def _checked(self, point: NavigationPoint, result: Any) -> tuple[Array, Array] | None:
+        """What the function returned at a point, with a whole Jacobian."""
         if result is None:
             return None
         d = len(self.kind.components)
+        bare = isinstance(result, np.ndarray)
         try:
-            reading, jacobian = (np.asarray(part, dtype=np.float64) for part in result)
-            fits = reading.shape == (d,) and jacobian.shape == (d, _COMPONENTS)
-            given = f"shapes {reading.shape} and {jacobian.shape}"
+            reading, given = (result, {}) if bare else result
+            reading = np.asarray(reading, dtype=np.float64)
+            if not isinstance(given, Mapping):
+                given = {NAVIGATION: given}
+            blocks = {name: np.asarray(part, dtype=np.float64) for name, part in given.items()}
         except (TypeError, ValueError):
-            fits, given = False, repr(result)
-        if not fits:
-            raise ValueError(
-                f"{self._label()} should return a reading of shape {(d,)} and its Jacobian "
-                f"of shape {(d, _COMPONENTS)}, or None, not {given}"
-            )
+            raise self._wrong(repr(result)) from None
+        sizes = {name: (d, at.stop - at.start) for name, at in self._columns.items()}
+        if reading.shape != (d,) or any(part.shape != sizes.get(name) for name, part in blocks.items()):
+            shapes = " and ".join(str(part.shape) for part in blocks.values())
+            if set(blocks) != {NAVIGATION}:
+                shapes = ", ".join(f"{name!r}: {part.shape}" for name, part in blocks.items())
+            raise self._wrong(f"shapes {reading.shape} and {shapes or 'nothing'}")
+        if len(blocks) == 1 and self._width == _COMPONENTS:
+            jacobian = blocks[NAVIGATION]
+        else:
+            jacobian = self._completed(point, reading, blocks)
         # A sum is finite where each of its terms is. That of an estimator whose state is not finite is its own fault.
-        state = (point.position, point.velocity, point.dcm)
+        state = (point.position, point.velocity, point.dcm, *point.blocks.values())
         if not isfinite(reading.sum() + jacobian.sum()) and all(np.isfinite(part).all() for part in state):
             raise ValueError(
                 f"{self._label()} should return finite numbers, or None where the state has no reading, not "
                 f"{reading.tolist()} with the Jacobian {jacobian.tolist()}"
             )
         return reading, jacobian
+
+    def _call(self, point: NavigationPoint) -> Any:
+        try:
+            return self._observation(point, self.sheet)
+        except Exception as error:
+            raise ValueError(f"{self._label()} raised {type(error).__name__}: {error}") from error
+
+    def _wrong(self, given: str) -> ValueError:
+        """The error for a result of another form."""
+        d = len(self.kind.components)
+        message = (
+            f"{self._label()} should return a reading of shape {(d,)} and its Jacobian "
+            f"of shape {(d, _COMPONENTS)}, or None, not {given}"
+        )
+        if self.sheet.blocks:
+            sizes = ", ".join(f"{name!r}: {(d, at.stop - at.start)}" for name, at in self._columns.items())
+            message += f"; by block the Jacobian is a dict of arrays of the shapes {{{sizes}}}"
+        return ValueError(message)
+
+    def _completed(self, point: NavigationPoint, reading: Array, blocks: Mapping[str, Array]) -> Array:
+        """The whole Jacobian, with differences for the blocks that are not given."""
+        jacobian = np.zeros((len(reading), self._width))
+        for name, at in self._columns.items():
+            if name in blocks:
+                jacobian[:, at] = blocks[name]
+                continue
+            for k in range(at.start, at.stop):
+                step = float(_STEPS[k]) if k < _COMPONENTS else self._steps[k - _COMPONENTS]
+                jacobian[:, k] = self._slope(point, reading, k, step)
+        return jacobian
+
+    def _slope(self, point: NavigationPoint, reading: Array, column: int, step: float) -> Array:
+        """The derivative of the reading by one component of the state; zero where its neighbours have no reading."""
+        ends, length = [reading, reading], 0.0
+        for side, sign in enumerate((1.0, -1.0)):
+            error = np.zeros(self._width)
+            error[column] = sign * step
+            found = self._call(self._moved(point, error))
+            if found is not None:
+                ends[side] = np.asarray(found if isinstance(found, np.ndarray) else found[0], dtype=np.float64)
+                length += step
+        return np.asarray(self.kind.difference(ends[0], ends[1]) / length) if length else np.zeros(len(reading))
+
+    def _moved(self, point: NavigationPoint, error: Array) -> NavigationPoint:
+        """A state with an error: navigation, then the blocks of the datasheet."""
+        position = point.position + error[:3] / _metres(point.position)
+        dcm = dcm_from_rotation_vector(error[6:9]) @ point.dcm
+        blocks = point.blocks
+        if self.sheet.blocks:
+            blocks = {b.name: point.blocks[b.name] + error[self._columns[b.name]] for b in self.sheet.blocks}
+        return NavigationPoint(point.time, position, point.velocity + error[3:6], dcm, point.angular_rate, blocks)
 
     def _label(self) -> str:
         """The function, for messages: of which kind it is, for which instrument, and where it stands."""
@@ -88,9 +208,33 @@ class OwnObservation:
         place = f"{function}() in {Path(file).name}, line {line}"
         return f"the observation of kind {self.sheet.kind!r} ({place}), for the instrument {self.sheet.name!r},"
 
+    def spread(self, own: Array, time: float) -> Array | None:
+        """The (d, d) noise of the blocks that have no state; None if all have one.
+
+        Parameters
+        ----------
+        own : (d, 9 + b) array
+            Jacobian of `predict`.
+        time : float
+            Time of validity [s]. The uncertainty of a clock or a random walk grows from the start of the run.
+        """
+        if not len(self._free):
+            return None
+        noise = np.zeros((len(own), len(own)))
+        for block in self.sheet.blocks:
+            if block.name in self._zeros:
+                part = own[:, self._columns[block.name]]
+                noise += part @ block.covariance(max(0.0, time - self._since)) @ part.T
+        return noise
+
+    def place(self, own: Array, jacobian: Array, offset: int) -> None:
+        """Write the columns of the blocks into a (d, n) Jacobian; ``offset`` is the index of the first value in it."""
+        if len(self._places):
+            jacobian[:, self._places + offset] = own[:, self._stated]
+
     def linearise(
         self, point: NavigationPoint, value: Array, calibration: Array, size: int, bias_at: int
-    ) -> tuple[Array, Array] | None:
+    ) -> tuple[Array, Array, Array | None] | None:
         """Innovation and Jacobian of a measurement.
 
         Parameters
@@ -112,6 +256,8 @@ class OwnObservation:
             Measurement minus prediction, in the units of the kind's errors.
         jacobian : (d, n) array
             Jacobian of the prediction with respect to the error state.
+        noise : (d, d) array or None
+            Covariance of what is without a state (`spread`).
         """
         predicted = self.predict(point)
         if predicted is None:
@@ -119,14 +265,15 @@ class OwnObservation:
         reading, own = predicted
         d = len(reading)
         jacobian = np.zeros((d, size))
-        jacobian[:, :_COMPONENTS] = own
+        jacobian[:, :_COMPONENTS] = own[:, :_COMPONENTS]
+        self.place(own, jacobian, size - len(calibration))
         if bias_at >= 0:
             jacobian[range(d), range(bias_at, bias_at + d)] = 1.0
             first = bias_at + len(calibration) - size
             reading = self.kind.add_error(reading, calibration[first : first + d])
-        return self.kind.difference(value, reading), jacobian
+        return self.kind.difference(value, reading), jacobian, self.spread(own, point.time)
 
-    def differences(self, point: NavigationPoint, errors: Array, bias_at: int) -> Array | None:
+    def differences(self, point: NavigationPoint, errors: Array, bias_at: int, offset: int) -> Array | None:
         """The predicted readings of the instrument at k states, minus that at one state.
 
         Parameters
@@ -137,6 +284,8 @@ class OwnObservation:
             Differences of the states from the point, as in `simnav.estimators.models.base.ErrorModel.correct`.
         bias_at : int
             Index of the instrument's first bias state; negative if it has none.
+        offset : int
+            Index in the error state of the first value that `point` received.
 
         Returns
         -------
@@ -148,18 +297,44 @@ class OwnObservation:
         if predicted is None:
             return None
         reading, jacobian = predicted
-        differences = errors[:, :_COMPONENTS] @ jacobian.T
-        meridian, prime = principal_radii(point.position[0])
-        height = point.position[2]
-        metres = np.array([meridian + height, (prime + height) * np.cos(point.position[0]), -1.0])
+        differences = errors[:, :_COMPONENTS] @ jacobian[:, :_COMPONENTS].T
+        if len(self._places):
+            differences += errors[:, self._places + offset] @ jacobian[:, self._stated].T
+        metres = _metres(point.position)
         positions = point.position + errors[:, :3] / metres
         velocities = point.velocity + errors[:, 3:6]
         attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
         rates = point.angular_rate - errors[:, 9:12]
         for k, state in enumerate(zip(positions, velocities, attitudes, rates, strict=True)):
-            there = self.predict(NavigationPoint(point.time, *state))
+            there = self.read(NavigationPoint(point.time, *state, self._blocks_at(point, errors[k], offset)))
             if there is not None:
-                differences[k] = self.kind.difference(there[0], reading)
+                differences[k] = self.kind.difference(there, reading)
         if bias_at >= 0:
             differences += errors[:, bias_at : bias_at + len(reading)]
         return differences
+
+    def _blocks_at(self, point: NavigationPoint, error: Array, offset: int) -> Mapping[str, Array]:
+        """The blocks at a state that differs from a point by an (n,) error."""
+        if not self._slices:
+            return point.blocks
+        moved = {name: point.blocks[name] + error[offset + at.start : offset + at.stop] for name, at in self._slices}
+        return {**self._zeros, **moved}
+
+    def read(self, point: NavigationPoint) -> Array | None:
+        """The reading alone, without a Jacobian by differences; a Jacobian that needs none is checked, too."""
+        result = self._call(point)
+        if not self.sheet.blocks and not isinstance(result, np.ndarray):
+            found = self._checked(point, result)
+            return None if found is None else found[0]
+        if result is None:
+            return None
+        reading = np.asarray(result if isinstance(result, np.ndarray) else result[0], dtype=np.float64)
+        if reading.shape != (len(self.kind.components),):
+            raise self._wrong(f"shape {reading.shape}")
+        return reading
+
+
+def _metres(position: Array) -> Array:
+    """(3,) metres north and east a radian of latitude and longitude, and a metre of height down."""
+    meridian, prime = principal_radii(position[0])
+    return np.array([meridian + position[2], (prime + position[2]) * np.cos(position[0]), -1.0])

@@ -1,8 +1,9 @@
 """The ship dead-reckoning model: position, speed, heading, turn rate and current, for a ship without an INS.
 
 State: latitude and longitude; forward speed u through the water; heading psi; turn rate r; current c (north, east);
-and, if the datasheets give them, a bias for each compass and log and a scale factor for each log. Motion, with the
-horizontal position p, the correlation time T of a state, and ' for the time derivative:
+and, if the datasheets give them, a bias for each compass and log, a scale factor for each log, and the blocks of states
+that instruments bring along (`simnav.blocks`), but for clocks. Motion, with the horizontal position p, the correlation
+time T of a state, and ' for the time derivative:
 
 - p' = u (cos psi, sin psi) + c
 - u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases as in
@@ -45,6 +46,7 @@ from simnav.estimators.models.ship_kernels import (
     observe_ship,
 )
 from simnav.estimators.models.ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
+from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
@@ -108,7 +110,9 @@ class ShipModel(ErrorModel):
         self.sway = sway
 
     def observes(self, instrument: Datasheet) -> bool:
-        """Whether it is a position, velocity, speed or heading, or of a kind with an observation of its own."""
+        """Whether it is a position, velocity, speed or heading, or has an observation of its own and no clock."""
+        if any(block.process == "clock" for block in instrument.blocks):
+            return False  # its states have independent errors
         return instrument.equation in OBSERVED or KINDS[instrument.kind].observation is not None
 
     @property
@@ -143,6 +147,8 @@ class ShipModel(ErrorModel):
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
             own = KINDS[sheet.kind].observation is not None
+            if own and not self.observes(sheet):
+                continue
             if not own and sheet.equation not in (kinds.HEADING, *POSITIONS, kinds.WATER_SPEED):
                 continue
             d = len(sheet.sigma) if own else 2 if sheet.equation in POSITIONS else 1
@@ -153,6 +159,9 @@ class ShipModel(ErrorModel):
             if sheet.equation == kinds.WATER_SPEED and sheet.scale:
                 self.scale_at[sheet.name] = 2 + len(states)
                 states.append(GaussMarkov(sheet.scale**2, 0.0, 0.0, 0.0))
+        brought = [s for s in instruments.values() if KINDS[s.kind].observation is not None and self.observes(s)]
+        self.blocks = StateBlocks(brought, 2 + len(states))
+        states += [GaussMarkov(*rates, 0.0) for rates in self.blocks.states]
         self.size = n = 2 + len(states)
         self.decay = np.array([0.0, 0.0, *(s.decay for s in states)])
         self.density = np.array([0.0, 0.0, *(s.noise for s in states)])
@@ -185,10 +194,12 @@ class ShipModel(ErrorModel):
         self.aids: dict[str, tuple[NDArray[np.int64], Array, int]] = {}
         self.own: dict[str, ShipObservation] = {}
         for name, sheet in self.instruments.items():
+            if not self.observes(sheet):
+                continue
             if KINDS[sheet.kind].observation is not None:
-                bias_at, white = self.bias_at.get(name, -1), _white(sheet)
-                self.own[name] = ShipObservation(sheet, bias_at, white, self._height_variance, self.sway**2)
-            elif self.observes(sheet):
+                bias_at, white, places = self.bias_at.get(name, -1), _white(sheet), self.blocks.places(name, 0)
+                self.own[name] = ShipObservation(sheet, places, bias_at, white, self._height_variance, self.sway**2)
+            else:
                 kind, numbers = _aid(sheet, self.sway)
                 code = np.array([kind, self.bias_at.get(name, -1), self.scale_at.get(name, -1)], dtype=np.int64)
                 self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
@@ -233,7 +244,11 @@ class ShipModel(ErrorModel):
         describe_ship(self.x, covariance, self.sway, velocity, full)
         full[2, 2], full[5, 5] = self._height_variance, VERTICAL_SPEED**2
         full[6, 6] = full[7, 7] = HEEL**2
-        return Estimate(self.time, self.position.copy(), velocity, np.array([0.0, 0.0, wrap(psi)]), full, ESTIMATED)
+        attitude = np.array([0.0, 0.0, wrap(psi)])
+        estimate = Estimate(self.time, self.position.copy(), velocity, attitude, full, ESTIMATED)
+        if self.blocks:
+            estimate.states = self.blocks.report(self.x, 0, covariance)
+        return estimate
 
 
 def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:

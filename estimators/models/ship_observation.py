@@ -7,6 +7,7 @@ What a reading depends on beyond that is noise: height, vertical speed, roll and
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import cos, sin
 
 import numpy as np
@@ -32,6 +33,8 @@ class ShipObservation(OwnObservation):
     ----------
     sheet : Datasheet
         Datasheet of the instrument, of a kind with an observation.
+    places : mapping of str to int
+        Index in the state of the first component of each of the instrument's blocks.
     bias_at : int
         Index of the instrument's first bias in the state; -1 if it has none.
     white : (d,) array
@@ -40,8 +43,10 @@ class ShipObservation(OwnObservation):
         Variance of the height [m^2], and of the sideways velocity [(m/s)^2].
     """
 
-    def __init__(self, sheet: Datasheet, bias_at: int, white: Array, height: float, sway: float):
-        super().__init__(sheet)
+    def __init__(
+        self, sheet: Datasheet, places: Mapping[str, int], bias_at: int, white: Array, height: float, sway: float
+    ):
+        super().__init__(sheet, places)
         self._bias_at, self._white, self._sway = bias_at, np.diag(white), sway
         self._unknown = np.diag([0.0, 0.0, height, 0.0, 0.0, VERTICAL_SPEED**2, HEEL**2, HEEL**2, 0.0])
 
@@ -62,11 +67,13 @@ class ShipObservation(OwnObservation):
         Linearised or None
             None where the state has no reading.
         """
-        predicted = self.predict(_point(time, position, x))
+        predicted = self.predict(self._point(time, position, x))
         if predicted is None:
             return None
-        reading, own = predicted
+        reading, whole = predicted
+        own = whole[:, :9]
         jacobian, at, d = own @ _navigation(x), self._bias_at, len(reading)
+        self.place(whole, jacobian, 0)
         if at >= 0:
             jacobian[:, at : at + d] = np.eye(d)
             reading = self.kind.add_error(reading, x[at : at + d])
@@ -91,28 +98,29 @@ class ShipObservation(OwnObservation):
         (k, d) array
             A state that has no reading gets the difference by the Jacobian.
         """
-        predicted = self.predict(_point(time, position, x))
+        predicted = self.predict(self._point(time, position, x))
         assert predicted is not None, "the model's own state has a reading"
         reading, own = predicted
-        differences = errors @ (own @ _navigation(x)).T
+        jacobian = own[:, :9] @ _navigation(x)
+        self.place(own, jacobian, 0)
+        differences = errors @ jacobian.T
         for k, error in enumerate(errors):
             there = position.copy()
             displace_ship(there, error[N], error[E])
-            found = self.predict(_point(time, there, x + error))
+            found = self.read(self._point(time, there, x + error))
             if found is not None:
-                differences[k] = self.kind.difference(found[0], reading)
+                differences[k] = self.kind.difference(found, reading)
         at = self._bias_at
         if at >= 0:
             differences += errors[:, at : at + len(reading)]
         return differences
 
-
-def _point(time: float, position: Array, x: Array) -> NavigationPoint:
-    """The navigation state of a ship."""
-    c, s = cos(x[PSI]), sin(x[PSI])
-    velocity = np.array([x[U] * c + x[CN], x[U] * s + x[CE], 0.0])
-    dcm = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return NavigationPoint(time, position, velocity, dcm, np.array([0.0, 0.0, x[R]]))
+    def _point(self, time: float, position: Array, x: Array) -> NavigationPoint:
+        """The navigation state of a ship."""
+        c, s = cos(x[PSI]), sin(x[PSI])
+        velocity = np.array([x[U] * c + x[CN], x[U] * s + x[CE], 0.0])
+        dcm = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return NavigationPoint(time, position, velocity, dcm, np.array([0.0, 0.0, x[R]]), self.blocks(x))
 
 
 def _navigation(x: Array) -> Array:

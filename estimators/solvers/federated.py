@@ -53,6 +53,7 @@ from simnav.estimators.models.base import Observation
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.models.propagation import propagate_covariance
+from simnav.estimators.models.state_blocks import without_shared_blocks
 from simnav.estimators.models.unaided import UnaidedModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
@@ -133,7 +134,7 @@ class FederatedEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
-        super().reset(start, instruments)
+        super().reset(start, without_shared_blocks(instruments))
         names = self._names
         shares = self.shares or tuple((1.0 - self.master_share) / len(names) for _ in names)
         if len(shares) != len(names):
@@ -141,6 +142,8 @@ class FederatedEstimator(KalmanEstimator):
         model = self.model
         self._common = c = len(model.transition)
         starts = {name: [at[name] for at in (model.bias_at, model.scale_at) if name in at] for name in names}
+        for name in names:
+            starts[name] += [at.start for at in model.blocks.of(name)]
         stops = sorted([*(at for each in starts.values() for at in each), model.size])
         self._locals: dict[str, _Local] = {}
         for name, share in zip(names, shares):
@@ -178,6 +181,9 @@ class FederatedEstimator(KalmanEstimator):
             propagate_covariance(local.covariance, transition, noise, self._still, decay, density, elapsed)
             local.error[:c] = transition @ local.error[:c]
             local.error[c:] *= kept
+            if model.blocks:
+                model.blocks.carry_covariance(local.covariance, elapsed)
+                model.blocks.carry(local.error, elapsed)
 
     def _estimate(self) -> Estimate:
         """The master's estimate; fused, if the step ends with a fusion epoch."""

@@ -201,6 +201,8 @@ class WindowEstimator(Solver):
         diagnostics["inconsistent"] = float(self._cost_test.inconsistent)
         if self._cost_test.inconsistent and estimate.covariance is not None:
             estimate.covariance *= self._cost_test.inflation
+            wider = self._cost_test.inflation**0.5
+            estimate.states = {name: (value, wider * sigma) for name, (value, sigma) in estimate.states.items()}
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 

@@ -148,7 +148,11 @@ def datasheets(scenario: Scenario, recording: Recording) -> list[dict[str, str]]
         *((a.name, a.kind, a) for a in recording.instruments.values()),
     ]
     for name, kind, sheet in sheets:
-        table = specs[name].to_toml() if name in specs else {k: v for k, v in asdict(sheet).items() if k != "details"}
+        table = (
+            specs[name].to_toml()
+            if name in specs
+            else {k: v for k, v in asdict(sheet).items() if k not in ("details", "blocks")}
+        )
         text = _table(table, skip=("kind", "name", "rate", "rate_hz", "phase", "phase_s"))
         found.append(
             {"name": name, "kind": kind.replace("_", " "), "rate": f"{tables.number(sheet.rate)} Hz", "text": text}

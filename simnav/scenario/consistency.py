@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from simnav.blocks import blocks_of
 from simnav.log.spec import RecordedSpec
 from simnav.scenario.catalogue import NAME
 from simnav.scenario.description import SMALLEST, Description
@@ -79,6 +80,7 @@ def _check_instruments(s: Description) -> None:
             raise ValueError(f"instruments.{name}.rate_hz = {spec.rate:g}: should be at most {_FASTEST:g}")
         if isinstance(spec, ImuSpec) != (name == "imu"):
             raise ValueError(f"instruments.{name}.kind = {spec.kind!r}: the IMU, and only the IMU, is called 'imu'")
+    blocks_of((name, spec.blocks()) for name, spec in s.instruments.items() if not isinstance(spec, ImuSpec))
 
 
 def _check_surroundings(s: Description) -> None:

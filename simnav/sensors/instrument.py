@@ -27,9 +27,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
+from simnav.blocks import StateBlock
 from simnav.kinds import INSTRUMENTS, Kind
 from simnav.plugins import PluginError, exception_of, place_of
 from simnav.recording import AidStream
+from simnav.sensors.block_values import BlockValues, check_blocks
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import (
     UNITS,
@@ -222,6 +224,14 @@ class AidSpec(Spec):
                 raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
         return self
 
+    def blocks(self) -> tuple[StateBlock, ...]:
+        """The states that this instrument brings along, from its fields; none, unless a subclass says so.
+
+        The figures of a block are fields of the specification that ``errors`` names, so that an ideal instrument has
+        none of them, and ``times_datasheet`` may change them.
+        """
+        return ()
+
     def actual(self) -> Self:
         """The instrument with its true figures: those of the datasheet times ``times_datasheet``."""
         return times_datasheet(self)
@@ -247,6 +257,7 @@ class AidSpec(Spec):
             np.broadcast_to(np.asarray(self.figure("misalignment"), dtype=np.float64), (3,)).copy(),
             np.broadcast_to(np.asarray(self.figure("lever_arm"), dtype=np.float64), (3,)).copy(),
             {detail: getattr(self, detail) for detail in self.definition.datasheet},
+            self.blocks(),
         )
 
     def build(self, name: str, seed: int) -> Instrument:
@@ -338,7 +349,9 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
         with INSTRUMENTS.adding(name, cls):
             source = f"the example of kind {name!r}"
             try:
-                cls.from_toml(example, source=source).datasheet("example")
+                spec = cls.from_toml(example, source=source)
+                check_blocks(spec, source)
+                spec.datasheet("example")
             except SpecError as error:
                 raise PluginError(str(error)) from None
             except ValueError as error:
@@ -414,6 +427,31 @@ class Instrument(ABC):
             rng = stream(seed, "instrument", name, "bias_instability")
             self._instability = GaussMarkov(sheet.bias_instability, sheet.correlation_time, rng)
         self.levered = bool(self.lever_arm.any())
+        self._blocks = {block.name: BlockValues(block, block.label(name), seed) for block in sheet.blocks}
+
+    def block(self, name: str, time: Array) -> Array:
+        """The true values of a block of states at n times.
+
+        Parameters
+        ----------
+        name : str
+            Name of one of the blocks of `AidSpec.blocks`.
+        time : (n,) array
+            Times [s].
+
+        Returns
+        -------
+        (n, k) array
+            SI units and radians.
+
+        Raises
+        ------
+        KeyError
+            If the instrument has no such block.
+        """
+        if name not in self._blocks:
+            raise KeyError(f"there is no block of states {name!r}{closest(name, list(self._blocks))}")
+        return self._blocks[name].at(time)
 
     def drawn(self, process: str, sigma: Array) -> Array:
         """Draw the values of this run from a random stream that is named after the process; ``sigma`` is one sigma."""

@@ -218,9 +218,10 @@ class EstimateEncoder:
             raise InvalidOutputError(f"flagged is a list, not {type(estimate.flagged).__name__}")
         shape, tail = 0, b""
         more: dict[str, Any] = {}
-        if estimate.diagnostics:
+        diagnostics = _with_states(estimate) if estimate.states else estimate.diagnostics
+        if diagnostics:
             signature = []
-            for key, value in estimate.diagnostics.items():
+            for key, value in diagnostics.items():
                 if type(value) is float:
                     signature.append((str(key), ()))
                     parts.append(_DOUBLE.pack(value))
@@ -247,6 +248,26 @@ class EstimateEncoder:
         if size > 0xFFFFFFFF:
             raise InvalidOutputError("the diagnostics of one step take more than 4 GiB")
         return b"".join([ANSWER.pack(ESTIMATE, given, bits, shape, len(flagged), size, len(tail), stamp), *parts])
+
+
+def _with_states(estimate: Estimate) -> dict[str, Any]:
+    """The diagnostics of an estimate, and its further states among them.
+
+    Raises
+    ------
+    InvalidOutputError
+        If the further states are not a mapping of names to pairs of value and standard deviation.
+    """
+    if not isinstance(estimate.states, Mapping):
+        raise InvalidOutputError(f"states is a dict, not {type(estimate.states).__name__}")
+    diagnostics = dict(estimate.diagnostics)
+    for name, pair in estimate.states.items():
+        try:
+            value, sigma = pair
+        except (TypeError, ValueError):
+            raise InvalidOutputError(f"states[{name!r}] is a pair, value and sigma, not {pair!r}") from None
+        diagnostics[f"state.{name}"], diagnostics[f"sigma.{name}"] = value, sigma
+    return diagnostics
 
 
 def _bytes_of(value: Any, name: str, shape: tuple[int, ...]) -> bytes:

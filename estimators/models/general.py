@@ -1,0 +1,326 @@
+"""A model of others, by its motion and the chart of its state: everything that solvers need follows by differences.
+
+A subclass says in plain NumPy
+
+- `initial`: the state at the start of a run, an (m,) array, and the covariance of its (n,) error
+- `move`: where the motion leads in a time
+- `noise`: what it adds to the covariance of the error
+- `navigation`: position, velocity, attitude and angular rate of a state, from which every instrument's reading follows
+- `retract` and `difference`: a state with an error added, and the error between two states; plain sum and difference,
+  unless a component is an angle or a latitude
+- `describe`: the state as an estimate
+
+From these come the transition matrix, the Jacobian of each measurement, sigma points, and the chain for windows and
+full graphs (`GeneralChain`). Derivatives are central differences. A subclass may override `transition` or `read` with
+faster forms. After its own states come the biases of the instruments, if their datasheets have any, and the blocks that
+instruments bring along (`simnav.blocks`). Scale factors and misalignments have no states.
+
+`simnav.estimators.models.inertial` and `simnav.estimators.models.ship` are compiled forms for their states.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.estimators.models.base import Linearised, aid_biases, is_fast
+from simnav.estimators.models.chain import Chain, Columns, chain_of
+from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.points import PointModel
+from simnav.estimators.models.readings import READINGS
+from simnav.estimators.models.state_blocks import StateBlocks
+from simnav.kinds import NavigationPoint
+from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+
+__all__ = ["GeneralChain", "GeneralModel"]
+
+#: Steps of the differences, as a part of the sigma at the start; and where that is zero.
+PART, SMALLEST = 1e-3, 1e-6
+
+
+class GeneralModel(PointModel):
+    """The model of the module; a subclass defines its abstract methods.
+
+    Attributes
+    ----------
+    x : (m,) array
+        The state of the motion.
+    extra : (k,) array
+        Biases of the instruments, then the blocks that they bring along.
+    blocks : StateBlocks
+        The blocks, and their places in the error.
+    equations : tuple of str
+        Measurement equations (`simnav.kinds.EQUATIONS`) that the model uses; also every kind with an observation of its
+        own. Subclasses may override it.
+    """
+
+    state = ("x", "extra")
+    moving = (slice(0, 0), slice(0, 0))
+    equations: ClassVar[tuple[str, ...]] = tuple(READINGS)
+
+    @abstractmethod
+    def initial(self, start: InitialState, instruments: Instruments) -> tuple[Array, Array]:
+        """The (m,) state at the start of a run, and the (n, n) covariance of its error."""
+
+    @abstractmethod
+    def move(self, x: Array, elapsed: float) -> Array:
+        """The (m,) state after a time [s]."""
+
+    @abstractmethod
+    def noise(self, x: Array, elapsed: float) -> Array:
+        """(n, n) covariance that a time [s] adds to the error."""
+
+    @abstractmethod
+    def navigation(self, x: Array, time: float) -> NavigationPoint:
+        """Position, velocity, attitude and angular rate of a state, without ``blocks``."""
+
+    @abstractmethod
+    def describe(self, x: Array, time: float, covariance: Array) -> Estimate:
+        """A state with the (n, n) covariance of its error as an estimate."""
+
+    def retract(self, x: Array, error: Array) -> Array:
+        """The state that differs from another by an (n,) error; by default their sum."""
+        return np.asarray(x + error)
+
+    def difference(self, x: Array, reference: Array) -> Array:
+        """The (n,) error that leads from ``reference`` to ``x``: the inverse of `retract`."""
+        return np.asarray(x - reference)
+
+    def read(self, x: Array, time: float, sheet: Datasheet, extra: Array) -> Array | None:
+        """What an instrument should read at a state: (d,) array, or None; with its bias and the blocks in ``extra``."""
+        own = self.own.get(sheet.name)
+        point = self.navigation(x, time)
+        if own is None:
+            reading = READINGS[sheet.equation](point, sheet)
+        else:
+            reading = own.read(point._replace(blocks=own.blocks(extra)))
+        at = self._bias_at.get(sheet.name, -1)
+        if reading is None or at < 0:
+            return reading
+        return KINDS[sheet.kind].add_error(reading, extra[at : at + len(reading)])
+
+    def observes(self, instrument: Datasheet) -> bool:
+        """Whether the model uses an instrument."""
+        return instrument.equation in self.equations or KINDS[instrument.kind].observation is not None
+
+    def begin(self, start: InitialState, instruments: Instruments) -> Array:
+        """Set the state; the covariance of its error, biases and blocks included."""
+        self.time = start.time
+        x, own = self.initial(start, instruments)
+        self.x, self.n_own = np.array(x, dtype=np.float64), len(own)
+        self.sheets = {name: s for name, s in instruments.items() if self.observes(s)}
+        rates: list[tuple[float, float, float]] = []
+        self._bias_at: dict[str, int] = {}
+        self._white: dict[str, Array] = {}
+        for name, sheet in self.sheets.items():
+            white = sheet.sigma**2 + (sheet.bias_instability**2 if is_fast(sheet) else 0.0)
+            self._white[name] = np.diag(white)
+            biases = aid_biases(sheet)
+            if any(b.variance or b.noise for b in biases):
+                self._bias_at[name] = len(rates)
+                rates += [(b.variance, b.decay, b.noise) for b in biases]
+        brought = [s for s in self.sheets.values() if KINDS[s.kind].observation is not None]
+        self.blocks = StateBlocks(brought, self.n_own + len(rates))
+        rates += self.blocks.states
+        places = {s.name: self.blocks.places(s.name, self.n_own) for s in brought}
+        self.own = {s.name: OwnObservation(s, places[s.name], start.time) for s in brought}
+        self.extra = np.zeros(len(rates))
+        variance, self._decay, self._density = np.array(rates).reshape(-1, 3).T.copy()
+        self.size = self.n_own + len(rates)
+        covariance = np.zeros((self.size, self.size))
+        covariance[: self.n_own, : self.n_own] = own
+        covariance[range(self.n_own, self.size), range(self.n_own, self.size)] = variance
+        self._steps = PART * np.sqrt(covariance.diagonal())
+        self._steps[self._steps == 0.0] = SMALLEST
+        self._last = np.eye(self.size)
+        return covariance
+
+    # --- what follows
+
+    def moved_extra(self, extra: Array, elapsed: float) -> Array:
+        """(k,) or (j, k) biases and blocks after a time [s]."""
+        moved = np.asarray(extra * np.exp(-self._decay * elapsed))
+        self.blocks.carry_values(moved.T, self.n_own, elapsed)
+        return moved
+
+    def transition(self, x: Array, moved: Array, elapsed: float) -> Array:
+        """(n, n) derivative of the motion's error by that of a state ``x``, which it leads to ``moved``."""
+        m = self.n_own
+        F = np.eye(self.size)
+        for j in range(m):
+            step = np.zeros(m)
+            step[j] = self._steps[j]
+            ends = [self.difference(self.move(self.retract(x, s * step), elapsed), moved) for s in (1.0, -1.0)]
+            F[:m, j] = (ends[0] - ends[1]) / (2.0 * step[j])
+        F[range(m, self.size), range(m, self.size)] = np.exp(-self._decay * elapsed)
+        for at in self.blocks.clocks:
+            F[at, at + 1] = elapsed
+        return F
+
+    def propagate(self, covariance: Array, until: float) -> None:
+        """Advance the state and its covariance."""
+        elapsed, m = until - self.time, self.n_own
+        if elapsed <= 0.0:
+            return
+        moved = self.move(self.x, elapsed)
+        F = self._last = self.transition(self.x, moved, elapsed)
+        added = self._density * elapsed
+        varies = self._decay > 0.0
+        rate = self._decay[varies]
+        added[varies] = self._density[varies] * -np.expm1(-2.0 * rate * elapsed) / (2.0 * rate)
+        covariance[:] = F @ covariance @ F.T
+        covariance[:m, :m] += self.noise(self.x, elapsed)
+        covariance[range(m, self.size), range(m, self.size)] += added
+        self.blocks.add_noise(covariance, elapsed)
+        covariance[:] = 0.5 * (covariance + covariance.T)
+        self.x[:], self.extra[:], self.time = moved, self.moved_extra(self.extra, elapsed), until
+
+    def carry(self, error: Array, elapsed: float) -> None:
+        """Take an error, or several in columns, through the last propagation, in place."""
+        error[...] = self._last @ error
+
+    def linearise(self, name: str, time: float, value: Array, x: Array, extra: Array) -> tuple[Array, Array] | None:
+        """Innovation (d,) and Jacobian (d, n) of a measurement at any state; None where it has no reading."""
+        sheet, kind, m = self.sheets[name], KINDS[self.sheets[name].kind], self.n_own
+        reading = self.read(x, time, sheet, extra)
+        if reading is None:
+            return None
+        jacobian = np.zeros((len(reading), self.size))
+        for j in [*range(m), *(m + k for k in self._extra_of(name))]:
+            error = np.zeros(self.size)
+            error[j] = self._steps[j]
+            ends, length = [reading, reading], 0.0
+            for side, sign in enumerate((1.0, -1.0)):
+                there = self.read(self.retract(x, sign * error[:m]), time, sheet, extra + sign * error[m:])
+                if there is not None:
+                    ends[side] = there
+                    length += error[j]
+            if length:
+                jacobian[:, j] = kind.difference(ends[0], ends[1]) / length
+        return kind.difference(value, reading), jacobian
+
+    def _extra_of(self, name: str) -> list[int]:
+        """Which of ``extra`` an instrument depends on."""
+        at = self._bias_at.get(name)
+        biases = [] if at is None else list(range(at, at + len(self._white[name])))
+        return biases + [k - self.n_own for place in self.blocks.of(name) for k in range(place.start, place.stop)]
+
+    def measure(self, measurement: Measurement) -> Linearised | None:
+        """Linearise one measurement at the present state."""
+        name = measurement.instrument
+        found = self.linearise(name, measurement.time, measurement.value, self.x, self.extra)
+        return None if found is None else Linearised(*found, self._white[name])
+
+    def correct(self, dx: Array) -> None:
+        """Add a correction to the state."""
+        self.x[:] = self.retract(self.x, dx[: self.n_own])
+        self.extra += dx[self.n_own :]
+
+    def propagate_points(self, errors: Array, until: float) -> Array:
+        """Advance the state and the points; return the process noise."""
+        elapsed, m = until - self.time, self.n_own
+        ends = [self.move(self.retract(self.x, e[:m]), elapsed) for e in errors]
+        noise = np.zeros((self.size, self.size))
+        self.propagate(noise, until)
+        errors[:, :m] = [self.difference(end, self.x) for end in ends]
+        errors[:, m:] = self.moved_extra(errors[:, m:], elapsed)
+        return noise
+
+    def observe_points(self, measurement: Measurement, errors: Array) -> Array:
+        """What the instrument should read at the points, minus what it should read at the state."""
+        name, m = measurement.instrument, self.n_own
+        sheet, kind = self.sheets[name], KINDS[measurement.kind]
+        found = self.linearise(name, measurement.time, measurement.value, self.x, self.extra)
+        reading = self.read(self.x, measurement.time, sheet, self.extra)
+        assert found is not None and reading is not None  # noqa: PT018 (`measure` says something of it)
+        differences = errors @ found[1].T
+        for k, error in enumerate(errors):
+            there = self.read(self.retract(self.x, error[:m]), measurement.time, sheet, self.extra + error[m:])
+            if there is not None:
+                differences[k] = kind.difference(there, reading)
+        return np.asarray(differences)
+
+    def estimate(self, covariance: Array) -> Estimate:
+        """The state as an estimate."""
+        m = self.n_own
+        estimate = self.describe(self.x.copy(), self.time, covariance[:m, :m])
+        states = self.blocks.report(self.extra, m, covariance) if self.blocks else {}
+        return replace(estimate, states={**estimate.states, **states})
+
+
+class GeneralChain(Chain):
+    """The chain of a general model: a motion factor is the motion itself, from the present state of the older node.
+
+    Parameters
+    ----------
+    front : GeneralModel
+        The model that runs ahead and leaves the nodes behind.
+    """
+
+    front: GeneralModel
+
+    def _moved(self, k: int, elapsed: float) -> tuple[Array, Array, Array]:
+        """Where a node leads in a time: its two arrays, and the derivative."""
+        front, x, extra = self.front, self.nodes["x"][k], self.nodes["extra"][k]
+        moved = front.move(x, elapsed)
+        return moved, front.moved_extra(extra, elapsed), front.transition(x, moved, elapsed)
+
+    def _difference(self, x: Array, extra: Array, other: Array, other_extra: Array) -> Array:
+        return np.concatenate([self.front.difference(x, other), extra - other_extra])
+
+    def linearise_motion(self, first: int = 0) -> None:
+        """As `Chain.linearise_motion`."""
+        nodes, motions = self.nodes, self.motions
+        for k in range(first, len(motions)):
+            x, extra, F = self._moved(k, float(nodes["time"][k + 1] - nodes["time"][k]))
+            motions["residual"][k] = self._difference(nodes["x"][k + 1], nodes["extra"][k + 1], x, extra)
+            motions["jacobian"][k] = F
+
+    def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
+        """As `Chain.observe`."""
+        aids, x, extra = self.aids, states[f"{prefix}x"], states[f"{prefix}extra"]
+        for i in first + np.flatnonzero(row[first:] >= 0):
+            name = self.names[aids["instrument"][i]]
+            d = len(self.front._white[name])
+            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
+            found = self.front.linearise(name, aids["time"][i], aids["value"][i, :d], x[row[i]], extra[row[i]])
+            if found is not None:
+                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
+
+    def move_folds(self, first: int) -> None:
+        """As `Chain.move_folds`."""
+        nodes, folds = self.nodes, self.folds
+        for i in range(first, len(folds)):
+            k = int(folds["node"][i]) - self.base
+            elapsed = float(folds["time"][i] - nodes["time"][k])
+            folds["now_x"][i], folds["now_extra"][i], folds["jacobian"][i] = self._moved(k, elapsed)
+
+    def retract(self, step: Array) -> None:
+        """As `Chain.retract`; the motion factors need no shifts."""
+        front, nodes, m = self.front, self.nodes, self.front.n_own
+        for k, each in enumerate(step):
+            nodes["x"][k] = front.retract(nodes["x"][k], each[:m])
+        nodes["extra"][...] += step[:, m:]
+        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
+
+    def along_motion(self, step: Array) -> Array:
+        """As `Chain.along_motion`."""
+        front, nodes, motions, m = self.front, self.nodes, self.motions, self.front.n_own
+        along = np.empty_like(step)
+        along[0] = step[0]
+        for k in range(len(motions)):
+            error = motions["residual"][k] + step[k + 1] - motions["jacobian"][k] @ step[k]
+            elapsed = float(nodes["time"][k + 1] - nodes["time"][k])
+            x = front.move(front.retract(nodes["x"][k], along[k, :m]), elapsed)
+            extra = front.moved_extra(nodes["extra"][k] + along[k, m:], elapsed)
+            along[k + 1] = error + self._difference(x, extra, nodes["x"][k + 1], nodes["extra"][k + 1])
+        return along
+
+
+@chain_of.register
+def _(model: GeneralModel) -> Chain:
+    return GeneralChain(model)

@@ -1,0 +1,65 @@
+"""Scenarios of a third party whose instruments bring states along, one for each of its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from simnav.scenario import Scenario, parse
+
+__all__ = ["CASES", "fjord", "true_blocks"]
+
+_FIX = '[instruments.fix]\nkind = "gnss_position"\nsigma_m = 2.0\n'
+_IRON = (
+    _FIX
+    + """[instruments.magnetometer]
+rate_hz = 2.0
+sigma_ut = 0.3
+hard_iron_ut = 4.0
+soft_iron = 0.05
+"""
+)
+_BEAM = """[instruments.beam_{0}]
+kind = "beam"
+sigma_m_s = 0.02
+azimuth_deg = {1}
+sound_speed = 0.02
+"""
+_RANGE = """[instruments.transponder_{0}]
+kind = "one_way_range"
+latitude_deg = {1}
+longitude_deg = {2}
+height_m = -20.0
+sigma_m = 0.5
+clock_m = 30.0
+drift_m_s = 0.1
+clock_noise = 0.02
+drift_noise = 0.002
+"""
+_PLACES = [(54.004, 7.9), (53.998, 7.907), (53.998, 7.893)]
+#: By name: the file of the instrument, and the tables of a scenario with it.
+CASES = {
+    "iron": ("magnetometer.py", _IRON),
+    "delay": ("late_fix.py", '[instruments.fix]\nkind = "late_fix"\nsigma_m = 1.0\ndelay_s = 0.5\n'),
+    "beams": ("beam.py", _FIX + "".join(_BEAM.format(k, 45 + 90 * k) for k in range(4))),
+    "clock": ("one_way_range.py", "".join(_RANGE.format(k, *place) for k, place in enumerate(_PLACES))),
+}
+
+
+def fjord(plugins: Path, case: str, *, duration: float = 60.0, tables: str = "") -> Scenario:
+    """The scenario of a case, with more tables."""
+    file, instruments = CASES[case]
+    text = (plugins / "fjord.toml").read_text().partition("[instruments.fix]")[0]
+    text = text.replace('plugins = ["magnetometer.py"]', f'plugins = ["{file}"]')
+    scenario = parse(text + instruments + tables, folder=plugins)
+    return scenario.model_copy(update={"duration": duration})
+
+
+def true_blocks(scenario: Scenario, seed: int, time: np.ndarray) -> dict[str, np.ndarray]:
+    """By label, the true values of all blocks of a run at n times, (n, k)."""
+    values = {}
+    for name, spec in scenario.aids.items():
+        instrument = spec.actual().build(name, seed)
+        values |= {block.label(name): instrument.block(block.name, time) for block in spec.blocks()}
+    return values
