@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.leaderboard import standard
+from simnav.leaderboard.ranking.evidence import common_seeds
 from simnav.leaderboard.ranking.statistics import FAILURE, Interval, score, separate, share, unlucky_excess
 from simnav.leaderboard.results import store
 from simnav.scenario.catalogue import headers
@@ -142,7 +143,8 @@ def real_errors(track: str) -> Array:
             )
     oracle = errors.pop("oracle")
     scenarios = sorted(oracle)
-    seeds = sorted(set.intersection(*(set(oracle[s]) for s in scenarios)))
+    counted = [set(common_seeds([by[s] for by in errors.values() if s in by])) & set(oracle[s]) for s in scenarios]
+    seeds = sorted(set.intersection(*counted))
     whole = [e for e in errors.values() if all(set(seeds) <= set(e.get(s, ())) for s in scenarios)]
     return np.array([
         [[min(e[s][k] - oracle[s][k], math.log(FAILURE)) for e in whole] for k in seeds] for s in scenarios
