@@ -61,7 +61,7 @@ def test_the_table_that_comes_with_simnav_has_all_its_rows():
         assert with_imu is not None
         assert (without is None) == bool(lacking(make(name).needs, ship.instruments)), name
     own = [costs.find(name, [name]) for name in ("ekf", "ship-ekf", "ekf-rts", "ship-ekf-rts")]
-    assert all(c is not None and 0.75 < c.value < 1.33 for c in own)
+    assert all(c is not None and 0.9 < c.value < 1.1 for c in own)
 
 
 def test_what_is_written_is_read(tmp_path: Path):
