@@ -332,6 +332,12 @@ def test_few_seeds_are_provisional_and_decide_nothing():
     assert not ranked(campaign(SIMPLE, seeds=10)).track("sea").provisional
 
 
+def test_a_board_says_what_its_test_promises_with_few_seeds():
+    said = "equal rows may be told apart on more than 5 % of boards"
+    assert any(said in remark for remark in ranked(campaign(SIMPLE, seeds=12)).track("sea").remarks)
+    assert not any(said in remark for remark in ranked(campaign(SIMPLE, seeds=30)).track("sea").remarks)
+
+
 def test_equal_scores_share_a_rank():
     results = campaign({"one-v1": {"a": 1.0, "c": 9.0, "d": 20.0, "e": 40.0}})
     results += [replace(r, estimator="b") for r in results if r.estimator == "a"]
