@@ -62,8 +62,8 @@ def remarks(
             found.append("No two rows can be told apart: all are tied.")
         elif count < _FIRM:
             found.append(
-                f"With fewer than {_FIRM} {unit}s equal rows may be told apart on more than 5 % of boards: with ten, on up "
-                f"to {_AT_TEN:.0f} %."
+                f"With fewer than {_FIRM} {unit}s equal rows may be told apart on more than 5 % of boards: "
+                f"with ten, on up to {_AT_TEN:.0f} %."
             )
     without = [r for r in references if not r.estimator]
     if without and len(without) == len(references):
