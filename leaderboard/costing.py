@@ -143,13 +143,12 @@ def _multiples(
     """The multiples of estimators, and the recordings of the scenarios, by versioned id."""
     from simnav.leaderboard.ranking.cost_measurement import SCENARIOS, multiples_of
     from simnav.leaderboard.ranking.costs import MultipleReport
+    from simnav.source import record
 
     with mistakes():
         for r in mine:
             r.make()  # a mistake in a file's name or in a parameter is no result
     chosen = [scenario_of(s) for s in (SCENARIOS if scenario is None else (scenario,))]
-    from simnav.source import record
-
     seas = [(s.id, record(s, seed)) for s in chosen]
     with mistakes(ValueError):
         rows, unmeasured = multiples_of(mine, seas, epochs=epochs, rounds=rounds, progress=progress)
