@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
-import operator
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.calls import whole_number
+from simnav.leaderboard.requests import ScenarioLike, Scenarios
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError, StoreError, mistakes, sentence
 from simnav.scenario import Scenario
 
@@ -18,19 +18,12 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
 __all__ = [
-    "ScenarioLike",
-    "Scenarios",
     "absolute",
-    "positive",
     "results_of",
     "scenario_of",
     "scenarios_of",
     "seeds_of",
-    "whole",
 ]
-
-ScenarioLike: TypeAlias = "str | Path | Scenario"
-Scenarios: TypeAlias = "ScenarioLike | Iterable[ScenarioLike] | None"
 
 
 def scenario_of(given: ScenarioLike) -> Scenario:
@@ -136,39 +129,9 @@ def absolute(path: str | os.PathLike[str]) -> Path:
         return Path(path).expanduser().resolve()
 
 
-def whole(name: str, value: Any, least: int = 0) -> int:
-    """An argument that should be a whole number, also of NumPy.
-
-    >>> whole("runs", 3, 1)
-    3
-    """
-    try:
-        number = operator.index(value)
-    except TypeError:
-        raise RequestError(f"{name} = {value!r}: a whole number is wanted") from None
-    if isinstance(value, bool) or number < least:
-        raise RequestError(f"{name} = {value!r}: a whole number from {least} up is wanted")
-    return number
-
-
-def positive(name: str, value: Any, least: float = 0.0) -> float:
-    """An argument that should be a number, finite and not less than another.
-
-    >>> positive("minutes", 1)
-    1.0
-    """
-    try:
-        number = float(value) if not isinstance(value, (str, bytes, bool)) else math.nan
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not (math.isfinite(number) and number >= least):
-        raise RequestError(f"{name} = {value!r}: a finite number from {least:g} up is wanted")
-    return number
-
-
 def seeds_of(seed: Any, runs: Any) -> range:
     """The seeds of some runs: the first, and those that count up from it."""
-    first, count = whole("seed", seed), whole("runs", runs, 1)
+    first, count = whole_number("seed", seed), whole_number("runs", runs, 1)
     if count > MOST_RUNS:
         raise RequestError(f"runs = {count}: at most {MOST_RUNS} are possible")
     return range(first, first + count)

@@ -1,22 +1,31 @@
 """Calls for published results: sites, submissions, and the standard result that comes with simnav.
 
-`simnav.leaderboard.interface` has the calls that compute and compare; these build on them.
+`simnav.leaderboard.running` and `simnav.leaderboard.inspection` have the calls that compute and compare.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.calls import call, whole_number
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
-from simnav.leaderboard.given import absolute, results_of, whole
+from simnav.leaderboard.given import absolute, results_of
 from simnav.leaderboard.inspection import rank
-from simnav.leaderboard.interface import CampaignProgress, campaign
+from simnav.leaderboard.requests import (
+    AuditRequest,
+    CheckStandardRequest,
+    PublishRequest,
+    SiteRequest,
+    StandardRequest,
+    SubmitRequest,
+    VerifyBundleRequest,
+)
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
+from simnav.leaderboard.running import campaign
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
@@ -39,40 +48,9 @@ __all__ = [
 ]
 
 
-def site(
-    results: str | os.PathLike[str],
-    *,
-    output: str | os.PathLike[str] = "site",
-    papers: str | os.PathLike[str] = "reproduced",
-    sweeps: str | os.PathLike[str] = "results",
-    runs_shown: int = 2,
-    figures: bool = False,
-    against: str | os.PathLike[str] | None = None,
-    workers: int = 2,
-    progress: Callable[..., None] | None = None,
-) -> SiteReport:
+@call(SiteRequest)
+def site(request: SiteRequest) -> SiteReport:
     """Rank the results of a campaign, and write the site.
-
-    Parameters
-    ----------
-    results : path
-        Folder that a campaign wrote.
-    output : path
-        Folder of the site; an older site there is replaced.
-    papers : path
-        Folder that `simnav.leaderboard.interface.reproduce` wrote; its papers get pages.
-    sweeps : path
-        Folder with the folders of sweeps, which the pages of scenarios show.
-    runs_shown : int
-        Runs of each scenario of which the site has track and errors.
-    figures : bool
-        Write the charts as SVG and PNG, too.
-    against : path, optional
-        Results of another campaign: how well its order agrees.
-    workers : int
-        Processes.
-    progress : callable, optional
-        Called with how many of how many pages are done.
 
     Returns
     -------
@@ -91,13 +69,14 @@ def site(
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
 
-    shown, processes = whole("runs_shown", runs_shown, 1), whole("workers", workers, 1)
-    found = results_of(results, series=True)
-    ranking = ranked(found, requested=requested.read(results))
-    correlations = () if against is None else tuple(rank_correlations(ranking, rank(against)))
+    shown, processes = whole_number("runs_shown", request.runs_shown, 1), whole_number("workers", request.workers, 1)
+    found = results_of(request.results, series=True)
+    ranking = ranked(found, requested=requested.read(request.results))
+    correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
     index = build(
-        found, ranking, absolute(output), progress=progress, workers=processes, papers=find(Path(papers)),
-        runs_shown=shown, figures=figures, sweeps=swept.find(Path(sweeps)),
+        found, ranking, absolute(request.output), progress=request.progress, workers=processes,
+        papers=find(Path(request.papers)), runs_shown=shown, figures=request.figures,
+        sweeps=swept.find(Path(request.sweeps)),
     )  # fmt: skip
     return SiteReport(index, found, ranking, correlations)
 
@@ -135,40 +114,9 @@ class Submission:
         return {**vars(self), "path": str(self.path)}
 
 
-def submit(
-    estimator: str,
-    *,
-    profile: str | os.PathLike[str] = "standard",
-    parameters: Mapping[str, Any] | None = None,
-    requires: Sequence[str] = (),
-    output: str | os.PathLike[str] | None = None,
-    results: str | os.PathLike[str] | None = None,
-    workers: int = 2,
-    minutes: float | None = None,
-    progress: CampaignProgress = None,
-) -> Submission:
+@call(SubmitRequest)
+def submit(request: SubmitRequest) -> Submission:
     """Run an estimator on a profile, and write its source and results as a bundle.
-
-    Parameters
-    ----------
-    estimator : str
-        A file, an installed package that registers estimators, or the name of one of its estimators.
-    profile : str or path
-        Profile that names the scenarios and seeds.
-    parameters : mapping, optional
-        Parameters of the estimators.
-    requires : sequence of str
-        Packages that a file needs beside simnav, as pip takes them. Those of a package are known.
-    output : path, optional
-        The bundle; default: ``NAME.simnav.zip``.
-    results : path, optional
-        Folder in which the results are kept; default: ``results/submit-NAME``. The same call continues there.
-    workers : int
-        Processes.
-    minutes : float, optional
-        Time after which no further run is started.
-    progress : callable, optional
-        As for `simnav.leaderboard.interface.campaign`.
 
     Returns
     -------
@@ -187,28 +135,28 @@ def submit(
     from simnav.leaderboard.submission.source import source_of
     from simnav.leaderboard.submission.verifying import runs_of
 
-    name = load(profile).name
+    name = load(request.profile).name
     with mistakes(ValueError):
         confinement = chosen_confinement("auto")
     with scratch("submit") as home:
-        source = source_of(str(estimator), dict(parameters or {}), home, tuple(requires))
-        folder = absolute(results or Path("results") / f"submit-{source.title}")
-        target = absolute(output or f"{source.title}{SUFFIX}")
+        source = source_of(str(request.estimator), dict(request.parameters or {}), home, tuple(request.requires))
+        folder = absolute(request.results or Path("results") / f"submit-{source.title}")
+        target = absolute(request.output or f"{source.title}{SUFFIX}")
         if not target.parent.is_dir():
             raise RequestError(f"{target.parent} is no folder")
         report = campaign(
-            estimators=list(source.requests), output=folder, profile=profile, workers=workers, minutes=minutes,
-            confinement=confinement, oracle=False, progress=progress,
+            estimators=list(source.requests), output=folder, profile=request.profile, workers=request.workers,
+            minutes=request.minutes, confinement=confinement, oracle=False, progress=request.progress,
         )  # fmt: skip
         if report.summary.left:
             raise RequestError(
-                f"{report.summary.left} of {report.summary.total} runs are left after {minutes:g} minutes; the same "
-                "command continues"
+                f"{report.summary.left} of {report.summary.total} runs are left after {request.minutes:g} minutes; the "
+                "same command continues"
             )
         with mistakes(StoreError):
             found = pack(folder, home / "results", [r.label for r in source.requests])
         ran = {r.scenario for r in found}
-        runs = {s: n for s, n in runs_of(str(profile)).items() if s in ran}
+        runs = {s: n for s, n in runs_of(str(request.profile)).items() if s in ran}
         rows = [_row(r) for r in source.requests]
         digest = write_bundle(
             target, title=source.title, benchmark=BENCHMARK, profile=name, runs=runs, main=source.main, estimators=rows,
@@ -238,34 +186,9 @@ def _row(request: EstimatorRequest) -> Row:
     )
 
 
-def verify_bundle(
-    bundle: str | os.PathLike[str],
-    *,
-    key: str | os.PathLike[str] | None = None,
-    sample: int | None = None,
-    present: bool = False,
-    tolerance: float | None = None,
-    progress: Callable[..., None] | None = None,
-) -> SubmissionReport:
+@call(VerifyBundleRequest)
+def verify_bundle(request: VerifyBundleRequest) -> SubmissionReport:
     """Check a submission, and repeat a sample of its runs in confined processes.
-
-    Parameters
-    ----------
-    bundle : path
-        Bundle that `submit` wrote.
-    key : path, optional
-        File of a secret key. The estimators also run on seeds that are derived from it, which the submission cannot
-        know, and should be no worse there.
-    sample : int, optional
-        Largest number of runs that are repeated; default: so many that 5 % of forged ones are found with 95 %
-        probability (about 59).
-    present : bool
-        True: use the packages of this environment, which is quick and needs no network. By default a new environment is
-        made.
-    tolerance : float, optional
-        Largest relative difference of a score that counts as the same; default: 1e-6. Differences of bits are counted.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
 
     Returns
     -------
@@ -281,41 +204,14 @@ def verify_bundle(
     from simnav.leaderboard.submission.verifying import verify_bundle as verify
 
     return verify(
-        absolute(bundle), read_seal(key), sample=sample, present=present,
-        tolerance=TOLERANCE if tolerance is None else tolerance, progress=progress,
+        absolute(request.bundle), read_seal(request.key), sample=request.sample, present=request.present,
+        tolerance=TOLERANCE if request.tolerance is None else request.tolerance, progress=request.progress,
     )  # fmt: skip
 
 
-def run_standard(
-    *,
-    minutes: float | None = 110.0,
-    profile: str | os.PathLike[str] = "standard",
-    results: str | os.PathLike[str] = "results/standard",
-    shipped: str | os.PathLike[str] | None = None,
-    workers: int = 2,
-    force: Sequence[str] = (),
-    shard: tuple[int, int] = (1, 1),
-    progress: CampaignProgress = None,
-) -> CampaignReport:
+@call(StandardRequest)
+def run_standard(request: StandardRequest) -> CampaignReport:
     """Run the missing and outdated parts of the standard result, for a limited time. The same call continues.
-
-    A new folder starts with the results that come with simnav. So only rows and scenarios with a new version are run.
-    Results are known by their declared versions: an edit without a new version runs nothing, but for ``force``.
-
-    Parameters
-    ----------
-    minutes : float or None
-        Time after which no further run is started; None for no end.
-    profile : str or path
-        Name of a profile, or the file of one.
-    results : path
-        Folder to work in.
-    shipped : path, optional
-        The results to start with; default: those that come with simnav.
-    workers : int
-        Processes.
-    force, shard, progress : optional
-        As for `simnav.leaderboard.interface.campaign`.
 
     Returns
     -------
@@ -329,24 +225,20 @@ def run_standard(
     from simnav.leaderboard.results import requested
     from simnav.leaderboard.standard.publication import begin, run
 
-    folder = absolute(results)
+    folder = absolute(request.results)
     with mistakes(StoreError):
-        begin(folder, standard.RESULTS if shipped is None else absolute(shipped))
+        begin(folder, standard.RESULTS if request.shipped is None else absolute(request.shipped))
         summary = run(
-            load(profile), folder, workers=whole("workers", workers, 1), minutes=minutes, force=force, shard=shard,
-            progress=progress,
+            load(request.profile), folder, workers=whole_number("workers", request.workers, 1),
+            minutes=request.minutes, force=request.force, shard=request.shard, progress=request.progress,
         )  # fmt: skip
     found = results_of(folder)
     return CampaignReport(found, rank(found, requested=requested.read(folder)), summary)
 
 
-def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
+@call(CheckStandardRequest)
+def check_standard(request: CheckStandardRequest) -> Outdated:
     """Whether the standard result has the declared versions of today; nothing is run.
-
-    Parameters
-    ----------
-    results : path, optional
-        Folder of results; default: those that come with simnav.
 
     Returns
     -------
@@ -359,7 +251,7 @@ def check_standard(results: str | os.PathLike[str] | None = None) -> Outdated:
     """
     from simnav.leaderboard.standard.currency import outdated
 
-    folder = _standard_results(results)
+    folder = _standard_results(request.results)
     with mistakes(StoreError):
         return outdated(folder)
 
@@ -374,24 +266,9 @@ def _standard_results(given: str | os.PathLike[str] | None) -> Path:
     return folder
 
 
-def audit_standard(
-    *,
-    sample: int = 20,
-    results: str | os.PathLike[str] | None = None,
-    progress: Callable[..., None] | None = None,
-) -> Audit:
+@call(AuditRequest)
+def audit_standard(request: AuditRequest) -> Audit:
     """Repeat a random sample of the standard result with the code of today, and compare the scores.
-
-    Declared versions alone say which results are up to date. The audit tests whether they are.
-
-    Parameters
-    ----------
-    sample : int
-        How many results are repeated. The audit says which share of wrong results such a sample would find.
-    results : path, optional
-        Folder of results; default: those that come with simnav.
-    progress : callable, optional
-        Called with how many of how many runs are done, and ``note=`` the next.
 
     Returns
     -------
@@ -404,46 +281,14 @@ def audit_standard(
     """
     from simnav.leaderboard.standard.auditing import audit
 
-    folder = _standard_results(results)
+    folder = _standard_results(request.results)
     with mistakes(StoreError):
-        return audit(folder, whole("sample", sample, 1), progress)
+        return audit(folder, whole_number("sample", request.sample, 1), request.progress)
 
 
-def publish_standard(
-    *,
-    results: str | os.PathLike[str] = "results/standard",
-    profile: str | os.PathLike[str] = "standard",
-    shipped: str | os.PathLike[str] | None = None,
-    history: str | os.PathLike[str] | None = None,
-    readme: str | os.PathLike[str] | None = None,
-    site: str | os.PathLike[str] | None = None,
-    workers: int = 2,
-    preliminary: bool = False,
-    progress: Callable[..., None] | None = None,
-) -> Published:
+@call(PublishRequest)
+def publish_standard(request: PublishRequest) -> Published:
     """Make what comes with simnav from the results of `run_standard`: packed results, history, README, and a site.
-
-    Results that the profile does not name, as those of submissions, are published as long as they are not out of date.
-
-    Parameters
-    ----------
-    results : path
-        Folder of the results, which may be the one that is written. If it is not there, the results that come with
-        simnav are taken.
-    profile : str or path
-        Profile that the results should contain completely.
-    shipped, history : path, optional
-        Folder of the packed results, and file of the editions; default: those that come with simnav.
-    readme : path, optional
-        Whose tables are written, between the marks of `simnav.leaderboard.standard.readme`; default: none.
-    site : path, optional
-        Folder of a site that is drawn; default: none.
-    workers : int
-        Number of processes that draw the charts.
-    preliminary : bool
-        Also if runs are missing. The tables then say how many are there, and there is no edition.
-    progress : callable, optional
-        Called with how many of how many pages are done.
 
     Raises
     ------
@@ -458,18 +303,23 @@ def publish_standard(
     from simnav.leaderboard.standard.history import read
     from simnav.leaderboard.standard.publication import publish
 
-    folder = standard.RESULTS if shipped is None else absolute(shipped)
-    file = standard.HISTORY if history is None else absolute(history)
-    working = absolute(results)
+    folder = standard.RESULTS if request.shipped is None else absolute(request.shipped)
+    file = standard.HISTORY if request.history is None else absolute(request.history)
+    working = absolute(request.results)
     if not working.exists():
         working = folder
     with mistakes(StoreError):
         made = publish(
-            working, load(profile), folder, file, None if readme is None else absolute(readme), preliminary=preliminary
+            working,
+            load(request.profile),
+            folder,
+            file,
+            None if request.readme is None else absolute(request.readme),
+            preliminary=request.preliminary,
         )
-    if site is not None:
+    if request.site is not None:
         published = {(r.scenario, r.estimator, r.seed) for r in made.results}
         found = [r for r in results_of(working, series=True) if (r.scenario, r.estimator, r.seed) in published]
-        build(found, made.ranking, absolute(site), progress=progress, workers=workers, papers=find(Path("reproduced")),
-              editions=pages_of(read(file)))  # fmt: skip
+        build(found, made.ranking, absolute(request.site), progress=request.progress, workers=request.workers,
+              papers=find(Path("reproduced")), editions=pages_of(read(file)))  # fmt: skip
     return made

@@ -20,27 +20,8 @@ if TYPE_CHECKING:
     from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv
     from simnav.estimator import Estimator, UnsuitableScenario, names, register
     from simnav.kinds import Component, Kind
-    from simnav.leaderboard.interface import (
-        RequestError,
-        bench,
-        bound,
-        campaign,
-        check,
-        cite,
-        costs,
-        evaluate,
-        make,
-        merge,
-        rank,
-        record,
-        reproduce,
-        rescore,
-        run,
-        seal,
-        sweep,
-        tune,
-        verify,
-    )
+    from simnav.leaderboard.costing import bench, costs
+    from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -50,6 +31,8 @@ if TYPE_CHECKING:
         submit,
         verify_bundle,
     )
+    from simnav.leaderboard.results.errors import RequestError
+    from simnav.leaderboard.running import campaign, check, evaluate, make, record, run, sweep, tune
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
@@ -134,8 +117,8 @@ __all__ = [
     "verify_bundle",
 ]
 
-# Modules, loaded when one of their names is first used. The last one is on the third floor: it is named by a string,
-# because the library must not import a floor above it.
+# Modules, loaded when one of their names is first used. Those of the third floor are named by a string, because
+# the library must not import a floor above it.
 _HOMES = {
     "blocks": ("StateBlock",),
     "environment": ("EstimatorAgent", "NavigationEnv", "NavigationVectorEnv"),
@@ -162,27 +145,10 @@ _HOMES = {
         "NavigationStates",
         "TriadDatasheet",
     ),
-    "leaderboard.interface": (
-        "RequestError",
-        "bench",
-        "bound",
-        "campaign",
-        "check",
-        "cite",
-        "costs",
-        "evaluate",
-        "make",
-        "merge",
-        "rank",
-        "record",
-        "reproduce",
-        "rescore",
-        "run",
-        "seal",
-        "sweep",
-        "tune",
-        "verify",
-    ),
+    "leaderboard.costing": ("bench", "costs"),
+    "leaderboard.inspection": ("bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.results.errors": ("RequestError",),
+    "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"),
     "leaderboard.publishing": (
         "audit_standard",
         "check_standard",

@@ -9,24 +9,23 @@ campaign that was stopped early is still balanced.
 from __future__ import annotations
 
 import contextlib
-import importlib
-import importlib.util
 import itertools
-import math
 import os
 import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
+from simnav.leaderboard.calls import call, option, request
 from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.confinement.session import Limits, ServerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
+from simnav.leaderboard.campaign.options import CampaignOptions, PathLike
 from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
 from simnav.leaderboard.campaign.plan import Plan
 from simnav.leaderboard.campaign.recorder import time_limit
@@ -40,18 +39,26 @@ from simnav.leaderboard.results import requested, store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import numerics
 from simnav.leaderboard.results.versions import declared_recording, declared_variant, is_declared
+from simnav.scenario import Scenario
 from simnav.simulation.version import SIMULATOR_VERSION
 from simnav.spec import closest
 
-if TYPE_CHECKING:
-    from simnav.scenario import Scenario
-
-__all__ = ["MEMORY", "RUNS", "CampaignError", "Progress", "Summary", "combined", "require_known", "run_campaign"]
+__all__ = [
+    "MEMORY",
+    "RUNS",
+    "Campaign",
+    "CampaignError",
+    "Progress",
+    "Summary",
+    "combined",
+    "require_known",
+    "run_campaign",
+]
 
 #: Seeds of a campaign, by default.
 RUNS = 50
-#: Memory that an estimator may take, by default [bytes].
-MEMORY = 2 << 30
+#: Memory that an estimator may take, by default [MiB].
+MEMORY = 2048.0
 
 #: How often the workers are started again, where one died.
 RESTARTS = 3
@@ -140,62 +147,75 @@ def combined(summaries: Sequence[Summary]) -> Summary:
     return Summary(summaries[0].folder, total, skipped, dict(statuses), sum(s.seconds for s in summaries))
 
 
-def run_campaign(
-    scenarios: Sequence[Scenario],
-    estimators: Sequence[EstimatorRequest],
-    seeds: Iterable[int],
-    folder: str | os.PathLike[str],
-    *,
-    workers: int = 2,
-    timeout: float | None = None,
-    memory: int = MEMORY,
-    retry: bool = False,
-    force: Sequence[str] = (),
-    keep_trials: bool = False,
-    covariance_interval: float = 0.0,
-    progress: Callable[[Progress], None] | None = None,
-    backend: str = "loky",
-    scheduler: str | None = None,
-    shard: tuple[int, int] = (1, 1),
-    confinement: str = "auto",
-    seal: Seal = PUBLIC,
-    minutes: float | None = None,
-    by_version: bool = False,
-) -> Summary:
+@request
+class Campaign(CampaignOptions):
     """Run estimators on scenarios and seeds, and store the results.
 
-    Results that the folder has already are not computed again; those of estimators, scenarios or
-    versions that are not part of this campaign stay in it.
+    Results that the folder has already are not computed again; those of estimators, scenarios or versions that are not
+    part of this campaign stay in it.
+    """
 
-    Parameters
-    ----------
-    scenarios, estimators, seeds
-        What is run: every estimator on every scenario with every seed.
-    folder : path
-        Folder of the results; it is made if it does not exist.
-    workers, retry, keep_trials, covariance_interval, confinement, minutes
-        As for `simnav.leaderboard.interface.campaign`.
-    force : sequence of str
-        Labels or names of estimators that are run anew, where they are among those that are run.
-    timeout : float, optional
-        Wall-clock time that an estimator may take for a run [s]; default: `time_limit`.
-    memory : int
-        Memory that an estimator may take beyond the recording [bytes].
-    progress : callable, optional
-        Called with a `Progress` now and then.
-    backend : {"loky", "dask"}
-        Processes of this machine, or a Dask cluster (extra ``distributed``). Its workers need no common disk: the
-        results travel through the scheduler.
-    scheduler : str, optional
-        Address of the Dask scheduler; default: a cluster on this machine.
-    shard : pair of int
-        Which of how many parts of the runs to do, from 1. All parts together are the campaign; `simnav.merge` puts
-        their folders together.
-    seal : Seal
-        May derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
-    by_version : bool
-        True: results are known by their declared versions (`simnav.leaderboard.results.versions`), as what comes with
-        simnav is. False: by digests of the code, and by the libraries and the processor that computed them.
+    scenarios: Sequence[Scenario] = option(help="Scenarios.")
+    estimators: Sequence[EstimatorRequest] = option(help="Every one is run on every scenario with every seed.")
+    seeds: Iterable[int] = option(help="Seeds of every scenario.")
+    folder: PathLike = option(help="Folder of the results; it is made if it does not exist.")
+    _: KW_ONLY
+    seal: Seal = option(
+        default=PUBLIC, help="May derive the seeds from a secret; ``seeds`` are then the numbers of the runs."
+    )
+    by_version: bool = option(
+        default=False,
+        help="True: results are known by their declared versions (`simnav.leaderboard.results.versions`), as what "
+        "comes with simnav is. False: by digests of the code, and by the libraries and the processor that computed "
+        "them.",
+    )
+    progress: Callable[[Progress], None] | None = option(default=None, help="Called with a `Progress` now and then.")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.seeds, range):
+            object.__setattr__(self, "seeds", list(dict.fromkeys(self.seeds)))
+        for seed in self._ends():
+            if not 0 <= seed < 2**63:
+                raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
+        _unique("scenario", [s.id for s in self.scenarios])
+        _unique("estimator", [e.label for e in self.estimators])
+        if self.by_version and self.seal.secret:
+            raise RequestError("results with sealed seeds are known by digests of the code, not by declared versions")
+
+    @property
+    def numbers(self) -> Sequence[int]:
+        """The seeds, each once."""
+        assert isinstance(self.seeds, Sequence)
+        return self.seeds
+
+    def _ends(self) -> tuple[int, ...]:
+        """The smallest and the largest seed; of a range its ends, without a look at each seed."""
+        if not self.numbers:
+            return ()
+        if isinstance(self.seeds, range):
+            return self.seeds[0], self.seeds[-1]
+        return min(self.numbers), max(self.numbers)
+
+    @property
+    def alone(self) -> bool:
+        """Whether the process that looks at estimators of others runs them, too."""
+        return self.workers == 1 and self.effective_backend == "loky"
+
+    def report(self, progress: Progress) -> None:
+        """Tell how far the campaign is."""
+        if self.progress is not None:
+            self.progress(progress)
+
+    def limits(self, scenario: Scenario) -> Limits:
+        """Time and memory that an estimator may take for a run."""
+        seconds = time_limit(scenario) if self.time_limit is None else self.time_limit
+        return Limits(seconds, int(self.memory_limit * 2**20))
+
+
+@call(Campaign)
+def run_campaign(asked: Campaign) -> Summary:
+    """Run the campaign of a request.
 
     Returns
     -------
@@ -213,139 +233,133 @@ def run_campaign(
         If the user stops the campaign; all finished results are on disk.
     """
     started = time.monotonic()
-    report = progress or (lambda p: None)
-    if not isinstance(seeds, range):
-        seeds = list(dict.fromkeys(seeds))
-    if workers < 1:
-        raise RequestError(f"workers = {workers}: at least one is wanted")
-    if timeout is not None and not timeout > 0.0:
-        raise RequestError(f"timeout = {timeout:g} s should be greater than 0")
-    if memory < 16 << 20:
-        raise RequestError(f"memory = {memory} bytes is too little for any estimator; at least 16 MiB is wanted")
-    if minutes is not None and not minutes >= 0.0:
-        raise RequestError(f"minutes = {minutes:g} should not be negative")
-    if not covariance_interval >= 0.0:
-        raise RequestError(f"covariance_interval = {covariance_interval:g} s should not be negative")
-    if isinstance(seeds, range):  # its ends say it, without a look at each seed
-        ends = (seeds[0], seeds[-1]) if seeds else ()
-    else:
-        ends = (min(seeds), max(seeds)) if seeds else ()
-    for seed in ends:
-        if not 0 <= seed < 2**63:
-            raise RequestError(f"seed {seed} should lie between 0 and 2**63 - 1")
-    _unique("scenario", [s.id for s in scenarios])
-    _unique("estimator", [e.label for e in estimators])
-    forced = _forced(force, estimators)
-    if by_version and seal.secret:
-        raise RequestError("results with sealed seeds are known by digests of the code, not by declared versions")
-    if not (isinstance(shard, Sequence) and len(shard) == 2 and all(isinstance(k, int) for k in shard)):
-        raise RequestError(f"shard = {shard!r} should be a pair (k, n): part k of n")
-    part, parts = shard
-    if not 1 <= part <= parts:
-        raise RequestError(f"shard = {part}/{parts} should be k/n, with k from 1 to n")
-    if backend not in ("loky", "dask"):
-        raise RequestError(f"backend = {backend!r} is unknown; there are 'loky' and 'dask'")
-    if backend == "dask" and importlib.util.find_spec("distributed") is None:
-        raise RequestError("backend = 'dask' needs the extra 'distributed': pip install 'simnav[distributed]'")
-
     with mistakes():
-        chosen = chosen_confinement(confinement)
-    path = store.create(Path(folder).resolve())
-    if not by_version:
-        _require_local(path, [s.id for s in scenarios])
-    endings = store.keys(path)
-    simulator = simulator_version()
-    alone = workers == 1 and backend == "loky"
-    if alone:  # the process that looks at estimators of others runs them, too, and loads all kernels
-        _compile(report)
-    try:
-        entrants = [resolve(request, chosen, seal.unreadable(path), alone) for request in estimators]
-    except ServerError as error:
-        raise CampaignError(str(error)) from None
-    if not seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
-        require_unseen(entrants, scenarios, seeds)
-    if by_version:
-        recordings = dict.fromkeys((s.id for s in scenarios), declared_recording(SIMULATOR_VERSION))
-    else:
-        recordings = {s.id: seal.recording(recording_digest(s, simulator)) for s in scenarios}
-
-    def variant(entrant: Entrant, scenario: str) -> str:
-        if by_version:
-            return declared_variant(
-                scenario, SIMULATOR_VERSION, entrant.label, entrant.version, entrant.parameters
-            )  # fmt: skip
-        return variant_of(entrant, recordings[scenario])
-
-    variants = {s.id: {e.label: variant(e, s.id) for e in entrants} for s in scenarios}
-    current = {s.id: (recordings[s.id], variants[s.id]) for s in scenarios}
-    store.select(path, current)
-    requested.add(path, (s.id for s in scenarios), len(seeds))
-
-    scores, scoring = own_scores(), scoring_code()
-    plan = Plan(scenarios, entrants, seeds, variants, shard=shard)
-    forced_keys = frozenset(variants[s.id][label] for s in scenarios for label in forced)
-
-    def rescored(key: str) -> bool:  # the rules of scoring of what ships are those of the benchmark's version
-        return not by_version and scoring_differs(endings[key].scoring, scoring)
-
-    stale = {key for key in filter(plan.asks, endings) if rescored(key) and trials.is_kept(path, key)}
-    if stale:  # a score was edited: the trials that were kept have all that it needs
-        rescore_results(path, scenarios=scenarios, keys=stale, seal=seal)
-        endings = store.keys(path)
-
-    def limits(scenario: Scenario) -> Limits:
-        return Limits(time_limit(scenario) if timeout is None else timeout, memory)
-
-    mine = set(filter(plan.asks, endings))
-    elsewhere = set[str]() if by_version else _computed_elsewhere(path, processors=backend == "loky")
-    again = {
-        key
-        for key in mine
-        if _again(endings[key], limits(plan.scenario_of(key)), retry)
-        or rescored(key)
-        or endings[key].provenance in elsewhere
-        or key.rpartition("-")[0] in forced_keys
-    }
-    plan = replace(plan, there=mine - again)
-
-    def unit(scenario: Scenario, seed: int, missing: tuple[tuple[Entrant, str], ...]) -> Unit:
-        return Unit(
-            scenario, seed, missing, recordings[scenario.id], simulator, path, limits(scenario), scores, scoring,
-            keep_trials, covariance_interval, chosen, seal,
-        )  # fmt: skip
-
+        confinement = chosen_confinement(asked.confinement)
+    path = store.create(Path(asked.folder).resolve())
+    if not asked.by_version:
+        _require_local(path, [s.id for s in asked.scenarios])
+    if asked.alone:
+        _compile(asked.report)
+    entrants = _entrants(asked, confinement, path)
+    keyed = _keyed(asked, entrants, path)
+    requested.add(path, (s.id for s in asked.scenarios), len(asked.numbers))
+    plan, again = _planned(asked, path, entrants, keyed)
     total, skipped = plan.total, len(plan.there)
     statuses: Counter[str] = Counter()
     if skipped < total:
-        if again:
-            store.drop(path, again)
-            for key in again:
-                trials.discard(path, key)
-        if not alone:
-            _compile(report)
-        run_started = time.monotonic()
-        weight, left, loose = 0.0, plan.weight, 0
-        report(Progress("run", skipped, total))
-        end = math.inf if minutes is None else started + 60.0 * minutes
-        units = itertools.takewhile(lambda _: time.monotonic() < end, plan.units(unit))
-        with contextlib.closing(_outcomes(units, path, workers, backend, scheduler)) as outcomes:
-            for done_unit, outcome in outcomes:
-                statuses.update(outcome)
-                loose += outcome.total()
-                if loose >= _GATHERED:
-                    store.compact(path)
-                    loose = 0
-                weight, left = weight + done_unit.weight, left - done_unit.weight
-                elapsed = time.monotonic() - run_started
-                failed = Summary(path, total, skipped, statuses, 0.0).failed
-                done = skipped + statuses.total()
-                note = f"{done_unit.scenario.id}, seed {done_unit.seed}"
-                report(Progress("run", done, total, failed, elapsed, elapsed / weight * left, note))
-        store.select(path, current)  # another campaign in the same folder may have had the last word
+        store.drop(path, again)
+        for key in again:
+            trials.discard(path, key)
+        if not asked.alone:
+            _compile(asked.report)
+        units = _units(asked, plan, keyed, path, confinement)
+        if asked.minutes is not None:
+            end = started + 60.0 * asked.minutes
+            units = itertools.takewhile(lambda _: time.monotonic() < end, units)
+        _run_units(asked, plan, units, path, statuses)
+        store.select(path, keyed)  # another campaign in the same folder may have had the last word
         store.compact(path)
     else:
-        report(Progress("run", total, total))
+        asked.report(Progress("run", total, total))
     return Summary(path, total, skipped, dict(statuses), time.monotonic() - started)
+
+
+#: Versioned id of a scenario -> key of its recordings, and label of an estimator -> key without the seed.
+_Keyed: TypeAlias = dict[str, tuple[str, dict[str, str]]]
+
+
+def _entrants(asked: Campaign, confinement: str, path: Path) -> list[Entrant]:
+    """The estimators that take part, looked at where they can do no harm."""
+    hidden = asked.seal.unreadable(path)
+    try:
+        entrants = [resolve(request, confinement, hidden, asked.alone) for request in asked.estimators]
+    except ServerError as error:
+        raise CampaignError(str(error)) from None
+    if not asked.seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
+        require_unseen(entrants, asked.scenarios, asked.numbers)
+    return entrants
+
+
+def _keyed(asked: Campaign, entrants: Sequence[Entrant], path: Path) -> _Keyed:
+    """The keys of what is run, which are the current ones of the folder from now on."""
+    keyed: _Keyed = {}
+    for s in asked.scenarios:
+        if asked.by_version:
+            recording = declared_recording(SIMULATOR_VERSION)
+            variants = {
+                e.label: declared_variant(s.id, SIMULATOR_VERSION, e.label, e.version, e.parameters) for e in entrants
+            }
+        else:
+            recording = asked.seal.recording(recording_digest(s, simulator_version()))
+            variants = {e.label: variant_of(e, recording) for e in entrants}
+        keyed[s.id] = recording, variants
+    store.select(path, keyed)
+    return keyed
+
+
+def _planned(asked: Campaign, path: Path, entrants: Sequence[Entrant], keyed: _Keyed) -> tuple[Plan, set[str]]:
+    """What has to be done, and the keys of the stored results that are computed anew."""
+    variants = {scenario: found for scenario, (_, found) in keyed.items()}
+    plan = Plan(asked.scenarios, entrants, asked.numbers, variants, shard=asked.shard)
+    labels = _forced(asked.force, asked.estimators)
+    forced = {found[label] for found in variants.values() for label in labels}
+    endings, scoring = store.keys(path), scoring_code()
+
+    def rescored(key: str) -> bool:  # the rules of scoring of what ships are those of the benchmark's version
+        return not asked.by_version and scoring_differs(endings[key].scoring, scoring)
+
+    stale = {key for key in filter(plan.asks, endings) if rescored(key) and trials.is_kept(path, key)}
+    if stale:  # a score was edited: the trials that were kept have all that it needs
+        rescore_results(path, scenarios=asked.scenarios, keys=stale, seal=asked.seal)
+        endings = store.keys(path)
+    mine = set(filter(plan.asks, endings))
+    processors = asked.effective_backend == "loky"
+    elsewhere = set[str]() if asked.by_version else _computed_elsewhere(path, processors=processors)
+    again = {
+        key
+        for key in mine
+        if _again(endings[key], asked.limits(plan.scenario_of(key)), asked.retry)
+        or rescored(key)
+        or endings[key].provenance in elsewhere
+        or key.rpartition("-")[0] in forced
+    }
+    return replace(plan, there=mine - again), again
+
+
+def _units(asked: Campaign, plan: Plan, keyed: _Keyed, path: Path, confinement: str) -> Iterator[Unit]:
+    """The runs that are missing, as they are sent to workers."""
+    scores, scoring, simulator = own_scores(), scoring_code(), simulator_version()
+
+    def unit(scenario: Scenario, seed: int, missing: tuple[tuple[Entrant, str], ...]) -> Unit:
+        return Unit(
+            scenario, seed, missing, keyed[scenario.id][0], simulator, path, asked.limits(scenario), scores, scoring,
+            asked.keep_trials, asked.covariance_interval, confinement, asked.seal,
+        )  # fmt: skip
+
+    return plan.units(unit)
+
+
+def _run_units(asked: Campaign, plan: Plan, units: Iterator[Unit], path: Path, statuses: Counter[str]) -> None:
+    """Run what is missing, count how it ends, and tell how far it is."""
+    started = time.monotonic()
+    total, skipped = plan.total, len(plan.there)
+    weight, left, loose = 0.0, plan.weight, 0
+    asked.report(Progress("run", skipped, total))
+    with contextlib.closing(
+        _outcomes(units, path, asked.workers, asked.effective_backend, asked.scheduler)
+    ) as outcomes:
+        for unit, outcome in outcomes:
+            statuses.update(outcome)
+            loose += outcome.total()
+            if loose >= _GATHERED:
+                store.compact(path)
+                loose = 0
+            weight, left = weight + unit.weight, left - unit.weight
+            elapsed = time.monotonic() - started
+            failed = Summary(path, total, skipped, statuses, 0.0).failed
+            done = skipped + statuses.total()
+            note = f"{unit.scenario.id}, seed {unit.seed}"
+            asked.report(Progress("run", done, total, failed, elapsed, elapsed / weight * left, note))
 
 
 def _again(ending: store.Ending, limits: Limits, retry: bool) -> bool:

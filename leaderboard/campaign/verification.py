@@ -198,8 +198,8 @@ def _repeat(
     usual = time_limit(scenario)  # a run that is said to have met a tiny limit is given the usual one
     run_campaign(
         [scenario], [request], [result.seed], folder, workers=1,
-        timeout=min(max(result.time_limit, usual), _MOST_TIME * usual),
-        memory=min(max(result.memory_limit, MEMORY), _MOST_MEMORY * MEMORY), seal=seal,
+        time_limit=min(max(result.time_limit, usual), _MOST_TIME * usual),
+        memory_limit=min(max(result.memory_limit / 2**20, MEMORY), _MOST_MEMORY * MEMORY), seal=seal,
     )  # fmt: skip
     mine = (result.scenario, result.estimator, result.seed)
     found = (r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)

@@ -1,6 +1,6 @@
 """The `simnav` command.
 
-Each command imports what it needs when it runs, so that ``simnav list`` answers at once. Results go to
+The module of a command is imported when the command runs, so that ``simnav list`` answers at once. Results go to
 standard output, everything else to standard error; exit code 2 is a user's mistake, 1 a failure.
 """
 
@@ -14,32 +14,9 @@ from typing import Annotated
 
 import typer
 
-from simnav.leaderboard.cli import (
-    bench,
-    bound,
-    campaign,
-    check,
-    cite,
-    evaluate,
-    leaderboard,
-    list_,
-    merge,
-    new_estimator,
-    reference,
-    reproduce,
-    rescore,
-    run,
-    seal,
-    simulate,
-    standard,
-    submit,
-    sweep,
-    train,
-    tune,
-    verify,
-    warmup,
-)
+from simnav.leaderboard.cli.commands import COMMANDS, GROUPS
 from simnav.leaderboard.cli.console import USER, Output
+from simnav.leaderboard.cli.derived import command
 from simnav.leaderboard.results.errors import shortened
 
 __all__ = ["app", "main"]
@@ -84,32 +61,14 @@ def root(
                 raise typer.BadParameter(text, param_hint="--plugin") from None
 
 
-for _module in (
-    list_,
-    run,
-    simulate,
-    check,
-    bench,
-    new_estimator,
-    evaluate,
-    campaign,
-    sweep,
-    leaderboard,
-    warmup,
-    bound,
-    reproduce,
-    reference,
-    rescore,
-    seal,
-    verify,
-    cite,
-    merge,
-    submit,
-    tune,
-):
-    app.command(_module.__name__.rpartition(".")[2].strip("_").replace("_", "-"))(_module.command)
-app.add_typer(standard.app, name="standard")
-app.add_typer(train.app, name="train")
+for _name, (_request, _home) in COMMANDS.items():
+    app.command(_name)(command(_request, _home))
+for _group, (_help, _commands) in GROUPS.items():
+    _typer = typer.Typer(help=_help, no_args_is_help=True)
+    for _name, (_request, _home) in _commands.items():
+        _typer.command(_name)(command(_request, _home))
+    _typer.callback()(lambda: None)
+    app.add_typer(_typer, name=_group)
 
 
 def _open_streams() -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
+import numpy as np
 
-from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json, absolute
+from simnav.leaderboard.cli.commands import BoundCommand
+from simnav.leaderboard.cli.console import Output
+from simnav.leaderboard.cli.options import absolute
+from simnav.leaderboard.given import scenario_of
+from simnav.leaderboard.inspection import bound
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
 
@@ -17,40 +21,27 @@ if TYPE_CHECKING:
 
     from simnav.leaderboard.ranking.bounds import BoundReport
 
-__all__ = ["command"]
+__all__ = ["show"]
 
 #: Epochs that the table shows.
 _ROWS = 12
 
 
-def command(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file; a simulated one.")],
-    runs: Annotated[int, typer.Option("--runs", "-n", min=1, help="Seeds over which it is averaged.")] = 12,
-    smoothed: Annotated[
-        bool, typer.Option("--smoothed", help="Bound of smoothed output, not of real-time output.")
-    ] = False,
-    csv: Annotated[Path | None, typer.Option("--csv", help="Write every epoch to this file.")] = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: BoundCommand) -> None:
     """Show the posterior Cramer-Rao bound of a scenario by epoch: without faults, faults known, faults unknown."""
-    with session(json, debug) as out:
-        from simnav.leaderboard import interface
-
-        chosen = interface.scenario_of(scenario)
-        with out.progress(f"{chosen.id}, {runs} seeds") as progress:
-            report = interface.bound(chosen, runs=runs, smoothed=smoothed, progress=progress)
-        written = None if csv is None else _write(report, absolute(csv))
-        out.document({**report.to_dict(), "csv": None if written is None else str(written)})
-        out.print(_table(report))
-        out.print("clean: no faults; flags: faults known as they come; mix: only their statistics known")
-        if written is not None:
-            out.print(f"table: {written}")
+    chosen = scenario_of(request.scenario)
+    with out.progress(f"{chosen.id}, {request.runs} seeds") as progress:
+        report = bound.of(replace(request, scenario=chosen, progress=progress))
+    written = None if request.csv is None else _write(report, absolute(request.csv))
+    out.document({**report.to_dict(), "csv": None if written is None else str(written)})
+    out.print(_table(report))
+    out.print("clean: no faults; flags: faults known as they come; mix: only their statistics known")
+    if written is not None:
+        out.print(f"table: {written}")
 
 
 def _table(report: BoundReport) -> Table:
     """A dozen epochs and the whole run."""
-    import numpy as np
 
     shown = np.unique(np.linspace(0, len(report.time) - 1, _ROWS).astype(int))
     rows = [[f"{report.time[i]:g}", *(tables.number(float(b.horizontal[i])) for b in report.bounds)] for i in shown]
@@ -62,7 +53,6 @@ def _table(report: BoundReport) -> Table:
 
 def _write(report: BoundReport, path: Path) -> Path:
     """All epochs and components [m, m/s, rad] as CSV."""
-    import numpy as np
 
     columns = report.columns()
     with mistakes(OSError):

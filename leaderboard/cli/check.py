@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from simnav.leaderboard.cli.commands import CheckCommand
+from simnav.leaderboard.cli.console import FAILED, Output
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.running import check
 
-import typer
-
-from simnav.leaderboard.cli.console import FAILED, session
-from simnav.leaderboard.cli.options import Debug, Json, Set, parameters
-
-__all__ = ["command"]
+__all__ = ["show"]
 
 
-def command(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="my_filter.py, my_filter.py:MyFilter or a name.")],
-    set_: Set = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: CheckCommand) -> None:
     """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
-    with session(json, debug) as out:
-        from simnav.leaderboard import interface
-        from simnav.leaderboard.ranking import tables
-
-        report = interface.check(file, **parameters(set_))
-        out.document(report.to_dict())
-        out.print(tables.table(f"{report.estimator} and the contract", ["", "test", "finding"],
-                               [["ok" if f.ok else "FAIL", f.name, f.sentence] for f in report.findings],
-                               strong=[i for i, f in enumerate(report.findings) if not f.ok]),
-                  f"{report.estimator} {'passes' if report.passed else 'fails'}")  # fmt: skip
-        out.code = 0 if report.passed else FAILED
+    report = check(request.estimator, **(request.parameters or {}))
+    out.document(report.to_dict())
+    out.print(tables.table(f"{report.estimator} and the contract", ["", "test", "finding"],
+                           [["ok" if f.ok else "FAIL", f.name, f.sentence] for f in report.findings],
+                           strong=[i for i, f in enumerate(report.findings) if not f.ok]),
+              f"{report.estimator} {'passes' if report.passed else 'fails'}")  # fmt: skip
+    out.code = 0 if report.passed else FAILED

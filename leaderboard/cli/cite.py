@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from simnav.leaderboard.cli.commands import CiteCommand
+from simnav.leaderboard.cli.console import Output
+from simnav.leaderboard.inspection import cite
 
-import typer
-
-from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json
-
-__all__ = ["command"]
+__all__ = ["show"]
 
 
-def command(
-    results: Annotated[
-        Path | None, typer.Argument(metavar="RESULTS", help="Folder that a campaign wrote. Default: simnav itself.")
-    ] = None,
-    text: Annotated[bool, typer.Option("--text", help="Print one line of text instead of BibTeX.")] = False,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: CiteCommand) -> None:
     """Print how to cite this version of simnav, or the results of a campaign."""
-    with session(json, debug) as out:
-        from simnav.leaderboard import interface
-
-        found = interface.cite(results)
-        out.document(found.to_dict())
-        out.print(found.text if text else found.bibtex)
+    found = cite.of(request)
+    out.document(found.to_dict())
+    out.print(found.text if request.text else found.bibtex)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json
+from simnav import sensors
+from simnav.estimator import describe, names
+from simnav.leaderboard.cli.commands import ListCommand, Topic
+from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.ranking import tables
+from simnav.scenario.catalogue import headers
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -19,36 +19,22 @@ if TYPE_CHECKING:
     from simnav.scenario.catalogue import Header
     from simnav.spec import Spec
 
-__all__ = ["command", "estimators", "faults", "instruments", "scenarios"]
+__all__ = ["estimators", "faults", "instruments", "scenarios", "show"]
 
 
-class Topic(StrEnum):
-    """What is listed."""
-
-    SCENARIOS = "scenarios"
-    ESTIMATORS = "estimators"
-    INSTRUMENTS = "instruments"
-    FAULTS = "faults"
-
-
-def command(
-    topic: Annotated[Topic | None, typer.Argument(help="What to list; without it, scenarios and estimators.")] = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: ListCommand) -> None:
     """List scenarios, estimators, kinds of instruments or kinds of faults."""
-    with session(json, debug) as out:
-        found: dict[str, Any] = {}
-        if topic in (None, Topic.SCENARIOS):
-            found["scenarios"] = scenarios()
-            out.print(_scenario_table(found["scenarios"]))
-        if topic in (None, Topic.ESTIMATORS):
-            found["estimators"] = estimators(places=out.json)
-            out.print(_estimator_table(found["estimators"]))
-        if topic in (Topic.INSTRUMENTS, Topic.FAULTS):
-            found[topic] = instruments() if topic is Topic.INSTRUMENTS else faults()
-            out.print(_kind_table(topic.value.capitalize(), found[topic]))
-        out.document(found)
+    found: dict[str, Any] = {}
+    if request.topic in (None, Topic.SCENARIOS):
+        found["scenarios"] = scenarios()
+        out.print(_scenario_table(found["scenarios"]))
+    if request.topic in (None, Topic.ESTIMATORS):
+        found["estimators"] = estimators(places=out.json)
+        out.print(_estimator_table(found["estimators"]))
+    if request.topic in (Topic.INSTRUMENTS, Topic.FAULTS):
+        found[request.topic] = instruments() if request.topic is Topic.INSTRUMENTS else faults()
+        out.print(_kind_table(request.topic.value.capitalize(), found[request.topic]))
+    out.document(found)
 
 
 @dataclass(frozen=True)
@@ -98,7 +84,6 @@ class KindItem:
 
 def scenarios() -> list[ScenarioItem]:
     """Every scenario of every pack, by track and group."""
-    from simnav.scenario.catalogue import headers
 
     return [
         ScenarioItem(h.name, h.id, h.title, h.duration, h.tags, h.track, h.group, f"simnav:{h.gym_id}", str(h.path))
@@ -108,7 +93,6 @@ def scenarios() -> list[ScenarioItem]:
 
 def estimators(*, places: bool = True) -> list[EstimatorItem]:
     """Every registered estimator; without ``places``, which take a tenth of the time, no file and line."""
-    from simnav.estimator import describe, names
 
     return [
         EstimatorItem(d.name, d.aliases, d.summary, d.reference,
@@ -120,7 +104,6 @@ def estimators(*, places: bool = True) -> list[EstimatorItem]:
 
 def instruments() -> list[KindItem]:
     """Every kind of instrument."""
-    from simnav import sensors
 
     imu = _kind(sensors.ImuSpec, "angular rate and specific force")
     return [imu, *(_kind(spec, spec.definition.quantity) for spec in sensors.instrument_specs())]
@@ -128,7 +111,6 @@ def instruments() -> list[KindItem]:
 
 def faults() -> list[KindItem]:
     """Every kind of fault."""
-    from simnav import sensors
 
     return [_kind(spec, "") for spec in sensors.fault_specs()]
 

@@ -6,30 +6,25 @@ import keyword
 import re
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
 
-import typer
-
-from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json, absolute
+from simnav.estimator import names
+from simnav.leaderboard.campaign.request import kebab as to_kebab
+from simnav.leaderboard.cli.commands import NewEstimatorCommand
+from simnav.leaderboard.cli.console import Output
+from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.results.errors import RequestError
+from simnav.scenario.catalogue import headers
 
-__all__ = ["command", "write_estimator"]
+__all__ = ["show", "write_estimator"]
 
 _TEMPLATE = Path(__file__).parent / "estimator.py.jinja"
 
 
-def command(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the estimator, such as my-filter.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. Default: my_filter.py.")] = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: NewEstimatorCommand) -> None:
     """Write a small working estimator as a starting point."""
-    with session(json, debug) as out:
-        kebab, path = write_estimator(name, output)
-        out.document({"name": kebab, "file": str(path)})
-        out.print(f"written: {path}", f"next:    simnav check {quote(path.name)}")
+    kebab, path = write_estimator(request.name, request.output)
+    out.document({"name": kebab, "file": str(path)})
+    out.print(f"written: {path}", f"next:    simnav check {quote(path.name)}")
 
 
 def write_estimator(name: str, output: Path | None = None) -> tuple[str, Path]:
@@ -41,10 +36,6 @@ def write_estimator(name: str, output: Path | None = None) -> tuple[str, Path]:
         If the name or the file will not do.
     """
     from jinja2 import Environment
-
-    from simnav.estimator import names
-    from simnav.leaderboard.campaign.request import kebab as to_kebab
-    from simnav.scenario.catalogue import headers
 
     kebab = to_kebab(name)
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", kebab) or keyword.iskeyword(kebab):

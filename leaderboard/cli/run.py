@@ -3,91 +3,70 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-import typer
-
-from simnav.leaderboard.cli.console import FAILED, USER, session
-from simnav.leaderboard.cli.options import Debug, Estimators, Json, ScenarioName, Seed, Set, absolute, parameters
+from simnav.leaderboard.cli.commands import RunCommand
+from simnav.leaderboard.cli.console import FAILED, USER, Output
+from simnav.leaderboard.cli.options import absolute, require_figure
+from simnav.leaderboard.figures.stanford import stanford_diagrams
+from simnav.leaderboard.figures.style import save_as
+from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.running import run
+from simnav.scoring.consistency import ending
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.single_run import RunReport
 
-__all__ = ["command"]
+__all__ = ["show"]
 
 
-def command(
-    scenario: ScenarioName,
-    estimator: Estimators = None,
-    seed: Seed = 0,
-    plot: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
-    stanford: Annotated[
-        Path | None, typer.Option(help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf.")
-    ] = None,
-    alert_limit: Annotated[
-        float,
-        typer.Option(min=0.01, help="Alert limit of the Stanford diagrams in metres; IMO A.915(22): 25, in ports 2.5."),
-    ] = 25.0,
-    set_: Set = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: RunCommand) -> None:
     """Run estimators once over one scenario and score them."""
-    with session(json, debug) as out:
-        from simnav.leaderboard import interface
-
-        for option, path in (("--plot", plot), ("--stanford", stanford)):
-            if path is not None and path.suffix not in (".png", ".svg", ".pdf"):
-                raise RequestError(f"{option} {path}: the file should end in .png, .svg or .pdf")
-            if path is not None and not path.expanduser().resolve().parent.is_dir():
-                raise RequestError(f"{option} {path}: there is no folder {path.parent}")
-        chosen = interface.scenario_of(scenario)
-        with out.progress(f"{chosen.id}, seed {seed}") as progress:
-            report = interface.run(chosen, estimator, seed=seed, parameters=parameters(set_), progress=progress)
-        drawn = None
-        if plot is not None and any(len(e.trial) for e in report.estimators):
-            from simnav.leaderboard.figures.style import save_as
-
-            drawn = save_as(report.plot(), absolute(plot))
-        diagrams = {} if stanford is None else report.stanford(alert_limit)
-        shown = None
-        if stanford is not None and diagrams:
-            from simnav.leaderboard.figures.stanford import stanford_diagrams
-            from simnav.leaderboard.figures.style import save_as
-
-            title = f"{report.recording.scenario}, seed {seed}: alert limit {alert_limit:g} m"
-            shown = save_as(stanford_diagrams(diagrams, title=title), absolute(stanford))
-        elif stanford is not None:
-            out.remark("no Stanford diagram: no estimator gave a covariance or a protection level")
-        document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
-        if stanford is not None:
-            integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
-            document |= {"stanford": integrity, "stanford_plot": None if shown is None else str(shown)}
-        out.document(document)
-        out.print(_table(report))
-        for e in report.estimators:
-            if e.status != "ok":
-                out.remark(f"{e.estimator}: {e.status}: {e.reason}")
-            unseen = [f"{name} ({kind})" for name, kind in report.unseen(e).items()]
-            if unseen:
-                left = "it out" if len(unseen) == 1 else "them out"
-                out.remark(f"{e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}")
-        if drawn is not None:
-            out.print(f"figure: {drawn}")
-        if shown is not None:
-            out.print(f"Stanford diagrams: {shown}")
-        if any(e.trial.failed for e in report.estimators):
-            out.code = FAILED
-        elif all(e.status == "unsuitable" for e in report.estimators):
-            out.code = USER
+    for option, path in (("--plot", request.plot), ("--stanford", request.stanford)):
+        require_figure(option, path)
+        if path is not None and not absolute(path).parent.is_dir():
+            raise RequestError(f"{option} {path}: there is no folder {path.parent}")
+    chosen = scenario_of(request.scenario)
+    with out.progress(f"{chosen.id}, seed {request.seed}") as progress:
+        report = run.of(replace(request, scenario=chosen, progress=progress))
+    drawn = None
+    if request.plot is not None and any(len(e.trial) for e in report.estimators):
+        drawn = save_as(report.plot(), absolute(request.plot))
+    diagrams = {} if request.stanford is None else report.stanford(request.alert_limit)
+    shown = None
+    if request.stanford is not None and diagrams:
+        title = f"{report.recording.scenario}, seed {request.seed}: alert limit {request.alert_limit:g} m"
+        shown = save_as(stanford_diagrams(diagrams, title=title), absolute(request.stanford))
+    elif request.stanford is not None:
+        out.remark("no Stanford diagram: no estimator gave a covariance or a protection level")
+    document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
+    if request.stanford is not None:
+        integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
+        document |= {"stanford": integrity, "stanford_plot": None if shown is None else str(shown)}
+    out.document(document)
+    out.print(_table(report))
+    for e in report.estimators:
+        if e.status != "ok":
+            out.remark(f"{e.estimator}: {e.status}: {e.reason}")
+        unseen = [f"{name} ({kind})" for name, kind in report.unseen(e).items()]
+        if unseen:
+            left = "it out" if len(unseen) == 1 else "them out"
+            out.remark(f"{e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}")
+    if drawn is not None:
+        out.print(f"figure: {drawn}")
+    if shown is not None:
+        out.print(f"Stanford diagrams: {shown}")
+    if any(e.trial.failed for e in report.estimators):
+        out.code = FAILED
+    elif all(e.status == "unsuitable" for e in report.estimators):
+        out.code = USER
 
 
 def _table(report: RunReport) -> tables.Fitted:
     """Scores of the estimators, the best horizontal RMSE first."""
-    from simnav.scoring.consistency import ending
 
     def order(k: int) -> tuple[bool, float]:
         value = report.estimators[k].scores.get("horizontal_rmse", math.inf)

@@ -2,65 +2,50 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Any
 
-import typer
-
-from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json, ScenarioName, Seed, absolute
+from simnav.leaderboard.cli.commands import SimulateCommand
+from simnav.leaderboard.cli.console import Output
+from simnav.leaderboard.cli.options import absolute
+from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.formats import formats, write
+from simnav.leaderboard.running import record
 
-__all__ = ["command"]
+__all__ = ["show"]
 
 
-def command(
-    scenario: ScenarioName,
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", help="Recording to write: .npz, or the ending of a plug-in's format."),
-    ],
-    seed: Seed = 0,
-    csv: Annotated[
-        Path | None, typer.Option(help="Folder for the recording as CSV files, one for each instrument.")
-    ] = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: SimulateCommand) -> None:
     """Write the recording of one run: measurements, labels and truth."""
-    with session(json, debug) as out:
-        from simnav.leaderboard.campaign.single_run import record
-        from simnav.leaderboard.interface import scenario_of
-        from simnav.leaderboard.results.formats import formats, write
-
-        # "csv" is a folder, and has an option of its own.
-        endings = [name for name in formats("recording") if name != "csv"]
-        ending = output.suffix.removeprefix(".")
-        if ending not in endings:
-            raise RequestError(f"--output {output}: the file should end in {' or '.join('.' + e for e in endings)}")
-        chosen = scenario_of(scenario)
-        recording = record(chosen, seed)
-        target, *_ = write("recording", ending, recording, absolute(output))
-        written = [] if csv is None else write("recording", "csv", recording, absolute(csv))
-        data = recording.data
-        out.document(
-            {
-                "scenario": chosen.id,
-                "seed": seed,
-                "duration": recording.duration,
-                "imu_samples": 0 if data.imu is None else len(data.imu),
-                "measurements": {name: len(stream) for name, stream in data.aids.items()},
-                "file": str(target),
-                "csv": [str(p) for p in written],
-            }
-        )
-        rows: list[list[Any]] = [[s.name, s.kind, len(s), len(s.dropped), int((s.faults != 0).sum())]
-                                 for s in data.aids.values()]  # fmt: skip
-        if data.imu is not None:
-            rows.insert(0, ["imu", "imu", len(data.imu), 0, 0])
-        columns = ["instrument", "kind", "measurements", "dropped", "touched by a fault"]
-        table = tables.table(f"{chosen.id}, seed {seed}", columns, rows, numeric=columns[2:])
-        out.print(table, f"recording: {target}")
-        if written:
-            out.print(f"CSV: {written[0].parent}")
+    # "csv" is a folder, and has an option of its own.
+    endings = [name for name in formats("recording") if name != "csv"]
+    ending = request.output.suffix.removeprefix(".")
+    if ending not in endings:
+        raise RequestError(f"--output {request.output}: the file should end in {' or '.join('.' + e for e in endings)}")
+    chosen = scenario_of(request.scenario)
+    recording = record.of(replace(request, scenario=chosen))
+    target, *_ = write("recording", ending, recording, absolute(request.output))
+    written = [] if request.csv is None else write("recording", "csv", recording, absolute(request.csv))
+    data = recording.data
+    out.document(
+        {
+            "scenario": chosen.id,
+            "seed": request.seed,
+            "duration": recording.duration,
+            "imu_samples": 0 if data.imu is None else len(data.imu),
+            "measurements": {name: len(stream) for name, stream in data.aids.items()},
+            "file": str(target),
+            "csv": [str(p) for p in written],
+        }
+    )
+    rows: list[list[Any]] = [[s.name, s.kind, len(s), len(s.dropped), int((s.faults != 0).sum())]
+                             for s in data.aids.values()]  # fmt: skip
+    if data.imu is not None:
+        rows.insert(0, ["imu", "imu", len(data.imu), 0, 0])
+    columns = ["instrument", "kind", "measurements", "dropped", "touched by a fault"]
+    table = tables.table(f"{chosen.id}, seed {request.seed}", columns, rows, numeric=columns[2:])
+    out.print(table, f"recording: {target}")
+    if written:
+        out.print(f"CSV: {written[0].parent}")

@@ -3,77 +3,41 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from simnav.leaderboard.cli.console import FAILED, session
-from simnav.leaderboard.cli.options import (
-    Debug,
-    FirstSeed,
-    Json,
-    MemoryLimit,
-    ScenarioName,
-    Set,
-    TimeLimit,
-    Workers,
-    absolute,
-    campaign_progress,
-    parameters,
-)
+from simnav.leaderboard.cli.commands import SweepCommand
+from simnav.leaderboard.cli.console import FAILED, Output
+from simnav.leaderboard.cli.options import absolute, campaign_progress, require_figure
+from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.ranking.ranking_table import between
+from simnav.leaderboard.results.errors import mistakes
+from simnav.leaderboard.running import sweep
+from simnav.leaderboard.sweep.report import axis_label
+from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
     from simnav.leaderboard.sweep.report import Sweep
 
-__all__ = ["command"]
-
-_DIAL = "A dial with its values, like multipath=0,1,2,4, or a key, like fault[0].sigma_m=1,2. Two make a map."
-_ESTIMATOR = "Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter."
+__all__ = ["show"]
 
 
-def command(
-    scenario: ScenarioName,
-    dial: Annotated[list[str], typer.Option(help=_DIAL)],
-    estimator: Annotated[list[str], typer.Option("--estimator", "-e", help=_ESTIMATOR)],
-    runs: Annotated[int, typer.Option("--runs", "-n", min=1, help="Seeds a value.")] = 30,
-    limit: Annotated[float | None, typer.Option(help="Threshold of the error, in the unit of the score.")] = None,
-    score: Annotated[str, typer.Option(help="A score that is better when lower.")] = "horizontal_rmse",
-    plot: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of the results. Default: results/sweep-SCENARIO.")
-    ] = None,
-    set_: Set = None,
-    seed: FirstSeed = 0,
-    workers: Workers = 2,
-    time_limit: TimeLimit = None,
-    memory_limit: MemoryLimit = 2048,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: SweepCommand) -> None:
     """Vary a quantity of a scenario (a dial): the error of estimators against it, and their breaking points."""
-    with session(json, debug) as out:
-        from simnav.leaderboard import interface
-
-        if plot is not None and plot.suffix.lower() not in (".png", ".svg", ".pdf"):
-            raise RequestError(f"--plot {plot.name}: it should end in .png, .svg or .pdf")
-        with out.progress("starting") as bar:
-            sweep = interface.sweep(
-                scenario, dial, estimator, runs=runs, seed=seed, score=score, limit=limit, output=output,
-                parameters=parameters(set_), workers=workers, time_limit=time_limit, memory_limit=memory_limit,
-                progress=campaign_progress(bar),
-            )  # fmt: skip
-        written = None if plot is None else _draw(sweep, absolute(plot))
-        out.document({**sweep.to_dict(), "figure": None if written is None else str(written)})
-        out.print(_errors(sweep), _breaking(sweep))
-        if written is not None:
-            out.print(f"figure:  {written}")
-        summary = sweep.summary
-        out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
-                  f"{tables.duration(summary.seconds)})")  # fmt: skip
-        out.code = 0 if any(r.status == "ok" for r in sweep.results) else FAILED
+    require_figure("--plot", request.plot)
+    with out.progress("starting") as bar:
+        made = sweep.of(replace(request, progress=campaign_progress(bar)))
+    written = None if request.plot is None else _draw(made, absolute(request.plot))
+    out.document({**made.to_dict(), "figure": None if written is None else str(written)})
+    out.print(_errors(made), _breaking(made))
+    if written is not None:
+        out.print(f"figure:  {written}")
+    summary = made.summary
+    out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
+              f"{tables.duration(summary.seconds)})")  # fmt: skip
+    out.code = 0 if any(r.status == "ok" for r in made.results) else FAILED
 
 
 def _figure(x: float) -> str:
@@ -82,9 +46,6 @@ def _figure(x: float) -> str:
 
 def _errors(sweep: Sweep) -> tables.Fitted:
     """A row an estimator and setting."""
-    from simnav.leaderboard.ranking.ranking_table import between
-    from simnav.leaderboard.sweep.report import axis_label
-    from simnav.scoring import SCORES
 
     at = {(p.estimator, p.values): p for p in sweep.points}
     rows = []
@@ -107,7 +68,6 @@ def _errors(sweep: Sweep) -> tables.Fitted:
 
 def _breaking(sweep: Sweep) -> tables.Fitted:
     """Where each estimator breaks."""
-    from simnav.leaderboard.sweep.report import axis_label
 
     beyond = f"beyond {sweep.values[0][-1]:g}"
 
@@ -128,7 +88,6 @@ def _breaking(sweep: Sweep) -> tables.Fitted:
 
 
 def _draw(sweep: Sweep, path: Path) -> Path:
-    from simnav.leaderboard.figures.style import save_as
 
     with mistakes(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)

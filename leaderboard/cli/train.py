@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 
-from simnav.leaderboard.cli.console import Output, session
-from simnav.leaderboard.cli.options import Debug, Json, absolute
+from simnav.estimators.training.anfis_training import (
+    FIRST_TRAINING_SEED,
+    FIRST_VALIDATION_SEED,
+    gather,
+    scenarios,
+    train,
+)
+from simnav.leaderboard.campaign.fingerprint import simulator_version
+from simnav.leaderboard.cli.commands import TrainAnfisCommand
+from simnav.leaderboard.cli.console import Output
+from simnav.leaderboard.cli.options import absolute
+from simnav.leaderboard.figures import training as training_figures
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -19,9 +27,7 @@ if TYPE_CHECKING:
     from simnav.estimators.adaptations.anfis_file import Parameters
     from simnav.estimators.training.hybrid_learning import Learned
 
-__all__ = ["app", "run"]
-
-app = typer.Typer(no_args_is_help=True)
+__all__ = ["show"]
 
 #: Passes that the table shows.
 _ROWS = 12
@@ -29,51 +35,9 @@ _ROWS = 12
 _LEAST_VALIDATION = 2
 
 
-class _Features(StrEnum):
-    """As `simnav.estimators.adaptations.anfis_file.FEATURES`, which the command does not import before it runs."""
-
-    INNOVATION = "innovation"
-    MOTION = "motion"
-    RECENT = "recent"
-
-
-@app.callback()
-def _root() -> None:
-    """Train the parameters of an estimator."""
-
-
-@app.command("anfis")
-def _command(
-    features: Annotated[_Features, typer.Option(help="Inputs of the network; see docs/explanation/anfis.md.")] = (
-        _Features.INNOVATION
-    ),
-    seeds: Annotated[
-        int, typer.Option("--seeds", "-n", min=1, help="Seeds of the training voyages; none of them is ever scored.")
-    ] = 3,
-    passes: Annotated[int, typer.Option(min=1, help="Most passes over the data.")] = 200,
-    output: Annotated[
-        Path | None, typer.Option("--output", "--out", "-o", help="Parameter file. Default: anfis_FEATURES.json.")
-    ] = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
-    """Train the network of anfis-fgo (a reconstruction of Jiang et al. 2026), and draw the result."""
-    with session(json, debug) as out:
-        run(out, features.value, seeds, passes, output)
-
-
-def run(out: Output, features: str, seeds: int, passes: int, output: Path | None) -> None:
+def show(out: Output, request: TrainAnfisCommand) -> None:
     """Simulate the training data, train, and write the parameter file and two figures."""
-    from simnav.estimators.training.anfis_training import (
-        FIRST_TRAINING_SEED,
-        FIRST_VALIDATION_SEED,
-        gather,
-        scenarios,
-        train,
-    )
-    from simnav.leaderboard.campaign.fingerprint import simulator_version
-    from simnav.leaderboard.figures import training as training_figures
-
+    features, seeds, passes, output = request.features.value, request.seeds, request.passes, request.output
     path = absolute(output or Path(f"anfis_{features}.json"))
     if path.suffix != ".json":
         raise RequestError(f"--output {path}: the file should end in .json")

@@ -2,84 +2,45 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-import typer
-
-from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, FirstSeed, Json, Set, absolute, parameters
+from simnav.leaderboard.cli.commands import TuneCommand
+from simnav.leaderboard.cli.console import Output
+from simnav.leaderboard.cli.options import absolute, require_figure
+from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.running import tune
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from simnav.leaderboard.tuning.tuning import Method, Tuning
+    from simnav.leaderboard.tuning.tuning import Tuning
 
-__all__ = ["command"]
-
-_METHODS: dict[str, Method] = {"differential-evolution": "differential-evolution", "nelder-mead": "nelder-mead"}
+__all__ = ["show"]
 
 
-def command(
-    estimator: Annotated[str, typer.Argument(metavar="ESTIMATOR", help="A name, or a file like my_filter.py.")],
-    family: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--family", "-f", help="Training families, separated by commas. Default: training-voyages,training-clean."
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=LOW:HIGH",
-            help="A parameter and its bounds; :log or :integer may follow. Default: those of the stored tuning.",
-        ),
-    ] = None,
-    runs: Annotated[int, typer.Option("--runs", "-n", min=2, help="Voyages of each family for the search.")] = 20,
-    unseen: Annotated[int, typer.Option(min=2, help="Voyages of each family for the comparison.")] = 20,
-    evaluations: Annotated[int, typer.Option(min=2, help="Evaluations of the objective.")] = 40,
-    method: Annotated[str, typer.Option(help="differential-evolution or nelder-mead.")] = "differential-evolution",
-    seed: FirstSeed = 0,
-    search_seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
-    set_: Set = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the chosen values to this file.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Write a figure of the search: .png, .svg or .pdf.")] = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: TuneCommand) -> None:
     """Choose parameters of an estimator on training families, never on ranked scenarios."""
-    with session(json, debug) as out:
-        from simnav.leaderboard import interface
-        from simnav.leaderboard.results.errors import RequestError
-
-        if method not in _METHODS:
-            raise RequestError(f"--method {method}: it should be one of {', '.join(_METHODS)}")
-        if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
-            raise RequestError(f"--plot {plot}: the file should end in .png, .svg or .pdf")
-        with out.progress(f"tuning {estimator}") as progress:
-            found = interface.tune(
-                (estimator, parameters(set_)) if set_ else estimator,
-                ",".join(family) if family else ("training-voyages", "training-clean"),
-                ",".join(vary) if vary else None,
-                runs=runs, unseen=unseen, seed=seed, evaluations=evaluations, method=_METHODS[method],
-                search_seed=search_seed, progress=progress,
-            )  # fmt: skip
-        written = None if output is None else found.write(absolute(output))
-        drawn = None
-        if plot is not None:
-            from simnav.leaderboard.figures.style import save_as
-
-            drawn = save_as(found.plot(), absolute(plot))
-        out.document(found.to_dict() | {"file": None if written is None else str(written)})
-        out.print(_table(found))
-        chosen = ", ".join(f"{name} {found.present[name]:g} -> {value:g}" for name, value in found.chosen.items())
-        out.print(f"chosen: {chosen}" if found.chosen != dict(found.present) else "the present values are the best")
-        if found.chosen != dict(found.present) and not found.holds:
-            out.print("on the unseen voyages it is no better: keep the present values, or search over more voyages")
-        for what, path in (("file", written), ("figure", drawn)):
-            if path is not None:
-                out.print(f"{what}: {path}")
+    if request.method not in ("differential-evolution", "nelder-mead"):
+        raise RequestError(f"--method {request.method}: it should be one of differential-evolution, nelder-mead")
+    require_figure("--plot", request.plot)
+    if request.parameters:
+        request = replace(request, estimator=(str(request.estimator), request.parameters))
+    with out.progress(f"tuning {request.estimator}") as progress:
+        found = tune.of(replace(request, progress=progress))
+    written = None if request.output is None else found.write(absolute(request.output))
+    drawn = None if request.plot is None else save_as(found.plot(), absolute(request.plot))
+    out.document(found.to_dict() | {"file": None if written is None else str(written)})
+    out.print(_table(found))
+    chosen = ", ".join(f"{name} {found.present[name]:g} -> {value:g}" for name, value in found.chosen.items())
+    out.print(f"chosen: {chosen}" if found.chosen != dict(found.present) else "the present values are the best")
+    if found.chosen != dict(found.present) and not found.holds:
+        out.print("on the unseen voyages it is no better: keep the present values, or search over more voyages")
+    for what, path in (("file", written), ("figure", drawn)):
+        if path is not None:
+            out.print(f"{what}: {path}")
 
 
 def _table(found: Tuning) -> Table:

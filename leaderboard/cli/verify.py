@@ -3,86 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-import typer
-
-from simnav.leaderboard.cli.console import FAILED, Output, session
-from simnav.leaderboard.cli.options import Debug, Estimators, Json, OwnScenarios
+from simnav.leaderboard.campaign.comparison import CLOSE
+from simnav.leaderboard.cli.commands import VerifyCommand
+from simnav.leaderboard.cli.console import FAILED, Output
+from simnav.leaderboard.cli.options import absolute
+from simnav.leaderboard.inspection import verify
+from simnav.leaderboard.publishing import verify_bundle
+from simnav.leaderboard.requests import VerifyBundleRequest
 
 if TYPE_CHECKING:
     from simnav.leaderboard.submission.verifying import SubmissionReport
 
-__all__ = ["command"]
+__all__ = ["show"]
 
 
-def command(
-    results: Annotated[
-        Path, typer.Argument(metavar="RESULTS", help="Folder of results, or a bundle of 'simnav submit'.")
-    ],
-    key: Annotated[
-        Path | None,
-        typer.Option("--key", metavar="KEYFILE", help="Key of sealed seeds: of the results, or for a bundle."),
-    ] = None,
-    sample: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Runs that are repeated at most. Default: so many that 5 % of forged runs are found, about 59."
-        ),
-    ] = None,
-    row: Annotated[
-        list[str] | None, typer.Option("--row", help="Of a folder: repeat runs of this row only; repeatable.")
-    ] = None,
-    scenario: OwnScenarios = None,
-    estimator: Estimators = None,
-    present: Annotated[
-        bool, typer.Option("--present", help="For a bundle: use the installed packages, not a new environment.")
-    ] = False,
-    tolerance: Annotated[
-        float | None, typer.Option(min=0.0, help="For a bundle: relative difference that is accepted. [1e-6]")
-    ] = None,
-    json: Json = False,
-    debug: Debug = False,
-) -> None:
+def show(out: Output, request: VerifyCommand) -> None:
     """Check results or a submission, and repeat some of the runs, bit for bit."""
-    with session(json, debug) as out:
-        if results.is_file():
-            from simnav.leaderboard import publishing
-
-            with out.progress("repeating") as progress:
-                facts = publishing.verify_bundle(
-                    results, key=key, sample=sample, present=present, tolerance=tolerance, progress=progress
-                )
-            _print(out, facts)
-            return
-        from simnav.leaderboard import interface
-        from simnav.leaderboard.campaign.comparison import CLOSE
-
+    if absolute(request.results).is_file():
+        bundle = VerifyBundleRequest(
+            request.results, key=request.key, sample=request.sample, present=request.present,
+            tolerance=request.tolerance,
+        )  # fmt: skip
         with out.progress("repeating") as progress:
-            done = interface.verify(
-                results, key=key, sample=sample, scenarios=scenario, estimators=estimator, rows=row or (),
-                progress=progress,
-            )  # fmt: skip
-        out.document(done.to_dict())
-        seal = f"sealed by {done.seal}" if done.seal else "public seeds"
-        lines = [f"results: {done.folder} ({done.results}, {seal})"]
-        if done.other_seals:
-            lines.append(f"{done.other_seals} results were not made under this key")
-        lines += [f"set aside: {text}" for text in done.set_aside]
-        lines += [f"different: {text}" for text in (*done.different, *done.claims)]
-        lines += [f"close: {text}" for text in done.close]
-        lines += [f"not repeatable: {text}" for text in done.not_repeatable]
-        lines += [f"incomplete: {text}" for text in done.missing]
-        lines += [f"not confirmed: {text}" for text in done.unconfirmed]
-        if done.unknown:
-            lines.append(f"{_unknown(done.unknown)} ('simnav --plugin FILE verify ...' loads a file of scores)")
-        same = done.same
-        more = f", {len(done.close)} more within {CLOSE:.0e}" if done.close else ""
-        lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")
-        lines.append(done.finds)
-        out.print(*lines)
-        out.code = 0 if done.passed else FAILED
+            facts = verify_bundle.of(replace(bundle, progress=progress))
+        _print(out, facts)
+        return
+    with out.progress("repeating") as progress:
+        done = verify.of(replace(request, progress=progress))
+    out.document(done.to_dict())
+    seal = f"sealed by {done.seal}" if done.seal else "public seeds"
+    lines = [f"results: {done.folder} ({done.results}, {seal})"]
+    if done.other_seals:
+        lines.append(f"{done.other_seals} results were not made under this key")
+    lines += [f"set aside: {text}" for text in done.set_aside]
+    lines += [f"different: {text}" for text in (*done.different, *done.claims)]
+    lines += [f"close: {text}" for text in done.close]
+    lines += [f"not repeatable: {text}" for text in done.not_repeatable]
+    lines += [f"incomplete: {text}" for text in done.missing]
+    lines += [f"not confirmed: {text}" for text in done.unconfirmed]
+    if done.unknown:
+        lines.append(f"{_unknown(done.unknown)} ('simnav --plugin FILE verify ...' loads a file of scores)")
+    same = done.same
+    more = f", {len(done.close)} more within {CLOSE:.0e}" if done.close else ""
+    lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")
+    lines.append(done.finds)
+    out.print(*lines)
+    out.code = 0 if done.passed else FAILED
 
 
 def _unknown(scores: Sequence[str]) -> str:

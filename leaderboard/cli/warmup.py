@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import time
 
-from simnav.leaderboard.cli.console import session
-from simnav.leaderboard.cli.options import Debug, Json
+from simnav.compiled import kernels
+from simnav.leaderboard.cli.commands import WarmupCommand
+from simnav.leaderboard.cli.console import Output
+from simnav.warmup import warmup
 
-__all__ = ["command"]
+__all__ = ["show"]
 
 
-def command(json: Json = False, debug: Debug = False) -> None:
+def show(out: Output, request: WarmupCommand) -> None:
     """Compile every kernel, once; later starts are quick."""
-    with session(json, debug) as out:
-        from simnav.compiled import kernels
-        from simnav.warmup import warmup
-
-        started = time.perf_counter()
-        with out.progress("compiling kernels") as progress:
-            warmup(progress)
-        seconds, count = time.perf_counter() - started, len(kernels())
-        out.document({"kernels": count, "seconds": seconds})
-        out.print(f"{count} kernels ready in {seconds:.1f} s")
+    started = time.perf_counter()
+    with out.progress("compiling kernels") as progress:
+        warmup(progress)
+    seconds, count = time.perf_counter() - started, len(kernels())
+    out.document({"kernels": count, "seconds": seconds})
+    out.print(f"{count} kernels ready in {seconds:.1f} s")

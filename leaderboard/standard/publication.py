@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from simnav.estimator import find
+from simnav.leaderboard.calls import finite_number
 from simnav.leaderboard.campaign.campaign import Progress, Summary, combined, require_known, run_campaign
 from simnav.leaderboard.campaign.request import comes_with_simnav, requests
-from simnav.leaderboard.given import positive, scenarios_of
+from simnav.leaderboard.given import scenarios_of
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank
@@ -127,7 +128,7 @@ def run(
     parts = [(scenarios_of(part.scenarios, optional=True), requests(part.estimators), part.runs)
              for part in profile.parts]  # fmt: skip
     require_known(force, [everyone for _, everyone, _ in parts])
-    end = None if minutes is None else time.monotonic() + 60.0 * positive("minutes", minutes)
+    end = None if minutes is None else time.monotonic() + 60.0 * finite_number("minutes", minutes)
     return combined([
         run_campaign(
             chosen, everyone, range(runs), working, workers=workers, progress=progress, force=force, shard=shard,

@@ -296,7 +296,7 @@ def _limits(results: Sequence[Result]) -> list[str]:
     findings = []
     for scenario in sorted({r.scenario for r in results}):
         try:
-            usual = time_limit(catalogued_scenario(scenario)), MEMORY
+            usual = time_limit(catalogued_scenario(scenario)), int(MEMORY * 2**20)
         except RequestError as error:
             findings.append(str(error))
             continue

@@ -18,7 +18,9 @@ from typer.testing import CliRunner
 import simnav
 from simnav import Estimate, Estimator
 from simnav.estimator import registry
+from simnav.leaderboard import requests
 from simnav.leaderboard.cli import app
+from simnav.leaderboard.cli.derived import requested
 from simnav.leaderboard.cli.new_estimator import write_estimator
 from simnav.leaderboard.interface import results_of, scenario_of
 from simnav.leaderboard.results.frame import frame
@@ -194,20 +196,18 @@ OF_THE_RESULT = {
     "list": {"topic"},
     "run": {"plot", "stanford", "alert_limit"},
     "simulate": {"output", "csv"},
-    "sweep": {"plot", "workers", "time_limit", "memory_limit"},  # limits are **options of the call
+    "sweep": {"plot"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
     "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
     "cite": {"text"},
     "tune": {"output", "plot", "parameters"},  # parameters that are held are a pair with the estimator
 }
-SAME = {"set_": "parameters", "file": "estimator", "family": "families"}
 
 
 def arguments(function: Callable[..., Any], *, without: Collection[str] = ()) -> set[str]:
-    """Names of the arguments, in the singular."""
-    names = {SAME.get(name, name) for name in inspect.signature(function).parameters} - {*without}
-    return {name.removesuffix("s") for name in names}
+    """Names of the arguments."""
+    return {*inspect.signature(function).parameters} - {*without}
 
 
 @pytest.mark.parametrize("name", commands())
@@ -216,8 +216,37 @@ def test_every_option_is_an_argument_of_the_call_and_the_other_way_round(name: s
     if call is None:
         return
     options = arguments(commands()[name], without={"json", "debug", *OF_THE_RESULT.get(name, ())})
-    more = {"parameter"} if name == "tune" else {"option"}
-    assert options == arguments(call, without={"progress", "load", "processes"}) - more
+    assert options == arguments(call, without={"progress", "load", "processes"})
+
+
+@pytest.mark.parametrize("name", ["campaign", "evaluate", "sweep", "site", "verify"])
+def test_a_call_shows_its_options(name: str) -> None:
+    """The request is the one place: signature, documentation and defaults of the call come from it."""
+    call = getattr(simnav, name)
+    request = inspect.signature(call.of).parameters["request"].annotation
+    declared = vars(requests)[request].__dataclass_fields__
+    shown = inspect.signature(call).parameters
+    assert {*shown} == {*declared}
+    text = inspect.getdoc(call) or ""
+    for option, field in declared.items():
+        assert f"\n{option} : " in text
+        assert shown[option].default in (field.default, inspect.Parameter.empty)
+    assert "\nReturns\n-------\n" in text
+    with pytest.raises(TypeError, match=rf"^{name}\(\) got an unexpected keyword argument 'nothing'"):
+        call("x", "y", nothing=1) if name == "evaluate" else call(nothing=1)
+
+
+def test_an_option_is_read_as_it_was_declared() -> None:
+    given = {
+        "scenarios": ["a"], "estimators": None, "force": ["ekf"], "shard": "2/3", "parameters": ["gate=3"],
+        "methods": None,
+    }  # fmt: skip
+    fields = requests.CampaignRequest.__dataclass_fields__
+    values = {n: f.default for n, f in fields.items()} | given
+    read = requested(requests.CampaignRequest, values)
+    assert (read.scenarios, read.force, read.shard, read.parameters) == (["a"], ("ekf",), (2, 3), {"gate": "3"})
+    with pytest.raises(simnav.RequestError, match="--set gate: it should be name=value"):
+        requested(requests.CampaignRequest, values | {"parameters": ["gate"]})
 
 
 # -- what may be given, and what comes back ------------------------------------------------------------------

@@ -111,7 +111,7 @@ def test_bad_estimators_are_recorded_and_everyone_else_stands(tmp_path: Path) ->
     requests = [estimator(tmp_path, name, mischief) for name, mischief in BAD.items()]
     requests.insert(3, estimator(tmp_path))
     out = tmp_path / "results"
-    summary = run_campaign([scenario()], requests, [7], out, workers=2, timeout=3.0, memory=200 << 20)
+    summary = run_campaign([scenario()], requests, [7], out, workers=2, time_limit=3.0, memory_limit=200)
     found = {r.estimator: r for r in store.load(out)}
     assert {name: found[name].status for name in BAD} == STATUS
     assert all(found[name].reason for name in BAD)
@@ -369,7 +369,7 @@ def test_a_stored_timeout_is_run_again_under_a_longer_limit(tmp_path: Path) -> N
     request, other = estimator(tmp_path, mischief=SLOW.format(path=str(sleep))), estimator(tmp_path, "other")
 
     def run(timeout: float, *, retry: bool = False) -> tuple[int, str, float]:
-        summary = run_campaign([scenario()], [request, other], [0], out, workers=1, timeout=timeout, retry=retry)
+        summary = run_campaign([scenario()], [request, other], [0], out, workers=1, time_limit=timeout, retry=retry)
         found = {r.estimator: r for r in store.load(out)}
         assert found["other"].status == "ok"
         return summary.computed, found["last-fix"].status, found["last-fix"].time_limit
@@ -442,7 +442,7 @@ def test_out_of_memory_is_run_again_under_a_larger_limit(tmp_path: Path) -> None
     request, out = estimator(tmp_path, mischief="self.eaten = bytearray(100 << 20)"), tmp_path / "out"
 
     def run(mebibytes: int) -> tuple[int, str, int]:
-        summary = run_campaign([scenario()], [request], [0], out, workers=1, memory=mebibytes << 20)
+        summary = run_campaign([scenario()], [request], [0], out, workers=1, memory_limit=mebibytes)
         (found,) = store.load(out)
         return summary.computed, found.status, found.memory_limit >> 20
 
@@ -530,8 +530,8 @@ def test_requests_that_make_no_sense(tmp_path: Path) -> None:
         ({"scenarios": [s, s]}, "'tiny-ship-v1' was asked for twice"),
         ({"seeds": [-1]}, "seed -1"),
         ({"workers": 0}, "workers = 0"),
-        ({"timeout": 0.0}, "timeout = 0 s"),
-        ({"memory": 1000}, "memory = 1000 bytes is too little"),
+        ({"time_limit": 0.0}, "time_limit = 0 s"),
+        ({"memory_limit": 0.001}, "memory_limit = 0.001: a finite number from 16 up"),
         ({"backend": "slurm"}, "backend = 'slurm' is unknown"),
     ]
     for change, message in cases:

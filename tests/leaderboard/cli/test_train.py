@@ -12,7 +12,7 @@ from simnav.estimator import make
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.training import anfis_training
 from simnav.leaderboard import cli
-from simnav.leaderboard.cli.train import _Features
+from simnav.leaderboard.cli.commands import Features
 from simnav.leaderboard.figures.training import LABELS
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -70,5 +70,5 @@ def test_mistakes(tmp_path: Path, monkeypatch, arguments: list[str], message: st
 
 
 def test_the_command_knows_all_features_and_inputs():
-    assert [f.value for f in _Features] == list(FEATURES)
+    assert [f.value for f in Features] == list(FEATURES)
     assert {name for names in FEATURES.values() for name in names} == set(LABELS)

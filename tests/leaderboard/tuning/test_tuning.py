@@ -196,9 +196,9 @@ def test_a_row_without_a_file_asks_what_to_vary():
 
 
 def test_a_tuning_is_stored_with_what_it_was_chosen_on(tmp_path: Path, monkeypatch):
-    from simnav.leaderboard import interface
+    from simnav.leaderboard import running
 
-    monkeypatch.setattr(interface, "scenarios_of", lambda families: [short()])
+    monkeypatch.setattr(running, "scenarios_of", lambda families: [short()])
     found = simnav.tune("huber-kf", "training-voyages", "k=0.5:4", runs=2, unseen=2, evaluations=4, seed=7)
     document = read(found.write(tmp_path / "huber-kf.json"))
     assert document == json.loads(json.dumps(found.to_dict()))

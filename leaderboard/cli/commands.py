@@ -1,0 +1,247 @@
+"""All commands with their requests, and the options that only the command line has: files that a command writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import KW_ONLY
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.calls import option, request
+from simnav.leaderboard.requests import (
+    AuditRequest,
+    BenchRequest,
+    BoundRequest,
+    BundleOptions,
+    CampaignRequest,
+    CheckStandardRequest,
+    CiteRequest,
+    EvaluateRequest,
+    MergeRequest,
+    Parameters,
+    PublishRequest,
+    RecordRequest,
+    ReproduceRequest,
+    RescoreRequest,
+    RunRequest,
+    Scenarios,
+    SealRequest,
+    SiteRequest,
+    StandardRequest,
+    SubmitRequest,
+    SweepRequest,
+    TuneRequest,
+    VerifyRequest,
+)
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.request import Estimators
+
+__all__ = ["COMMANDS", "GROUPS", "Features", "Topic"]
+
+_FIGURE = "Write a figure: .png, .svg or .pdf."
+
+
+class Topic(StrEnum):
+    """What is listed."""
+
+    SCENARIOS = "scenarios"
+    ESTIMATORS = "estimators"
+    INSTRUMENTS = "instruments"
+    FAULTS = "faults"
+
+
+class Features(StrEnum):
+    """As `simnav.estimators.adaptations.anfis_file.FEATURES`, which the command does not import before it runs."""
+
+    INNOVATION = "innovation"
+    MOTION = "motion"
+    RECENT = "recent"
+
+
+@request
+class ListCommand:
+    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+
+    topic: Topic | None = option(
+        default=None,
+        cli=Topic | None,
+        help="What to list; without it, scenarios and estimators.",
+        argument=True,
+    )
+
+
+@request
+class RunCommand(RunRequest):
+    """Run estimators once over one scenario and score them."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    stanford: Path | None = option(
+        default=None, help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf."
+    )
+    alert_limit: float = option(
+        default=25.0,
+        least=0.01,
+        help="Alert limit of the Stanford diagrams in metres; IMO A.915(22): 25, in ports 2.5.",
+    )
+
+
+@request
+class SimulateCommand(RecordRequest):
+    """Write the recording of one run: measurements, labels and truth."""
+
+    _: KW_ONLY
+    output: Path = option("--output", "-o", help="Recording to write: .npz, or the ending of a plug-in's format.")
+    csv: Path | None = option(default=None, help="Folder for the recording as CSV files, one for each instrument.")
+
+
+@request
+class CheckCommand:
+    """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
+
+    estimator: str = option(help="my_filter.py, my_filter.py:MyFilter or a name.", argument=True, metavar="FILE")
+    parameters: Parameters = option(
+        "--set", default=None, metavar="NAME=VALUE", help="Value of a parameter of the estimators."
+    )
+
+
+@request
+class BenchCommand(BenchRequest):
+    """Measure time and memory of an epoch, and processor time as a multiple of that of the plain row."""
+
+    estimators: Estimators = option(
+        default=None, argument=True, metavar="FILE_OR_NAME...", help="my_filter.py, or a name; one or several."
+    )
+    _: KW_ONLY
+    every: bool = option("--all", default=False, help="Multiples of all rows that come with simnav, and nothing else.")
+    output: Path | None = option(
+        "--output", "-o", default=None, help="File for the multiples, as boards read it; with --all."
+    )
+
+
+@request
+class NewEstimatorCommand:
+    """Write a small working estimator as a starting point."""
+
+    name: str = option(help="Name of the estimator, such as my-filter.", argument=True, metavar="NAME")
+    output: Path | None = option("--output", "-o", default=None, help="File to write. Default: my_filter.py.")
+
+
+@request
+class SweepCommand(SweepRequest):
+    """Vary a quantity of a scenario (a dial): the error of estimators against it, and their breaking points."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
+class WarmupCommand:
+    """Compile every kernel, once; later starts are quick."""
+
+
+@request
+class BoundCommand(BoundRequest):
+    """Show the posterior Cramer-Rao bound of a scenario by epoch: without faults, faults known, faults unknown."""
+
+    _: KW_ONLY
+    csv: Path | None = option("--csv", default=None, help="Write every epoch to this file.")
+
+
+@request
+class ReferenceCommand:
+    """Run the oracles over many seeds, and store the figures that errors are divided by."""
+
+    scenarios: Scenarios = option(
+        "--scenario", "-s", default=None, help="Names, tracks or TOML files, separated by commas. Default: all."
+    )
+    runs: int = option("--runs", "-n", default=200, least=2, help="Seeds of each scenario.")
+    output: Path | None = option(
+        "--output", "-o", default=None, help="File of the figures. Default: the one that comes with simnav."
+    )
+    results: Path = option(
+        default="results/reference", help="Keep the runs in this folder; started again, it continues there."
+    )
+    workers: int = option(default=2, least=1, help="Number of processes.")
+
+
+@request
+class VerifyCommand(VerifyRequest, BundleOptions):
+    """Check results or a submission, and repeat some of the runs, bit for bit."""
+
+
+@request
+class CiteCommand(CiteRequest):
+    """Print how to cite this version of simnav, or the results of a campaign."""
+
+    text: bool = option("--text", default=False, help="Print one line of text instead of BibTeX.")
+
+
+@request
+class TuneCommand(TuneRequest):
+    """Choose parameters of an estimator on training families, never on ranked scenarios."""
+
+    _: KW_ONLY
+    parameters: Parameters = option(
+        "--set", default=None, metavar="NAME=VALUE", help="Value of a parameter that is not varied."
+    )
+    output: Path | None = option("--output", "-o", default=None, help="Write the chosen values to this file.")
+    plot: Path | None = option(default=None, help="Write a figure of the search: .png, .svg or .pdf.")
+
+
+@request
+class TrainAnfisCommand:
+    """Train the network of anfis-fgo (a reconstruction of Jiang et al. 2026), and draw the result."""
+
+    features: Features = option(
+        default=Features.INNOVATION, cli=Features, help="Inputs of the network; see docs/explanation/anfis.md."
+    )
+    seeds: int = option(
+        "--seeds", "-n", default=3, least=1, help="Seeds of the training voyages; none of them is ever scored."
+    )
+    passes: int = option(default=200, least=1, help="Most passes over the data.")
+    output: Path | None = option(
+        "--output", "--out", "-o", default=None, help="Parameter file. Default: anfis_FEATURES.json."
+    )
+
+
+#: Name of a command -> its request, and the module of this package that runs it.
+COMMANDS: Mapping[str, tuple[type[Any], str]] = {
+    "list": (ListCommand, "list_"),
+    "run": (RunCommand, "run"),
+    "simulate": (SimulateCommand, "simulate"),
+    "check": (CheckCommand, "check"),
+    "bench": (BenchCommand, "bench"),
+    "new-estimator": (NewEstimatorCommand, "new_estimator"),
+    "evaluate": (EvaluateRequest, "evaluate"),
+    "campaign": (CampaignRequest, "campaign"),
+    "sweep": (SweepCommand, "sweep"),
+    "leaderboard": (SiteRequest, "leaderboard"),
+    "warmup": (WarmupCommand, "warmup"),
+    "bound": (BoundCommand, "bound"),
+    "reproduce": (ReproduceRequest, "reproduce"),
+    "reference": (ReferenceCommand, "reference"),
+    "rescore": (RescoreRequest, "rescore"),
+    "seal": (SealRequest, "seal"),
+    "verify": (VerifyCommand, "verify"),
+    "cite": (CiteCommand, "cite"),
+    "merge": (MergeRequest, "merge"),
+    "submit": (SubmitRequest, "submit"),
+    "tune": (TuneCommand, "tune"),
+}
+
+#: Name of a group -> its help, and its commands.
+GROUPS: Mapping[str, tuple[str, Mapping[str, tuple[type[Any], str]]]] = {
+    "standard": (
+        "Run, check and publish the result that comes with simnav.",
+        {
+            "run": (StandardRequest, "standard_run"),
+            "check": (CheckStandardRequest, "standard_check"),
+            "audit": (AuditRequest, "standard_audit"),
+            "publish": (PublishRequest, "standard_publish"),
+        },
+    ),
+    "train": ("Train the parameters of an estimator.", {"anfis": (TrainAnfisCommand, "train")}),
+}

@@ -1,0 +1,24 @@
+"""``simnav standard run``: the missing and outdated parts of the result that comes with simnav."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from simnav.leaderboard.cli.console import Output
+from simnav.leaderboard.cli.options import campaign_progress
+from simnav.leaderboard.publishing import run_standard
+from simnav.leaderboard.requests import StandardRequest
+
+__all__ = ["show"]
+
+
+def show(out: Output, request: StandardRequest) -> None:
+    """Run the missing and outdated parts of the standard result."""
+    with out.progress("starting") as bar:
+        report = run_standard.of(replace(request, progress=campaign_progress(bar)))
+    s = report.summary
+    out.document({"results": str(s.folder), "computed": s.computed, "skipped": s.skipped, "left": s.left})
+    out.print(
+        f"results: {s.folder} ({s.computed} computed, {s.skipped} were there, {s.left} are left)",
+        "next:    simnav standard run" if s.left else "next:    simnav standard publish",
+    )

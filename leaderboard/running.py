@@ -1,0 +1,311 @@
+"""Calls that run estimators: once, on many seeds, against a dial, and for a search of parameters."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from simnav.leaderboard.calls import call, whole_number
+from simnav.leaderboard.campaign.options import RunOptions, shared
+from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
+from simnav.leaderboard.campaign.request import request as one_request
+from simnav.leaderboard.given import absolute, results_of, scenario_of, scenarios_of, seeds_of
+from simnav.leaderboard.requests import (
+    CampaignRequest,
+    EvaluateRequest,
+    RecordRequest,
+    RunRequest,
+    Scenarios,
+    SweepRequest,
+    TuneRequest,
+)
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
+from simnav.leaderboard.results.scratch import scratch
+
+if TYPE_CHECKING:
+    from simnav.estimator import Estimator
+    from simnav.leaderboard.campaign.campaign import Summary
+    from simnav.leaderboard.campaign.single_run import RunReport
+    from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
+    from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.tuning.tuning import Tuning
+    from simnav.recording import Recording
+    from simnav.scenario import Scenario
+    from simnav.testing.contract_check import Report
+
+__all__ = ["campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"]
+
+
+def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
+    """Make an estimator.
+
+    Parameters
+    ----------
+    estimator : str, Path, type or pair
+        Name, file or class, also with parameters.
+    **parameters
+        Parameters of its constructor; texts are converted as on the command line.
+
+    Raises
+    ------
+    ValueError
+        If the estimator or a parameter is unknown, or a value is not valid: one sentence.
+
+    Examples
+    --------
+    >>> make("gnss-only").name
+    'gnss-only'
+    """
+    with mistakes():
+        return one_request(estimator, parameters).make()
+
+
+@call(RecordRequest)
+def record(request: RecordRequest) -> Recording:
+    """Record a run.
+
+    Raises
+    ------
+    ValueError
+        If there is no such scenario, or its log is absent or cannot be used.
+
+    Examples
+    --------
+    >>> len(record("harbour-multipath", seed=1).data.truth) > 100
+    True
+    """
+    from simnav.source import record
+
+    with mistakes(ValueError, FileNotFoundError):
+        return record(scenario_of(request.scenario), whole_number("seed", request.seed))
+
+
+def check(estimator: EstimatorLike, **parameters: Any) -> Report:
+    """Test an estimator against the contract: causality, shapes, units, determinism, missing instruments.
+
+    Parameters
+    ----------
+    estimator, **parameters
+        The estimator and its parameters, as for `make`.
+
+    Returns
+    -------
+    simnav.testing.contract_check.Report
+
+    Raises
+    ------
+    ValueError
+        If there is no such estimator, or it cannot be constructed.
+    """
+    from simnav.testing.contract_check import check
+
+    with mistakes(ValueError):
+        return check(one_request(estimator, parameters).make)
+
+
+@call(RunRequest)
+def run(request: RunRequest) -> RunReport:
+    """Run estimators once.
+
+    Returns
+    -------
+    RunReport
+        The recording, all trials and their scores.
+    """
+    from simnav.leaderboard.campaign.single_run import run_once
+
+    chosen, seed = scenario_of(request.scenario), whole_number("seed", request.seed)
+    return run_once(chosen, requests(request.estimators, request.parameters), seed, request.progress)
+
+
+@call(EvaluateRequest)
+def evaluate(request: EvaluateRequest) -> EvaluationReport:
+    """Compare estimators with the baselines.
+
+    Returns
+    -------
+    EvaluationReport
+        The place of each estimator, and its differences from the baselines.
+    """
+    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.reports import EvaluationReport
+    from simnav.leaderboard.ranking.runs import group
+    from simnav.leaderboard.ranking.standing import standing
+
+    if not request.estimators:
+        raise RequestError("no estimator was asked for; name those that should be evaluated")
+    mine = requests(request.estimators, request.parameters)
+    everyone = together([*mine, *requests(request.against)])
+    chosen, seeds = scenarios_of(request.scenarios), seeds_of(request.seed, request.runs)
+    with _folder(request.results) as folder:
+        _run(request, chosen, everyone, seeds, folder)
+        found = results_of(folder)
+    wanted, known = {s.id for s in chosen}, {r.label for r in everyone}
+    found = [r for r in found if r.scenario in wanted and r.estimator in known and r.seed in seeds]
+    by_scenario = group(found)
+    return EvaluationReport(
+        found,
+        rank(found, tracks={s.id: s.track for s in chosen}),
+        tuple(r.label for r in mine),
+        tuple(s.id for s in chosen),
+        seeds,
+        tuple(standing(by, r.label, s) for r in mine for s, by in by_scenario.items()),
+        None if request.results is None else folder,
+    )
+
+
+@call(CampaignRequest)
+def campaign(request: CampaignRequest) -> CampaignReport:
+    """Run a campaign.
+
+    Returns
+    -------
+    CampaignReport
+        A summary of all results in the folder.
+    """
+    from simnav.leaderboard.campaign.campaign import combined, require_known
+    from simnav.leaderboard.campaign.oracles import beside_oracles
+    from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.results import requested
+
+    parts = _parts(request)
+    folder, summaries, seal = absolute(request.output), [], read_seal(request.sealed)
+    tracks: dict[str, str] = {}
+    end = None if request.minutes is None else time.monotonic() + 60.0 * request.minutes
+    asked = [requests(estimators, request.parameters) for _, estimators, _ in parts]
+    request = replace(request, force=_names(request.force))
+    require_known(request.force, asked)
+    for (scenarios, _, runs), everyone in zip(parts, asked, strict=True):
+        chosen = scenarios_of(scenarios, optional=request.profile is not None)
+        tracks |= {s.id: s.track for s in chosen}
+        for some, beside in beside_oracles(chosen, everyone) if request.oracle else [(chosen, everyone)]:
+            left = None if end is None else max(0.0, (end - time.monotonic()) / 60.0)
+            seeds = seeds_of(request.seed, runs)
+            summaries.append(_run(request, some, beside, seeds, folder, seal=seal, minutes=left))
+    results = results_of(folder)
+    ranking = rank(results, tracks=tracks, requested=requested.read(folder))
+    return CampaignReport(results, ranking, combined(summaries))
+
+
+def _parts(request: CampaignRequest) -> list[tuple[Scenarios, Estimators, int]]:
+    """Scenarios, estimators and number of runs of each part of a profile; what was asked for replaces them."""
+    from simnav.leaderboard.campaign.campaign import RUNS
+    from simnav.leaderboard.profiles import load
+
+    scenarios, estimators, runs = request.scenarios, request.estimators, request.runs
+    if request.profile is None:
+        return [(scenarios, estimators, RUNS if runs is None else runs)]
+    return [
+        (
+            p.scenarios if scenarios is None else scenarios,
+            p.estimators if estimators is None else estimators,
+            p.runs if runs is None else runs,
+        )
+        for p in load(request.profile).parts
+    ]
+
+
+@call(SweepRequest)
+def sweep(request: SweepRequest) -> Sweep:
+    """Vary dials.
+
+    Returns
+    -------
+    Sweep
+        Errors at all values, and the breaking points.
+    """
+    from simnav.leaderboard.site.sweeps import write
+    from simnav.leaderboard.sweep.report import Sweep
+    from simnav.leaderboard.sweep.settings import checked_score, chosen_dials, parse_dials, settings
+
+    if not request.estimators:
+        raise RequestError("no estimator was asked for; name those whose error should be seen against the dial")
+    chosen, mine = scenario_of(request.scenario), requests(request.estimators, request.parameters)
+    checked_score(request.score, request.limit)
+    turned = chosen_dials(chosen, parse_dials(request.dials))
+    found, seeds = settings(chosen, turned), seeds_of(request.seed, request.runs)
+    folder = absolute(request.output or Path("results") / f"sweep-{chosen.name}")
+    summary = _run(request, [s.scenario for s in found], mine, seeds, folder)
+    ids, labels = {s.scenario.id for s in found}, tuple(r.label for r in mine)
+    results = [r for r in results_of(folder) if r.scenario in ids and r.estimator in labels and r.seed in seeds]
+    made = Sweep(chosen.id, tuple(d for d, _ in turned), tuple(tuple(v) for _, v in turned), labels, request.score,
+                 request.limit, results, tuple(found), summary)  # fmt: skip
+    write(made)
+    return made
+
+
+@call(TuneRequest)
+def tune(request: TuneRequest) -> Tuning:
+    """Choose parameters.
+
+    Returns
+    -------
+    Tuning
+        The chosen values, and the objective before and after, on the voyages of the search and on unseen ones.
+
+    Raises
+    ------
+    RequestError
+        If a scenario is not for training, or a parameter cannot be varied.
+    """
+    from simnav.leaderboard.tuning.space import what_to_vary
+    from simnav.leaderboard.tuning.tuning import TUNED, ranges_of, read, tune_row
+
+    estimator, vary = one_request(request.estimator), request.vary
+    with mistakes():
+        estimator.make()
+    chosen = scenarios_of(request.families)
+    if vary is None:
+        path = TUNED / f"{estimator.name}.json"
+        if not path.is_file():
+            raise RequestError(what_to_vary(estimator))
+        vary = ranges_of(read(path))
+    ranges = [text for text in vary.split(",") if text.strip()] if isinstance(vary, str) else list(vary)
+    return tune_row(
+        estimator, chosen, ranges, runs=whole_number("runs", request.runs, 2),
+        unseen=whole_number("unseen", request.unseen, 2), seed=whole_number("seed", request.seed),
+        evaluations=whole_number("evaluations", request.evaluations, 2), method=request.method,
+        search_seed=whole_number("search_seed", request.search_seed), progress=request.progress,
+    )  # fmt: skip
+
+
+@contextlib.contextmanager
+def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
+    """The folder that was named, or one that is deleted afterwards."""
+    if keep is not None:
+        yield absolute(keep)
+        return
+    with scratch("evaluate") as home:
+        yield home / "results"
+
+
+def _names(given: Sequence[str] | str) -> tuple[str, ...]:
+    """Names, one by one; a text may hold several, separated by commas.
+
+    >>> _names(["ekf, ukf", "sw-fgo"])
+    ('ekf', 'ukf', 'sw-fgo')
+    """
+    texts = [given] if isinstance(given, str) else given
+    return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())
+
+
+def _run(
+    request: RunOptions, scenarios: Sequence[Scenario], estimators: Sequence[EstimatorRequest], seeds: range,
+    folder: Path, **more: Any,
+) -> Summary:  # fmt: skip
+    """Run a campaign with those options of a request that campaigns have."""
+    from simnav.leaderboard.campaign.campaign import Campaign, run_campaign
+    from simnav.leaderboard.results.store import create
+
+    with mistakes(StoreError):
+        create(folder)
+    options = shared(request, Campaign)
+    given = {"scenarios": scenarios, "estimators": estimators, "seeds": seeds, "folder": folder}
+    return run_campaign(**(options | given | more))
