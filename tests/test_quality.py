@@ -51,14 +51,31 @@ def test_a_kernel_has_few_arguments():
     assert not {name: n for name, n in many.items() if n > 9}
 
 
+def cycles(edges):
+    """Groups of names of which each reaches every other one."""
+    index = {name: i for i, name in enumerate(sorted({n for edge in edges for n in edge}))}
+    rows, columns = zip(*((index[a], index[b]) for a, b in edges), strict=True)
+    matrix = coo_array(([1] * len(rows), (rows, columns)), shape=(len(index), len(index)))
+    count, label = connected_components(matrix, directed=True, connection="strong")
+    return [[n for n, i in index.items() if label[i] == k] for k in range(count) if (label == k).sum() > 1]
+
+
+def test_cycles_are_found():
+    assert cycles([("a", "b"), ("b", "c"), ("c", "a"), ("c", "d")]) == [["a", "b", "c"]]
+
+
+#: A mend is under way; the check shows here what is left.
+KNOWN_CYCLES = [["simnav.sensors.block_values", "simnav.sensors.instrument"]]
+
+
 def test_no_import_cycle_between_files():
+    """Imports inside functions and those for type checkers count, too."""
     import grimp
 
-    graph = grimp.build_graph("simnav", cache_dir=None, exclude_type_checking_imports=True)
-    index = {name: i for i, name in enumerate(sorted(graph.modules))}
-    edges = [(index[a], index[b]) for a in index for b in graph.find_modules_directly_imported_by(a)]
-    rows, columns = zip(*edges, strict=True)
-    matrix = coo_array(([1] * len(edges), (rows, columns)), shape=(len(index), len(index)))
-    count, label = connected_components(matrix, directed=True, connection="strong")
-    cycles = [[n for n, i in index.items() if label[i] == k] for k in range(count) if (label == k).sum() > 1]
-    assert not cycles
+    graph = grimp.build_graph("simnav", cache_dir=None, exclude_type_checking_imports=False)
+    inside = "simnav.leaderboard.running", "simnav.leaderboard.campaign.campaign"  # an import in a function
+    assert inside[1] in graph.find_modules_directly_imported_by(inside[0])
+    for_types = "simnav.leaderboard.papers.figures", "simnav.leaderboard.papers.findings"  # under TYPE_CHECKING
+    assert for_types[1] in graph.find_modules_directly_imported_by(for_types[0])
+    found = cycles([(a, b) for a in graph.modules for b in graph.find_modules_directly_imported_by(a)])
+    assert [c for c in found if c not in KNOWN_CYCLES] == []

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.campaign.isolation import isolate
+from simnav.leaderboard.campaign.confinement.isolation import isolate
 from simnav.leaderboard.results.errors import sentence
 
 if TYPE_CHECKING:

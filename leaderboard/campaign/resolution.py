@@ -14,10 +14,10 @@ from typing import Any
 from simnav.estimator import EstimatorError, find
 from simnav.estimator.registry import is_own_reference, point_of
 from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
+from simnav.leaderboard.campaign.confinement.isolation import isolate
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, own_code, variant, with_library
-from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
 from simnav.leaderboard.campaign.session_class import carry, is_session
 from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, record_of

@@ -18,13 +18,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-import simnav
 from simnav.plugins import code_text
 
 __all__ = ["LIBRARY", "code_of", "digest", "files_digest", "folder_code", "followed", "is_installed"]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
-LIBRARY = Path(simnav.__file__).parent
+LIBRARY = Path(sys.modules["simnav"].__file__ or "").parent
 
 
 def digest(*parts: str) -> str:

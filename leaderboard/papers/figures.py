@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     import matplotlib.figure
 
-    from simnav.leaderboard.papers.reproduction import Reproduction
+    from simnav.leaderboard.papers.findings import Findings
     from simnav.recording import Recording
     from simnav.trial import Trial
 
@@ -89,7 +89,7 @@ class Drawn:
 
 
 def write_figures(
-    found: Reproduction,
+    found: Findings,
     folder: Path,
     progress: Callable[[int, int, str], None] | None = None,
     *,
@@ -99,7 +99,7 @@ def write_figures(
 
     Parameters
     ----------
-    found : Reproduction
+    found : Findings
         The comparison.
     folder : Path
         An existing folder.
@@ -125,7 +125,7 @@ def write_figures(
     return drawn
 
 
-def draw(found: Reproduction, entry: Figure) -> matplotlib.figure.Figure | None:
+def draw(found: Findings, entry: Figure) -> matplotlib.figure.Figure | None:
     """Draw one of the paper's figures; None if nothing can be drawn."""
     return _Sketch(found).draw(entry)[0]
 
@@ -133,7 +133,7 @@ def draw(found: Reproduction, entry: Figure) -> matplotlib.figure.Figure | None:
 class _Sketch:
     """What the figures of a paper share: style, recordings and trials of the first seed."""
 
-    def __init__(self, found: Reproduction):
+    def __init__(self, found: Findings):
         self.found, self.paper = found, found.paper
         self.style = Style([m.name for m in found.paper.methods], ["truth"])
         self.recordings: dict[str, Recording] = {}

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.papers.comparison import Verdict, as_gain, judge, judge_gain
+from simnav.leaderboard.papers.figures import draw
+from simnav.leaderboard.papers.findings import Finding, Findings
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row, kind_of
-from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
+from simnav.leaderboard.ranking.statistics import mean, mean_ratio
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
 
@@ -27,61 +29,9 @@ __all__ = ["Finding", "Reproduction", "fill", "find", "find_method", "load_resul
 _UNEXPLAINED = "the reason is not known"
 
 
-@dataclass(frozen=True)
-class Finding:
-    """A row of a paper with our figures.
-
-    Attributes
-    ----------
-    table : str
-        Title of its table.
-    row : Value or Gain
-        The paper's row.
-    ours : Interval or None
-        Our figure in the unit of the measure; for a `Gain` the ratio. None if there is no figure.
-    verdict : str
-        ``agrees``, ``differs`` or ``undecided``; ``ours`` if the paper has no comparable figure; ``absent`` if a method
-        is not registered; ``failed`` or ``unsuitable`` if it has no successful run.
-    why : str
-        Reason in one sentence; empty if the row agrees.
-    estimators : tuple of str
-        Labels of the estimators that stand for the row's methods.
-    failed : int
-        Number of runs that failed.
-    """
-
-    table: str
-    row: Row
-    ours: Interval | None
-    verdict: str
-    why: str = ""
-    estimators: tuple[str, ...] = ()
-    failed: int = 0
-
-
 @dataclass(frozen=True, eq=False)
-class Reproduction:
-    """A paper's comparison, repeated with our estimators and scenarios.
-
-    Attributes
-    ----------
-    paper : Paper
-        The paper.
-    seeds : sequence of int
-        Seeds of the runs. Rows may have fewer runs (`Finding.ours`).
-    findings : list of Finding
-        All rows of all tables, in order.
-    stands_for : dict of str to EstimatorRequest or None
-        Method of the paper -> the estimator that stands for it.
-    results : list of Result
-        Results of all runs.
-    """
-
-    paper: Paper
-    seeds: Sequence[int]
-    findings: list[Finding]
-    stands_for: dict[str, EstimatorRequest | None]
-    results: list[Result]
+class Reproduction(Findings):
+    """A paper's comparison, repeated with our estimators and scenarios; the attributes are those of `Findings`."""
 
     def count(self, verdict: str, kind: str = "") -> int:
         """Number of rows with a verdict; of one kind (`simnav.leaderboard.papers.paper.kind_of`), or of all."""
@@ -120,8 +70,6 @@ class Reproduction:
         RequestError
             If it cannot be drawn; one sentence.
         """
-        from simnav.leaderboard.papers.figures import draw
-
         for entry in self.paper.figures:
             if number in ("", entry.number) and (fig := draw(self, entry)) is not None:
                 return fig

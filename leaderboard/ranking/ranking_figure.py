@@ -11,17 +11,17 @@ from simnav.leaderboard.figures.style import Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from simnav.leaderboard.ranking.board import TrackRanking, TrackRow
+    from simnav.leaderboard.ranking.rows import TrackRow, TrackTable
 
 __all__ = ["ranking_figure"]
 
 
-def ranking_figure(track: TrackRanking, most: int | None = None) -> Figure:
+def ranking_figure(track: TrackTable, most: int | None = None) -> Figure:
     """Score of every estimator of a track with its interval; what is not ranked is grey, and references are hollow.
 
     Parameters
     ----------
-    track : TrackRanking
+    track : TrackTable
         The ranking that is drawn.
     most : int, optional
         Ranked rows that are drawn, the best first; what is not ranked is left out then, but for references.

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.ranking import tables
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Row, TrackRanking
+    from simnav.leaderboard.ranking.rows import Row, TrackTable
 
 __all__ = ["best_rows", "gain_text", "less", "sentence", "spread"]
 
 _NAMED = 4  # rows that a sentence names
 
 
-def best_rows(track: TrackRanking) -> list[Row]:
+def best_rows(track: TrackTable) -> list[Row]:
     """The rows that may be the best, in order of score; none where the rows cannot be ordered."""
     return [r for r in track.rows if r.ranked and r.may_be_best]
 
@@ -78,7 +78,7 @@ def _less(ratios: Iterable[float]) -> str:
     return f"{spread([low, high])} % less" if high > 0.5 or low > -0.5 else f"{spread([-high, -low])} % more"
 
 
-def sentence(track: TrackRanking) -> str:
+def sentence(track: TrackTable) -> str:
     """One sentence that can be quoted, made from the results.
 
     Returns

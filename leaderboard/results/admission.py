@@ -7,18 +7,17 @@ are those of a run is another question, which `simnav verify` answers by repeati
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["LONGEST_LABEL", "STATUSES", "admitted", "fault_of", "is_scenario_id", "label_fault", "look", "lookalikes",
-           "table_of"]  # fmt: skip
+__all__ = ["LONGEST_LABEL", "STATUSES", "admitted", "fault_of", "is_scenario_id", "label_fault", "look",
+           "lookalikes"]  # fmt: skip
 
 #: Characters of the label of an estimator.
 LONGEST_LABEL = 200
@@ -146,21 +145,6 @@ def _is_own(name: str) -> bool:
     from simnav.estimator.registry import is_own
 
     return is_own(name)
-
-
-def table_of(text: Any) -> Any:
-    """Parameters or draws from their JSON; None where it is none, or no table of plain values by name."""
-    try:
-        found = json.loads(text)
-    except (ValueError, TypeError, RecursionError):
-        return None
-    return found if isinstance(found, dict) and all(map(_is_plain, found.values())) else None
-
-
-def _is_plain(value: object) -> bool:
-    if isinstance(value, list):
-        return len(value) <= 1000 and all(map(_is_plain, value)) and json.dumps(value).count("[") < 1000
-    return value is None or isinstance(value, (bool, int, float, str, dict))
 
 
 def fault_of(result: Result) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["plain"]
+__all__ = ["plain", "table_of"]
 
 
 def plain(value: Any) -> Any:
@@ -29,3 +30,18 @@ def plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
         return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     return str(value)
+
+
+def table_of(text: Any) -> Any:
+    """Parameters or draws from their JSON; None where it is none, or no table of plain values by name."""
+    try:
+        found = json.loads(text)
+    except (ValueError, TypeError, RecursionError):
+        return None
+    return found if isinstance(found, dict) and all(map(_is_plain, found.values())) else None
+
+
+def _is_plain(value: object) -> bool:
+    if isinstance(value, list):
+        return len(value) <= 1000 and all(map(_is_plain, value)) and json.dumps(value).count("[") < 1000
+    return value is None or isinstance(value, (bool, int, float, str, dict))

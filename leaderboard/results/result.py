@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.results.admission import table_of
 from simnav.leaderboard.results.ahead import made_ahead
 from simnav.leaderboard.results.errors import printable
+from simnav.leaderboard.results.plain import table_of
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.stored_scores import StoredScores
 from simnav.scoring.consistency import ending

@@ -15,6 +15,7 @@ import numpy as np
 from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.leaderboard.campaign.confinement.cores import own_core
 from simnav.leaderboard.campaign.confinement.estimator_process import seed_generators
+from simnav.leaderboard.campaign.confinement.isolation import isolate
 from simnav.leaderboard.campaign.confinement.limits import interrupted
 from simnav.leaderboard.campaign.confinement.session import (
     LOST,
@@ -24,7 +25,6 @@ from simnav.leaderboard.campaign.confinement.session import (
     ServerError,
     StoppedError,
 )
-from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.results.errors import named
 from simnav.trial import FailureError, Trial, run_session, run_trial
 from simnav.trial.log import TrialLog

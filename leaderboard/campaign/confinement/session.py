@@ -74,7 +74,7 @@ class StoppedError(LostError):
     Parameters
     ----------
     status : str
-        As of `simnav.leaderboard.campaign.isolation.Outcome`.
+        As of `simnav.leaderboard.campaign.confinement.isolation.Outcome`.
     reason : str
         Description of the event, for the user.
     """

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.leaderboard.campaign.isolation import Outcome, isolate
+from simnav.leaderboard.campaign.confinement.isolation import Outcome, isolate
 
 MIB = 1 << 20
 posix = pytest.mark.skipif(os.name != "posix", reason="forks")
@@ -223,7 +223,8 @@ def test_children_of_the_call_die_with_it(tmp_path: Path) -> None:
 def test_the_call_dies_with_its_worker(tmp_path: Path) -> None:
     note = tmp_path / "pid"
     code = (
-        "import os, time; from pathlib import Path; from simnav.leaderboard.campaign.isolation import isolate\n"
+        "import os, time; from pathlib import Path\n"
+        "from simnav.leaderboard.campaign.confinement.isolation import isolate\n"
         f"note = Path({str(note)!r})\n"
         "isolate(lambda: (note.write_text(str(os.getpid())), time.sleep(60)), timeout=60, memory=1 << 30)\n"
     )

@@ -1,0 +1,73 @@
+"""What the repeated comparison of a paper consists of: its rows with our figures, and the runs behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.papers.paper import Paper, Row
+from simnav.leaderboard.ranking.statistics import Interval
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.campaign.request import EstimatorRequest
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["Finding", "Findings"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A row of a paper with our figures.
+
+    Attributes
+    ----------
+    table : str
+        Title of its table.
+    row : Value or Gain
+        The paper's row.
+    ours : Interval or None
+        Our figure in the unit of the measure; for a `Gain` the ratio. None if there is no figure.
+    verdict : str
+        ``agrees``, ``differs`` or ``undecided``; ``ours`` if the paper has no comparable figure; ``absent`` if a method
+        is not registered; ``failed`` or ``unsuitable`` if it has no successful run.
+    why : str
+        Reason in one sentence; empty if the row agrees.
+    estimators : tuple of str
+        Labels of the estimators that stand for the row's methods.
+    failed : int
+        Number of runs that failed.
+    """
+
+    table: str
+    row: Row
+    ours: Interval | None
+    verdict: str
+    why: str = ""
+    estimators: tuple[str, ...] = ()
+    failed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What a repeated comparison found: runs and rows.
+
+    Attributes
+    ----------
+    paper : Paper
+        The paper.
+    seeds : sequence of int
+        Seeds of the runs. Rows may have fewer runs (`Finding.ours`).
+    findings : list of Finding
+        All rows of all tables, in order.
+    stands_for : dict of str to EstimatorRequest or None
+        Method of the paper -> the estimator that stands for it.
+    results : list of Result
+        Results of all runs.
+    """
+
+    paper: Paper
+    seeds: Sequence[int]
+    findings: list[Finding]
+    stands_for: dict[str, EstimatorRequest | None]
+    results: list[Result]
