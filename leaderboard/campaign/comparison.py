@@ -17,6 +17,7 @@ import numpy as np
 
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
 from simnav.leaderboard.results.provenance import is_commit
+from simnav.scoring import SCORES
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.provenance import Provenance
@@ -54,8 +55,6 @@ def compared(stored: Result, again: Result, close: float = CLOSE) -> Comparison:
     What was stored in single precision (`simnav.leaderboard.results.packing`) is compared with the rounded score. A
     score that came to simnav after the results, or by a plug-in, need not be in them.
     """
-    from simnav.scoring import SCORES
-
     found = Comparison([], [], [])
     homes = same_code(stored.scoring, scoring_code())
     for name in dict.fromkeys((*stored.scores, *again.scores)):
@@ -85,8 +84,6 @@ def differing(stored: Result, again: Result) -> tuple[list[str], list[str]]:
     undecided : list of str
         What another machine or another version may explain; the run is not confirmed.
     """
-    from simnav.scoring import SCORES
-
     different, undecided = list[str](), list[str]()
     for name in ("scenario_digest", "estimator_digest", "simnav", "parameters", "reference"):
         _unequal(different, name, getattr(stored, name), getattr(again, name))

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from simnav.estimator import find, make
+from simnav.estimator.registry import discover_point
 from simnav.leaderboard.campaign.request import enlist
 from simnav.leaderboard.campaign.session_class import receive
 
@@ -53,9 +55,6 @@ class Entrant:
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""
-        from simnav.estimator import find
-        from simnav.estimator.registry import discover_point
-
         discover_point(self.point)
         if self.code:
             enlist(receive(self.code))
@@ -63,7 +62,5 @@ class Entrant:
 
     def make(self) -> Estimator:
         """An instance, likewise."""
-        from simnav.estimator import make
-
         self.find()
         return make(self.name, **self.parameters)

@@ -19,13 +19,16 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
+from simnav.estimator.parameters import parameters_of
 from simnav.leaderboard.campaign import sources
 from simnav.leaderboard.campaign.session_class import is_session, source_of
 from simnav.leaderboard.campaign.sources import digest, files_digest, folder_code, followed, is_installed
+from simnav.log import channel
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -82,8 +85,6 @@ def _installed_code(package: str) -> str:
 
 def simulator_version() -> str:
     """Version of simnav with a digest of the code that makes recordings; what reads log files is not in it."""
-    from importlib.metadata import version
-
     return f"{version('simnav')}+{folder_code(sources.LIBRARY, (*_NEVER, *_ESTIMATION, _LOGS))[:12]}"
 
 
@@ -122,8 +123,6 @@ def _plugin_digests(scenario: Scenario) -> list[str]:
 def _log_digest(scenario: Scenario) -> str:
     if scenario.log is None:
         return ""
-    from simnav.log import channel
-
     files = []
     try:
         for recording in channel.list_recordings(scenario.log):
@@ -161,8 +160,6 @@ def own_code(cls: type[Estimator]) -> str:
     what it uses of the session, and the files of the user's own that it uses. The content of a file that a default of
     its parameters names counts, too.
     """
-    from simnav.estimator.parameters import parameters_of
-
     parts = list[str]()
     for module in dict.fromkeys(_homes(cls)):
         package = module.partition(".")[0]

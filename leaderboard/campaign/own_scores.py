@@ -10,6 +10,7 @@ from simnav.leaderboard.campaign import sources
 from simnav.leaderboard.campaign.session_class import carry, is_session, receive
 from simnav.leaderboard.campaign.sources import folder_code
 from simnav.plugins import is_file_module, load_plugin, place_of
+from simnav.scoring import SCORES, registry
 
 __all__ = ["OwnScores", "changed_code", "own_scores", "same_code", "scoring_code", "scoring_differs"]
 
@@ -31,8 +32,6 @@ class OwnScores:
 
     def register(self) -> None:
         """Make them known in this process."""
-        from simnav.scoring import SCORES, registry
-
         for file in self.files:
             load_plugin(file)
         for packed in self.code:
@@ -49,8 +48,6 @@ def own_scores() -> OwnScores:
     RequestError
         If a score of the session uses something that cannot be sent.
     """
-    from simnav.scoring import SCORES
-
     files, code = [], []
     for score in SCORES.values():
         if score.__module__.startswith("simnav."):
@@ -64,8 +61,6 @@ def own_scores() -> OwnScores:
 
 def scoring_code() -> str:
     """JSON: the modules of simnav that hold scores, each with the digest of the code of all of them."""
-    from simnav.scoring import SCORES
-
     code = folder_code(sources.LIBRARY / "scoring")
     homes = {score.__module__ for score in SCORES.values() if score.__module__.startswith("simnav.")}
     return json.dumps(dict.fromkeys(sorted(homes), code))

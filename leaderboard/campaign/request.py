@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from simnav.estimator import Estimator, find, make, names, register
+from simnav.estimator import Estimator, describe, find, make, names, register
 from simnav.leaderboard.results.admission import label_fault, lookalikes
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -233,8 +233,6 @@ def _items(given: Estimators) -> list[EstimatorLike]:
 
 def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Those of the parameters that an estimator has."""
-    from simnav.estimator import describe
-
     known = {p.name for p in describe(request(item).name).parameters}
     return {k: v for k, v in parameters.items() if k in known}
 

@@ -18,7 +18,9 @@ from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.versions import is_declared
+from simnav.scoring import SCORES, score
 from simnav.simulation.version import SIMULATOR_VERSION
+from simnav.spec import closest
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
@@ -92,9 +94,6 @@ def rescore_results(
     StoreError
         If the folder or a trial in it cannot be used.
     """
-    from simnav.scoring import SCORES, score
-    from simnav.spec import closest
-
     started = time.monotonic()
     path = Path(folder).resolve()
     asked = tuple(names)

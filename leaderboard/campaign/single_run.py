@@ -7,9 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from simnav.kinds import EQUATIONS, KINDS
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.figures.run_figure import run_figure
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
 from simnav.leaderboard.results.frame import frame
+from simnav.scoring import SCORES, protection_levels, score, stanford
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,16 +87,12 @@ class RunReport:
         Those only whose kind has an equation of its own, or none: whether an estimator can use the others, its
         documentation says. Empty where the estimator did not run.
         """
-        from simnav.kinds import EQUATIONS, KINDS
-
         shown = {name.partition(".")[2] for name in run.trial.diagnostics if name.startswith(_OF_INSTRUMENTS)}
         own = {s.name: s.kind for s in self.recording.data.aids.values() if KINDS[s.kind].equation not in EQUATIONS}
         return {name: kind for name, kind in own.items() if len(run.trial) and name not in shown}
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav run --json`` prints, but for the figure."""
-        from simnav.scoring import SCORES
-
         fields = ("estimator", "parameters", "reference", "status", "reason", "seconds", "scores")
         return {
             "scenario": self.recording.scenario,
@@ -106,8 +107,6 @@ class RunReport:
 
     def to_frame(self) -> Any:
         """A row an estimator, a column a score (SI units, radians); see `simnav.leaderboard.results.frame.frame`."""
-        from simnav.scoring import SCORES
-
         head = ("estimator", "reference", "status", "reason", "seconds")
         return frame([
             {**{name: getattr(e, name) for name in head}, **{s: e.scores.get(s, float("nan")) for s in SCORES}}
@@ -122,8 +121,6 @@ class RunReport:
         RequestError
             If no estimator gave anything.
         """
-        from simnav.leaderboard.figures.run_figure import run_figure
-
         trials = [(e.estimator, e.trial) for e in self.estimators]
         if not any(len(trial) for _, trial in trials):
             raise RequestError("there is nothing to draw: no estimator gave an estimate")
@@ -137,10 +134,6 @@ class RunReport:
         limit : float
             Alert limit [m]; 25 m is IMO A.915(22) outside of ports.
         """
-        import numpy as np
-
-        from simnav.scoring import protection_levels, stanford
-
         return {
             e.estimator: stanford([(e.trial, self.recording)], limit)
             for e in self.estimators
@@ -163,7 +156,6 @@ def run_once(
     progress: Callable[..., None] | None = None,
 ) -> RunReport:
     """Run estimators over one recording; see `simnav.leaderboard.interface.run`."""
-    from simnav.scoring import score
     from simnav.trial import run_trial
 
     with mistakes(ValueError):

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.estimator import EstimatorError
+from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
 from simnav.leaderboard.campaign.comparison import CLOSE, Comparison, claims, compared, differing, listed, too_quick
 from simnav.leaderboard.campaign.fingerprint import named_files
@@ -217,9 +219,6 @@ def request_of(result: Result) -> EstimatorRequest:
     RequestError
         If no estimator of that name is registered, or a parameter names a file of this machine.
     """
-    from simnav.estimator import EstimatorError
-    from simnav.estimator.registry import registered
-
     name = result.estimator.partition("(")[0]
     try:
         registered(name)

@@ -13,6 +13,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from simnav.estimator.registry import discover_own
 from simnav.leaderboard.campaign.confinement.attempt import Attempt, close_server, prepare, try_estimator
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
@@ -23,6 +26,7 @@ from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import named, printable
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
+from simnav.scoring import score, series
 from simnav.simulation.version import SIMULATOR_VERSION
 
 if TYPE_CHECKING:
@@ -142,7 +146,6 @@ def _prepare_worker(unit: Unit) -> None:
 def _load(estimators: bool) -> None:
     """Load the kernels of what is made in forks of this process: of recordings, and of references if there are any."""
     from simnav.compiled import kernels
-    from simnav.estimator.registry import discover_own
 
     importlib.import_module("simnav.simulation.simulator")
     with warnings.catch_warnings():
@@ -183,7 +186,9 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
             statuses["no-recording"] += 1
     if recording is not None:
         for entrant, key in unit.entrants:
-            result = _try(unit, entrant, key, recording)
+            hidden = unit.seal.unreadable(unit.folder)
+            made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
+            result = judged(unit, entrant, key, recording, made)
             try:
                 _store(unit.folder, result)
             except store.StoreError:
@@ -195,13 +200,6 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
     return index, statuses
 
 
-def _try(unit: Unit, entrant: Entrant, key: str, recording: Recording) -> Result:
-    """One estimator on one recording."""
-    hidden = unit.seal.unreadable(unit.folder)
-    made = try_estimator(entrant, recording, unit.limits, unit.confinement, hidden, sealed=unit.seal.secret)
-    return judged(unit, entrant, key, recording, made)
-
-
 def judged(unit: Unit, entrant: Entrant, key: str, recording: Recording, made: Attempt) -> Result:
     """The result of an attempt, with its scores; the trial is kept where that is wanted.
 
@@ -210,13 +208,10 @@ def judged(unit: Unit, entrant: Entrant, key: str, recording: Recording, made: A
     StoreError
         If the trial cannot be kept, because of the disk. What the estimator answered raises nothing.
     """
-    import numpy as np
-
-    from simnav.scoring import score, series
-
     trial = made.trial
     if trial is not None:
-        trial = replace(trial, diagnostics={_text(name): values for name, values in trial.diagnostics.items()})
+        storable = {name.encode(errors="backslashreplace").decode(): v for name, v in trial.diagnostics.items()}
+        trial = replace(trial, diagnostics=storable)
     blank = replace(
         unit.result(entrant, key, made.status, made.reason, made.confinement),
         note=recording.note,
@@ -238,8 +233,3 @@ def judged(unit: Unit, entrant: Entrant, key: str, recording: Recording, made: A
     except Exception as error:
         return replace(blank, status="error", reason=f"it cannot be scored: {printable(named(error))}")
     return replace(blank, scores=scores, scoring=unit.scoring if scores else blank.scoring, series=kept)
-
-
-def _text(name: str) -> str:
-    """A name of a diagnostic as it can be written to a file."""
-    return name.encode(errors="backslashreplace").decode()

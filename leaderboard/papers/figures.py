@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement, try_estimator
+from simnav.leaderboard.campaign.confinement.session import Limits
+from simnav.leaderboard.campaign.resolution import resolve
 from simnav.leaderboard.figures.panels import Bar, bars, curves_over_time
 from simnav.leaderboard.figures.plots import Band, Curve, error_cdf, error_over_time, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
@@ -22,7 +25,8 @@ from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.papers.paper import Figure, Gain, Range, Value
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
-from simnav.types import Array
+from simnav.scoring import errors, smoothed_errors
+from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -179,10 +183,6 @@ class _Sketch:
 
     def _trial(self, scenario: str, method: str) -> Trial | None:
         """A method's run of the first seed, in a process of its own; None where it is not there or gives nothing."""
-        from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement, try_estimator
-        from simnav.leaderboard.campaign.confinement.session import Limits
-        from simnav.leaderboard.campaign.resolution import resolve
-
         request = self.found.stands_for[method]
         if request is None:
             return None
@@ -234,8 +234,6 @@ class _Sketch:
         return fig, [m for m in entry.methods if m in shown], f"One run ({self._seed()}).{shaded}"
 
     def _curve(self, scenario: str, method: str, name: str) -> Curve | None:
-        from simnav.scoring import errors, smoothed_errors
-
         trial = self._trial(scenario, method)
         if trial is None:
             return None
@@ -344,8 +342,6 @@ def _bar(label: str, ours: Interval, runs: Iterable[float], paper: Range | None)
 
 
 def _true_sigma(recording: Recording, name: str) -> Iterator[Curve]:
-    from simnav.types import KINDS
-
     quantity, _, instrument = name.partition(".")
     stream = recording.data.aids[instrument]
     column = KINDS[stream.kind].errors.index(quantity.removeprefix("sigma_"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -169,7 +170,6 @@ def _render(document: _Document, place: str, site: SiteFacts) -> str:
 
 
 def _document(found: Reproduction, drawn: Sequence[Drawn]) -> _Document:
-    from datetime import UTC, datetime
     from importlib.metadata import version
 
     paper = found.paper

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.request import EstimatorRequest, split_estimators
 from simnav.leaderboard.papers.comparison import Verdict, as_gain, judge, judge_gain
 from simnav.leaderboard.papers.figures import draw
 from simnav.leaderboard.papers.findings import Finding, Findings
@@ -108,7 +110,6 @@ def _row_dict(f: Finding) -> dict[str, Any]:
 def find_method(method: Method) -> EstimatorRequest | None:
     """The registered estimator that stands for a method; None if there is none."""
     from simnav.estimator import EstimatorError, make, names
-    from simnav.leaderboard.campaign.request import EstimatorRequest, split_estimators
 
     known = set(names())
     for text in method.rows:
@@ -173,8 +174,6 @@ def run(
     progress: Callable[[str, Progress], None] | None,
 ) -> None:
     """Run some methods of a paper on one of its scenarios; results that are in the folder are kept."""
-    from simnav.leaderboard.campaign.campaign import run_campaign
-
     requests = {r.label: r for m in methods if (r := stands_for[m]) is not None}
     if requests:
         named = None if progress is None else lambda p: progress(scenario, p)

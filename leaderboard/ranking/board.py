@@ -29,6 +29,7 @@ from simnav.leaderboard.ranking.rows import (
     TrackRow,
     TrackTable,
 )
+from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.ranking.summary import sentence
 
 __all__ = [
@@ -147,8 +148,6 @@ class Ranking:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts and lists for JSON; numbers that are not finite become None. Each row has its stored cost."""
-        from simnav.leaderboard.ranking.stored_costs import cost_of
-
         found: dict[str, Any] = plain(vars(self))
         for board in (*found["tracks"], *found["scenarios"]):
             for row in board["rows"]:
@@ -157,8 +156,6 @@ class Ranking:
 
     def to_frame(self) -> Any:
         """A row an estimator and track, with its ratios; see `simnav.leaderboard.results.frame.frame`."""
-        from simnav.leaderboard.ranking.stored_costs import cost_of
-
         scenarios = [s.scenario for s in self.scenarios]
         costs = {(t.track, r.estimator): cost_of(r.estimator, t.plain, t.score) for t in self.tracks for r in t.rows}
         return frame([

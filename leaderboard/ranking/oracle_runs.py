@@ -14,6 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from simnav.estimator import find
 from simnav.leaderboard.campaign.fingerprint import digest, estimator_source, recording_digest, simulator_version
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
@@ -43,8 +44,6 @@ class OracleRuns:
     """
 
     def __init__(self, scenario: Scenario, folder: str | os.PathLike[str]):
-        from simnav.estimator import find
-
         self.scenario = scenario
         self.path = Path(folder) / f"{scenario.id}.jsonl"
         oracle = estimator_source(find("oracle-rts"))

@@ -32,6 +32,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.estimator import EstimatorError
+from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.ranking.board import (
     Consistency,
@@ -177,9 +179,6 @@ def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list
 
 
 def _comes_with_simnav(name: str) -> bool:
-    from simnav.estimator import EstimatorError
-    from simnav.estimator.registry import registered
-
     try:
         return comes_with_simnav(registered(name))
     except EstimatorError:

@@ -11,6 +11,7 @@ from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.failures import failures
 from simnav.leaderboard.ranking.standing import Standing
+from simnav.leaderboard.results.export import table
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.results.result import Result
@@ -40,8 +41,6 @@ class _Report:
 
     def to_frame(self) -> Any:
         """A row a run, a column a score (SI units, radians); see `simnav.leaderboard.results.frame.frame`."""
-        from simnav.leaderboard.results.export import table
-
         return frame(table(self.results).to_pylist())
 
     def plot(self) -> Figure:

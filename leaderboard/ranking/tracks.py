@@ -10,6 +10,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from simnav.scenario.catalogue import headers
+
 if TYPE_CHECKING:
     from simnav.scenario.catalogue import Header
 
@@ -57,8 +59,6 @@ class Track:
 
 def catalogued() -> dict[str, Header]:
     """What the catalogue says of each of its scenarios, by versioned id."""
-    from simnav.scenario.catalogue import headers
-
     return {h.id: h for h in headers()}
 
 

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from simnav.estimator.registry import discover_own, is_own, is_own_reference, snapshot
+
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
@@ -101,8 +103,6 @@ def _base(label: str) -> str:
 @lru_cache(maxsize=1)
 def _own() -> Mapping[str, str]:
     """Names and aliases of the estimators that come with simnav, by their look."""
-    from simnav.estimator.registry import discover_own, is_own, snapshot
-
     discover_own()
     classes, aliases = snapshot()
     return {look(name): name for name in (*aliases, *classes) if is_own(name)}
@@ -142,8 +142,6 @@ def lookalikes(labels: Iterable[str]) -> dict[str, str]:
 
 
 def _is_own(name: str) -> bool:
-    from simnav.estimator.registry import is_own
-
     return is_own(name)
 
 
@@ -193,8 +191,6 @@ def _fault_of_reference(result: Result) -> str:
 
 @lru_cache(maxsize=4096)
 def _is_reference(name: str) -> bool:
-    from simnav.estimator.registry import is_own_reference
-
     return is_own_reference(name)
 
 

@@ -21,6 +21,7 @@ import stat
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
@@ -166,8 +167,6 @@ def _is_text(value: object) -> bool:
 
 
 def _write_marker(path: Path, current: Mapping[str, Any]) -> None:
-    from importlib.metadata import version
-
     content = {"format": FORMAT, "simnav": version("simnav"), "benchmark": BENCHMARK, "current": current}
     with atomic(path / _MARKER) as file:
         file.write(json.dumps(content, indent=1, sort_keys=True).encode())

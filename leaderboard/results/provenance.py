@@ -17,8 +17,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
 from functools import cached_property, lru_cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from llvmlite.binding import get_host_cpu_name
 
 from simnav.leaderboard.results.errors import RequestError
 
@@ -157,8 +160,6 @@ def here(confinement: str = "", seal: str = "") -> Provenance:
 
 @lru_cache(maxsize=8)
 def _on(date: str, confinement: str, seal: str) -> Provenance:
-    from importlib.metadata import PackageNotFoundError, version
-
     versions = {}
     for name in _LIBRARIES:
         with contextlib.suppress(PackageNotFoundError):
@@ -232,8 +233,6 @@ def numerics(provenance: Provenance | None = None, *, processor: bool = True) ->
 
 
 def _processor() -> str:
-    from llvmlite.binding import get_host_cpu_name
-
     chosen = os.environ.get("NUMBA_CPU_NAME", "")  # which the kernels are compiled for, in place of what is here
     return f"{platform.machine()} {chosen or get_host_cpu_name()}"
 

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from simnav.leaderboard.campaign.fingerprint import recording_digest
+from simnav.leaderboard.campaign.sources import code_of, digest
 from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, true_track
 from simnav.leaderboard.site.charts import NO_BOUND, columns
 from simnav.leaderboard.site.facts import EVENT, catalogued, datasheets, events
@@ -205,7 +207,6 @@ def truth_of(east: Any, north: Any, time: Any) -> dict[str, Any]:
 def _code() -> tuple[str, str]:
     """Version of the simulator, and a digest of the other code that makes a background."""
     from simnav.leaderboard.campaign.fingerprint import simulator_version, with_library
-    from simnav.leaderboard.campaign.sources import code_of, digest
     from simnav.leaderboard.results.provenance import numerics
 
     return simulator_version(), with_library(digest(code_of(Path(__file__)).digest, *numerics()))
@@ -213,8 +214,6 @@ def _code() -> tuple[str, str]:
 
 def _file(identity: str, seeds: Sequence[int]) -> Path | None:
     """Where it is kept; None for what is not in the catalogue, or plays a log, whose files may change."""
-    from simnav.leaderboard.campaign.fingerprint import digest, recording_digest
-
     scenario = catalogued(identity)
     if scenario is None or scenario.recorded:
         return None

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from simnav.leaderboard.ranking.runs import at_times, has_series
 from simnav.leaderboard.results.stored_series import read_ahead
 from simnav.leaderboard.site.rounding import shorts, spaced
-from simnav.scoring.integrity import RISK
+from simnav.scoring.integrity import RISK, Stanford
 from simnav.scoring.plot_series import DIAGNOSTICS
 
 if TYPE_CHECKING:
@@ -204,8 +204,6 @@ def integrity(curves: Sequence[Curves], limit: float) -> dict[str, list[Any]] | 
     limit : float
         Alert limit [m].
     """
-    from simnav.scoring.integrity import Stanford
-
     pairs = [(c.values["horizontal"], c.values["level"]) for c in curves if {"level", "horizontal"} <= c.values.keys()]
     if not pairs:
         return None

@@ -12,9 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from simnav.estimator import describe
+from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.site.charts import columns
+from simnav.scenario.catalogue import headers
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
@@ -79,9 +82,6 @@ class EstimatorFacts:
 
 def estimator_facts(label: str) -> EstimatorFacts:
     """What the registered class says of itself."""
-    from simnav.estimator import describe
-    from simnav.estimator.registry import registered
-
     name = name_of(label)
     try:
         cls = registered(name)  # a label of others never names a file that is imported
@@ -129,8 +129,6 @@ def catalogued(identity: str) -> Scenario | None:
 
 def toml_of(identity: str) -> str:
     """The file of a scenario of the catalogue; empty where there is none."""
-    from simnav.scenario.catalogue import headers
-
     path = next((h.path for h in headers() if h.id == identity), None)
     try:
         return "" if path is None else path.read_text(encoding="utf-8")

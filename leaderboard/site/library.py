@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from importlib.metadata import version
 from pathlib import Path
 
 from simnav.leaderboard.results.files import write_whole
@@ -41,8 +42,6 @@ def bundle() -> str:
 
     Putting it together takes seconds, so it is kept in the user's cache, once for each version.
     """
-    from importlib.metadata import version
-
     kept = cache() / f"vega-{version('vl-convert-python')}-{VEGA_LITE}.js"
     with contextlib.suppress(OSError):
         return kept.read_text(encoding="utf-8")

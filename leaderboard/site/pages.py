@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from markupsafe import Markup, escape
+
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
@@ -34,8 +36,6 @@ def environment() -> Environment:
 
 def _prose(text: str) -> Markup:
     """A text of a docstring: ``*title*`` and code in two backticks become HTML, all else is escaped."""
-    from markupsafe import Markup, escape
-
     safe = re.sub(r"``(.+?)``", r"<code>\1</code>", str(escape(text)))
     # Nothing but the text that was escaped above.
     return Markup(re.sub(r"(?<!\*)\*([^*]+)\*(?!\*)", r"<em>\1</em>", safe))

@@ -19,9 +19,11 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.estimator import names
 from simnav.leaderboard.figures.style import save
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
@@ -42,6 +44,7 @@ from simnav.leaderboard.site.facts import catalogued, name_of
 from simnav.leaderboard.site.library import bundle
 from simnav.leaderboard.site.overview import BOARD_COLUMNS, overview
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
+from simnav.leaderboard.site.print_figures import filled, write_figure
 from simnav.leaderboard.site.scenario_page import RUNS_SHOWN, ScenarioData, scenario_data, seeds_to_show
 from simnav.leaderboard.site.sweeps import SweepFile
 
@@ -112,49 +115,45 @@ def build(
     if not results:
         raise RequestError("there are no results to show")
     output = Path(output).expanduser().resolve()
-    _refuse_strangers(output)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    _sweep(output)
-    catalogued.cache_clear()
-    draft = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent))
-    try:
-        draft.chmod(0o755)
+    with _in_place_of(output) as draft:
+        catalogued.cache_clear()
         report = progress or (lambda *_, **__: None)
         site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions)
         site.write(runs_shown, figures, sweeps)
-        _swap(draft, output)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return output / "index.html"
 
 
-def _refuse_strangers(output: Path) -> None:
+@contextmanager
+def _in_place_of(output: Path) -> Iterator[Path]:
+    """A folder beside another one, which takes its place at the end; a build that is killed leaves the old one.
+
+    What builds that were killed left, a while ago, is deleted.
+    """
     if output.is_file():
         raise RequestError(f"{output} is a file; a folder for the site is wanted")
     if output.is_dir() and any(output.iterdir()) and not (output / "results.schema.json").is_file():
         raise RequestError(f"{output} holds other files and no site of simnav; name an empty or a new folder")
-
-
-def _sweep(output: Path) -> None:
-    """Delete what builds that were killed left, a while ago, beside the site."""
+    output.parent.mkdir(parents=True, exist_ok=True)
     for folder in [*output.parent.glob(f".{output.name}.*.part"), *output.parent.glob(f".{output.name}.*.old")]:
         if time.time() - folder.stat().st_mtime > _STALE and (output.exists() or folder.suffix == ".part"):
             shutil.rmtree(folder, ignore_errors=True)
-
-
-def _swap(draft: Path, output: Path) -> None:
-    """Put the new folder in the place of the old one."""
-    if not output.exists():
-        os.replace(draft, output)
-        return
-    old = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".old", dir=output.parent))
-    os.replace(output, old)
+    draft = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent))
     try:
-        os.replace(draft, output)
-    except OSError:
-        os.replace(old, output)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
+        draft.chmod(0o755)
+        yield draft
+        if not output.exists():
+            os.replace(draft, output)
+            return
+        old = Path(tempfile.mkdtemp(prefix=f".{output.name}.", suffix=".old", dir=output.parent))
+        os.replace(output, old)
+        try:
+            os.replace(draft, output)
+        except OSError:
+            os.replace(old, output)
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
 
 
 def reproduce(results: Sequence[Result]) -> str:
@@ -169,8 +168,6 @@ def reproduce(results: Sequence[Result]) -> str:
 
 def _request(result: Result) -> str:
     """An estimator as it is asked for; one that is not registered came from a file."""
-    from simnav.estimator import names
-
     name, _, class_name = name_of(result.estimator).partition(":")
     if name not in names():
         name += f".py:{class_name}" if class_name else ".py"
@@ -244,8 +241,6 @@ class _Site:
         papers: Sequence[ExtraPage],
         editions: Sequence[ExtraPage],
     ):
-        from importlib.metadata import version
-
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
         self.runs = group(self.results)
@@ -369,8 +364,6 @@ class _Site:
         (self.folder / "data" / f"{name}.js").write_text(text, encoding="utf-8")
 
     def _print(self, scenario: ScenarioEntry, found: ScenarioData) -> None:
-        from simnav.leaderboard.site.print_figures import filled, write_figure
-
         for chart in found.charts:
             write_figure(filled(chart, found.first), self.folder / "figures" / f"{scenario.data}-{chart.name}")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from simnav.estimator import EstimatorError, describe
 from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
+from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
 from simnav.leaderboard.ranking.summary import best_rows, gain_text, sentence, spread
 from simnav.leaderboard.ranking.tables import MISSING
@@ -96,7 +97,6 @@ def _main(ranking: Ranking) -> TrackRanking | None:
 def draw(ranking: Ranking, path: Path) -> Path | None:
     """Draw the picture of the README: the best rows of the main track, and the oracles; None without a ranked row."""
     from simnav.leaderboard.figures.style import save
-    from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 
     main = _main(ranking)
     if main is None:

@@ -20,6 +20,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from simnav.estimator.registry import is_own
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.admission import is_scenario_id, label_fault, lookalikes
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
@@ -264,8 +265,6 @@ def _contents(manifest: Path, what: str) -> Contents:
 
 def _check_rows(contents: Contents, what: str, files: Mapping[str, Path]) -> None:
     """Whether the estimators are in the bundle, and are none of simnav's own."""
-    from simnav.estimator.registry import is_own
-
     for name in ("title", "benchmark", "profile", "main"):
         text = getattr(contents, name)
         if not (text.isascii() and text.isprintable()):

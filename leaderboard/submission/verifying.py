@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import random
+import statistics
 import subprocess
 import sys
 import warnings
@@ -466,8 +467,6 @@ def _rank_test(public: Sequence[float], sealed: Sequence[float]) -> float:
 
 
 def _ratio(public: Sequence[float], sealed: Sequence[float]) -> float:
-    import statistics
-
     if not public or not sealed:
         return math.nan
     below, above = statistics.median(public), statistics.median(sealed)

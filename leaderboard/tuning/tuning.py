@@ -22,8 +22,10 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.figures.training import objective_curve
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.tuning.objective import CLEAN, LARGEST, PRICE, Figures, Voyages, only_training
 from simnav.leaderboard.tuning.space import Range, space_of
 from simnav.scenario import Scenario
@@ -131,8 +133,6 @@ class Tuning:
 
     def plot(self) -> Figure:
         """The best objective so far, by evaluation."""
-        from simnav.leaderboard.figures.training import objective_curve
-
         return objective_curve([e.objective for e in self.evaluations], self.before.objective, self.estimator)
 
     def write(self, path: Path) -> Path:
@@ -255,8 +255,6 @@ def tune_row(
     progress: Callable[..., None] | None = None,
 ) -> Tuning:
     """Choose parameters of a row; see `simnav.leaderboard.interface.tune`."""
-    from simnav.leaderboard.results.provenance import here
-
     for family in families:
         only_training(family)
     space, present = space_of(request, vary)

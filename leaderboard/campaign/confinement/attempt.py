@@ -219,34 +219,30 @@ def try_estimator(
     ServerError
         If estimator processes cannot be started.
     """
-    found = _once(entrant, recording, limits, confinement, hidden, sealed)
-    if found.status == "error" and found.trial is None and (found.reason == LOST or interrupted(found.reason)):
-        # It was killed. Perhaps whoever kills the campaign began with it: then this process is soon gone, too.
+    for again in (False, True):
+        if confinement == "none" or entrant.reference:
+            outcome = isolate(_in_a_fork, entrant, recording, timeout=limits.timeout, memory=limits.memory)
+            trial: Trial | None = outcome.value if outcome.status == "ok" else None
+            status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
+            found = Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
+        else:
+            try:
+                if sealed and _server is not None and _server.used:  # its server has had no other estimator
+                    close_server()
+                try:
+                    found = attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+                except NoAnswerError:  # the estimator was not there yet, so this is not a result of it
+                    close_server()
+                    found = attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+            finally:
+                if sealed:
+                    close_server()
+        killed = found.status == "error" and found.trial is None and (found.reason == LOST or interrupted(found.reason))
+        if again or not killed:
+            break
+        # Perhaps whoever kills the campaign began with the estimator: then this process is soon gone, too.
         time.sleep(_SETTLE)
-        found = _once(entrant, recording, limits, confinement, hidden, sealed)
     return found
-
-
-def _once(
-    entrant: Entrant, recording: Recording, limits: Limits, confinement: str, hidden: Sequence[Path], sealed: bool
-) -> Attempt:
-    """One attempt, in a sealed campaign with a server that has had no other estimator."""
-    if confinement == "none" or entrant.reference:
-        outcome = isolate(_in_a_fork, entrant, recording, timeout=limits.timeout, memory=limits.memory)
-        trial: Trial | None = outcome.value if outcome.status == "ok" else None
-        status, reason = (outcome.status, outcome.reason) if trial is None else (trial.status, trial.reason)
-        return Attempt(status, reason, trial, outcome.seconds, outcome.peak_memory, "none")
-    try:
-        if sealed and _server is not None and _server.used:
-            close_server()
-        try:
-            return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
-        except NoAnswerError:  # the estimator was not there yet, so this is not a result of it
-            close_server()
-            return attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
-    finally:
-        if sealed:
-            close_server()
 
 
 def _in_a_fork(entrant: Entrant, recording: Recording) -> Trial:
