@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.figures.appearance import titled
 from simnav.leaderboard.figures.frames import (
     legend_below,
     longest_time,
@@ -164,7 +165,7 @@ def _chart(
     ax.set_xlim(centre[0] - half[0], centre[0] + half[0])
     ax.set_ylim(centre[1] - half[1], centre[1] + half[1])
     ax.set_aspect("equal", adjustable="box")
-    ax.set(xlabel=f"East [{unit}]", ylabel=f"North [{unit}]", title=title)
+    ax.set(xlabel=titled("East", unit), ylabel=titled("North", unit), title=title)
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
 
 
@@ -350,7 +351,7 @@ def run_chart(
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
             ax.tick_params(labelbottom=row == lowest[column])
             if row == lowest[column]:
-                ax.set_xlabel(f"Time [{unit}]")
+                ax.set_xlabel(titled("Time", unit))
         if first is not None:
             claimed = any(c.bound is not None for curves in errors.values() for c in curves)
             first.set_title("Error; dashed: claimed ±3σ" if claimed else "Error")

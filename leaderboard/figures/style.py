@@ -1,4 +1,4 @@
-"""The common style of all figures: colours and lines, and how a figure is written to files.
+"""The common style of all figures of matplotlib, and how a figure is written to files.
 
 Every estimator keeps one colour and line style in all figures (`Style`); the palette can be told
 apart with any colour vision. SVG files follow the reader's light or dark setting in a browser and
@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.figures.appearance import INKS, LINES, PALETTE
 from simnav.leaderboard.results.files import write_whole
 
 if TYPE_CHECKING:
@@ -29,21 +30,16 @@ __all__ = [
     "styled",
 ]
 
-# Light and dark form of each colour: Okabe and Ito (2008) without yellow, and two of Tol's "muted" set.
-PALETTE: tuple[tuple[str, str], ...] = (
-    ("#0072b2", "#4aa8e0"),
-    ("#d55e00", "#f08a45"),
-    ("#009e73", "#2fc79c"),
-    ("#cc79a7", "#e39fc4"),
-    ("#56b4e9", "#8fd0f5"),
-    ("#e69f00", "#f5bd45"),
-    ("#882255", "#c9679b"),
-    ("#999933", "#dddd92"),
-)
-_LINES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
-INK, GREY, GRID, SHADE, PAPER = "#1b2430", "#66707d", "#dfe3e8", "#eceff3", "#fefefe"
-_DARK = {INK: "#e8ebef", GREY: "#9aa5b1", GRID: "#343c46", SHADE: "#262d36", PAPER: "#161b21"}
+INK, GRID = INKS["light"]["ink"], INKS["light"]["grid"]
+GREY, SHADE, PAPER = "#66707d", "#eceff3", "#fefefe"
+_DARK = {
+    INK: INKS["dark"]["ink"],
+    GREY: INKS["dark"]["grey"],
+    GRID: INKS["dark"]["grid"],
+    SHADE: "#262d36",
+    PAPER: "#161b21",
+}
 TRUTH = INK
 _DPI = 160  # of PNG files
 
@@ -110,8 +106,8 @@ class Style:
     def line(self, label: str) -> Any:
         """Matplotlib line style: changes once the colours are used up."""
         if label in self._references:
-            return _LINES[1 + self._references.index(label) % (len(_LINES) - 1)]
-        return _LINES[self._of(label) // len(PALETTE) % len(_LINES)]
+            return LINES[1 + self._references.index(label) % (len(LINES) - 1)]
+        return LINES[self._of(label) // len(PALETTE) % len(LINES)]
 
     def marker(self, label: str) -> str:
         """Matplotlib marker."""

@@ -16,6 +16,7 @@ import numpy as np
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement, try_estimator
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.resolution import resolve
+from simnav.leaderboard.figures.appearance import HORIZONTAL_ERROR
 from simnav.leaderboard.figures.panels import Bar, bars, curves_over_time
 from simnav.leaderboard.figures.plots import Band, Curve, error_cdf, error_over_time, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
@@ -289,7 +290,7 @@ class _Sketch:
         bands = [Band(m, q.time, q.values) for m, r in self._all(entry) if (q := r.quantiles()) is not None]
         if not bands:
             return _NOTHING
-        fig = error_cdf(bands, self.style, label="Horizontal error [m]", title=self._heading(entry, self._count()))
+        fig = error_cdf(bands, self.style, label=HORIZONTAL_ERROR, title=self._heading(entry, self._count()))
         caption = f"Share of the epochs of {self._count()} whose horizontal error is below a value."
         return fig, [b.label for b in bands], caption
 

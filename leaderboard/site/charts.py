@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from simnav.leaderboard.figures.appearance import EAST, HORIZONTAL_ERROR, NORTH, PROTECTION_LEVEL, TIME
+
 __all__ = [
     "NO_BOUND",
     "NO_FAULTS",
@@ -178,7 +180,7 @@ def over_time(
         As of `timed`. ``curves``: curves by row over ``time`` with ``middle`` (and ``low``, ``high``); ``faults``:
         columns ``start``, ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
     """
-    x = _axis("time", "Time [s]")
+    x = _axis("time", TIME)
     y = _axis("middle", f"{title} [{unit}]", log=log)
     kept = "datum.middle > 0" if log else "isValid(datum.middle)"
     curves = {"data": {"name": "curves"}, "transform": [{"filter": kept}]}
@@ -201,7 +203,7 @@ def over_time(
         },
         _hover(
             {**curves, "encoding": {"x": x, "y": y, "color": _COLOUR}},
-            _tip(row="Estimator", time="Time [s]", middle=f"{title} [{unit}]"),
+            _tip(row="Estimator", time=TIME, middle=f"{title} [{unit}]"),
         ),
     ]
     return Chart(
@@ -237,13 +239,13 @@ def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], capt
 
 def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart:
     """A horizontal track: truth (``truth``), fixes, where faults act, estimates (``curves``)."""
-    x, y = _axis("east", "East [m]"), _axis("north", "North [m]")
+    x, y = _axis("east", EAST), _axis("north", NORTH)
     order = {"order": {"field": "time"}}
     layers: list[Spec] = [
         {
             "data": {"name": "fixes"},
             "mark": {"type": "point", "color": "$grey", "opacity": 0.5, "size": 8, "filled": True},
-            "encoding": {"tooltip": _tip(name="Fix", time="Time [s]")},
+            "encoding": {"tooltip": _tip(name="Fix", time=TIME)},
         },
         {
             "data": {"name": "faulty"},
@@ -269,7 +271,7 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
                 "tooltip": _tip(name="Truth"),
             },
         },
-        _hover({"data": {"name": "curves"}, "encoding": {"color": _COLOUR}}, _tip(row="Estimator", time="Time [s]")),
+        _hover({"data": {"name": "curves"}, "encoding": {"color": _COLOUR}}, _tip(row="Estimator", time=TIME)),
     ]
     return Chart(
         name,
@@ -501,7 +503,7 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
     """
     end = 2.0 * limit
     x, y = ({"field": f, "type": "quantitative", "title": title, "scale": {"domain": [0.0, end], "nice": False}}
-            for f, title in (("x", "Horizontal error [m]"), ("y", "Protection level [m]")))  # fmt: skip
+            for f, title in (("x", HORIZONTAL_ERROR), ("y", PROTECTION_LEVEL)))  # fmt: skip
     regions = [{"x": 0.0, "x2": end, "y": limit, "y2": end, "what": "not available"},
                {"x": limit, "x2": end, "y": 0.0, "y2": limit, "what": "hazardously misleading"}]  # fmt: skip
     diagonal = [{"x": 0.0, "y": 0.0}, {"x": end, "y": end}]
@@ -556,7 +558,7 @@ def timeline(name: str, data: Mapping[str, Any], caption: str, duration: float) 
         "data": {"name": "events"},
         "mark": {"type": "bar", "height": 16, "cornerRadius": 3},
         "encoding": {
-            "x": {**_axis("start", "Time [s]"), "scale": {"domain": [0.0, duration], "nice": False}},
+            "x": {**_axis("start", TIME), "scale": {"domain": [0.0, duration], "nice": False}},
             "x2": {"field": "end"},
             "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
             "color": {"condition": {"test": "datum.group == 'manoeuvres'", "value": "$shade"}, "value": "$second"},

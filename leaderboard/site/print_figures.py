@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.figures.style import INK, PALETTE
+from simnav.leaderboard.figures.appearance import DASHES, INKS, PALETTE
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.site.charts import Chart, Spec
 from simnav.leaderboard.site.library import VEGA_LITE
@@ -14,16 +14,19 @@ from simnav.leaderboard.site.library import VEGA_LITE
 __all__ = ["filled", "write_figure"]
 
 _PALETTE = tuple(light for light, _ in PALETTE)
-_INKS = {"$ink": INK, "$grey": "#5b6673", "$shade": "#9aa5b1", "$strong": _PALETTE[0], "$second": _PALETTE[1],
-         "$scheme": "blues"}  # fmt: skip
-_DASHES = ([1, 0], [6, 2], [2, 2], [6, 2, 2, 2])
+_INKS = {
+    **{f"${name}": colour for name, colour in INKS["light"].items() if name != "grid"},
+    "$strong": _PALETTE[0],
+    "$second": _PALETTE[1],
+    "$scheme": "blues",
+}
 
 
 def filled(chart: Chart, rows: Sequence[str], width: int = 620) -> Spec:
     """A specification with its data, in the colours of print, that shows some rows and a legend."""
     scales = {
         "$colours": {"domain": list(rows), "range": [_PALETTE[k % 8] for k in range(len(rows))]},
-        "$dashes": {"domain": list(rows), "range": [_DASHES[k // 8 % 4] for k in range(len(rows))]},
+        "$dashes": {"domain": list(rows), "range": [DASHES[k // 8 % 4] for k in range(len(rows))]},
     }
 
     def fill(item: Any) -> Any:

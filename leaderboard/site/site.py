@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.estimator import names
+from simnav.leaderboard.figures import appearance
 from simnav.leaderboard.figures.style import save
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
@@ -57,7 +58,7 @@ __all__ = ["build"]
 #: Fewer scenarios than this are written by one process.
 WORTH_PROCESSES = 3
 _STALE = 3600.0  # a build of this age runs no more [s]
-_STATIC = (*STATIC, "core.js", "table.js", "charts.js", "compare.js", "page.js", "results.schema.json")
+_STATIC = (*STATIC, "core.js", "table.js", "compare.js", "page.js", "results.schema.json")
 
 
 def build(
@@ -312,6 +313,9 @@ class _Site:
             extra.install(self.folder, self.facts)
         for name in _STATIC:
             shutil.copyfile(TEMPLATES / name, self.folder / name)
+        charts = (TEMPLATES / "charts.js").read_text(encoding="utf-8")
+        charts = charts.replace("$APPEARANCE", json.dumps(appearance.for_browser()))
+        (self.folder / "charts.js").write_text(charts, encoding="utf-8")
         (self.folder / "vega.js").write_text(bundle(), encoding="utf-8")
 
     def _gathered(self, seeds: Mapping[str, Sequence[int]], worst: Sequence[Result]) -> Gathered:

@@ -3,12 +3,7 @@
 {
   const { make, state } = simnav;
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  const palettes = {
-    light: ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255", "#999933"],
-    dark: ["#4aa8e0", "#f08a45", "#2fc79c", "#e39fc4", "#8fd0f5", "#f5bd45", "#c9679b", "#dddd92"],
-  };
-  const inks = { light: { ink: "#1b2430", grey: "#5b6673", grid: "#dfe3e8", shade: "#9aa5b1" }, dark: { ink: "#e8ebef", grey: "#9aa5b1", grid: "#343c46", shade: "#66707d" } };
-  const dashes = [[1, 0], [6, 2], [2, 2], [6, 2, 2, 2]];
+  const { palettes, inks, dashes } = $APPEARANCE; // written by the site, see figures/appearance.py
 
   let printing = false;
   const theme = () => (dark.matches && !printing ? "dark" : "light");
