@@ -222,12 +222,12 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
     if request.until_decided and request.runs is not None:
         raise RequestError("'until_decided' chooses the number of runs itself: give 'limit' in place of 'runs'")
     with mistakes(ValueError):
-        chosen = papers.load(str(request.paper))
+        chosen = papers.paper_of(str(request.paper))
         if request.methods:
             names = request.methods.split(",") if isinstance(request.methods, str) else request.methods
             chosen = chosen.only([name.strip() for name in names])
         if request.stored:
-            return shipped.load(chosen)
+            return shipped.shipped_reproduction(chosen)
     workers, limit = whole_number("workers", request.workers, 1), whole_number("limit", request.limit, 1)
     folder = absolute(request.output or Path("reproduced") / chosen.key) / "results"
     with mistakes(StoreError):

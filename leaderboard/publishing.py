@@ -61,7 +61,7 @@ def site(request: SiteRequest) -> SiteReport:
     RequestError
         If there are no results, or the site cannot be written.
     """
-    from simnav.leaderboard.papers.page import find
+    from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
     from simnav.leaderboard.ranking.ranking import rank as ranked
     from simnav.leaderboard.results import requested
@@ -75,8 +75,8 @@ def site(request: SiteRequest) -> SiteReport:
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
     index = build(
         found, ranking, absolute(request.output), progress=request.progress, workers=processes,
-        papers=find(Path(request.papers)), runs_shown=shown, figures=request.figures,
-        sweeps=swept.find(Path(request.sweeps)),
+        papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures,
+        sweeps=swept.sweeps_in(Path(request.sweeps)),
     )  # fmt: skip
     return SiteReport(index, found, ranking, correlations)
 
@@ -110,7 +110,7 @@ class Submission:
     remarks: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain."""
+        """The fields as values that JSON can hold."""
         return {**vars(self), "path": str(self.path)}
 
 
@@ -128,14 +128,14 @@ def submit(request: SubmitRequest) -> Submission:
         If there is no such estimator or profile, the estimator cannot be passed on, or runs are left after ``minutes``.
     """
     from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
-    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.profiles import read_profile
     from simnav.leaderboard.results.packing import pack
     from simnav.leaderboard.results.provenance import BENCHMARK
     from simnav.leaderboard.submission.bundle import SUFFIX, write_bundle
     from simnav.leaderboard.submission.source import source_of
     from simnav.leaderboard.submission.verifying import runs_of
 
-    name = load(request.profile).name
+    name = read_profile(request.profile).name
     with mistakes(ValueError):
         confinement = chosen_confinement("auto")
     with scratch("submit") as home:
@@ -219,7 +219,7 @@ def run_standard(request: StandardRequest) -> CampaignReport:
         Its summary says how many runs are left.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.profiles import read_profile
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
     from simnav.leaderboard.results import requested
@@ -229,7 +229,7 @@ def run_standard(request: StandardRequest) -> CampaignReport:
     with mistakes(StoreError):
         begin(folder, standard.RESULTS if request.shipped is None else absolute(request.shipped))
         summary = run(
-            load(request.profile), folder, workers=whole_number("workers", request.workers, 1),
+            read_profile(request.profile), folder, workers=whole_number("workers", request.workers, 1),
             minutes=request.minutes, force=request.force, shard=request.shard, progress=request.progress,
         )  # fmt: skip
     found = results_of(folder)
@@ -296,8 +296,8 @@ def publish_standard(request: PublishRequest) -> Published:
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard import standard
-    from simnav.leaderboard.papers.page import find
-    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.papers.page import pages_in
+    from simnav.leaderboard.profiles import read_profile
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.editions import pages_of
     from simnav.leaderboard.standard.history import read
@@ -311,7 +311,7 @@ def publish_standard(request: PublishRequest) -> Published:
     with mistakes(StoreError):
         made = publish(
             working,
-            load(request.profile),
+            read_profile(request.profile),
             folder,
             file,
             None if request.readme is None else absolute(request.readme),
@@ -321,5 +321,5 @@ def publish_standard(request: PublishRequest) -> Published:
         published = {(r.scenario, r.estimator, r.seed) for r in made.results}
         found = [r for r in results_of(working, series=True) if (r.scenario, r.estimator, r.seed) in published]
         build(found, made.ranking, absolute(request.site), progress=request.progress, workers=request.workers,
-              papers=find(Path("reproduced")), editions=pages_of(read(file)))  # fmt: skip
+              papers=pages_in(Path("reproduced")), editions=pages_of(read(file)))  # fmt: skip
     return made

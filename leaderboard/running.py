@@ -197,7 +197,7 @@ def campaign(request: CampaignRequest) -> CampaignReport:
 def _parts(request: CampaignRequest) -> list[tuple[Scenarios, Estimators, int]]:
     """Scenarios, estimators and number of runs of each part of a profile; what was asked for replaces them."""
     from simnav.leaderboard.campaign.campaign import RUNS
-    from simnav.leaderboard.profiles import load
+    from simnav.leaderboard.profiles import read_profile
 
     scenarios, estimators, runs = request.scenarios, request.estimators, request.runs
     if request.profile is None:
@@ -208,7 +208,7 @@ def _parts(request: CampaignRequest) -> list[tuple[Scenarios, Estimators, int]]:
             p.estimators if estimators is None else estimators,
             p.runs if runs is None else runs,
         )
-        for p in load(request.profile).parts
+        for p in read_profile(request.profile).parts
     ]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from simnav.leaderboard.campaign import sources
-from simnav.leaderboard.campaign.session_class import carry, is_session, receive
+from simnav.leaderboard.campaign.session_class import is_session, pickle_class, receive
 from simnav.leaderboard.campaign.sources import folder_code
 from simnav.plugins import is_file_module, load_plugin, place_of
 from simnav.scoring import SCORES, registry
@@ -55,7 +55,7 @@ def own_scores() -> OwnScores:
         if is_file_module(score.__module__):
             files.append(str(Path(place_of(score)[0]).resolve()))
         elif is_session(score.__module__):
-            code.append(carry(score))
+            code.append(pickle_class(score))
     return OwnScores(tuple(dict.fromkeys(files)), tuple(code))
 
 

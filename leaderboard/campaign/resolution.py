@@ -19,7 +19,7 @@ from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, own_code, variant, with_library
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
-from simnav.leaderboard.campaign.session_class import carry, is_session
+from simnav.leaderboard.campaign.session_class import is_session, pickle_class
 from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, record_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -58,7 +58,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         with contextlib.suppress(Exception):  # the other process says what is wrong
             source = estimator_source(cls)  # here, where the text of a session is known
         if request.cls is not None or is_session(cls.__module__):
-            entrant = replace(entrant, code=carry(cls))
+            entrant = replace(entrant, code=pickle_class(cls))
     if confinement == "none":
         outcome = isolate(_describe, entrant, timeout=_IMPORT_TIME, memory=_MEMORY)
         found, why = outcome.value, outcome.reason

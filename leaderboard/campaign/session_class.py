@@ -21,7 +21,7 @@ from typing import Any
 from simnav.leaderboard.results.errors import RequestError, sentence
 from simnav.plugins import code_text
 
-__all__ = ["carry", "is_session", "receive", "source_of"]
+__all__ = ["is_session", "pickle_class", "receive", "source_of"]
 
 
 def is_session(module: str) -> bool:
@@ -47,7 +47,7 @@ def is_session(module: str) -> bool:
     return not os.path.samefile(here, origin)  # another module of the same name
 
 
-def carry(cls: Any) -> bytes:
+def pickle_class(cls: Any) -> bytes:
     """A class or a function as bytes; of its session everything that it uses goes with it.
 
     Raises

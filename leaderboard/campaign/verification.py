@@ -96,7 +96,7 @@ class Verification:
         return bool(self.repeated) and not faults
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain."""
+        """The fields as values that JSON can hold."""
         return asdict(self) | {"passed": self.passed}
 
 

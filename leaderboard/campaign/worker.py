@@ -140,10 +140,10 @@ def _prepare_worker(unit: Unit) -> None:
     if unit.confinement != "none":  # it loads its kernels while the first recording is made
         prepare(unit.confinement, unit.seal.unreadable(unit.folder))
     if first:
-        _load(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
+        _load_kernels(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
 
 
-def _load(estimators: bool) -> None:
+def _load_kernels(estimators: bool) -> None:
     """Load the kernels of what is made in forks of this process: of recordings, and of references if there are any."""
     from simnav.compiled import kernels
 

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.results.errors import RequestError, sentence, shortened
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -162,7 +162,7 @@ class Output:
     def flush(self) -> None:
         """Print the JSON document, with ``--json``."""
         if self.json:
-            sys.stdout.write(json.dumps(plain(self._document), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+            sys.stdout.write(json.dumps(as_json(self._document), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
             sys.stdout.flush()
 
 

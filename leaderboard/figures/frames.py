@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "decimal_log_ticks",
     "grid_of_panels",
     "legend_below",
     "longest_time",
     "named_lines",
-    "plain_log_ticks",
     "shade",
     "time_panels",
     "time_unit",
@@ -114,7 +114,7 @@ def shade(ax: Axes, outages: Sequence[tuple[float, float, str]], factor: float, 
             last = end
 
 
-def plain_log_ticks(axis: Any) -> None:
+def decimal_log_ticks(axis: Any) -> None:
     """Powers of ten as 0.1, 1, 10, 100, 1k; more ticks where the range is short."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.frames import legend_below, named_lines, plain_log_ticks, time_panels
+from simnav.leaderboard.figures.frames import decimal_log_ticks, legend_below, named_lines, time_panels
 from simnav.leaderboard.figures.plots import Array, Curve
 from simnav.leaderboard.figures.style import GREY, INK, PAPER, Style, figure, styled
 
@@ -147,7 +147,7 @@ def bars(panels: Mapping[str, Sequence[Bar]], style: Style, *, title: str = "", 
                 ax.axvline(0.0, color=GREY, lw=0.8, zorder=0.5)
             elif values and min(values) > 0.0 and max(values) > _DECADES * min(values):
                 ax.set_xscale("log")
-                plain_log_ticks(ax.xaxis)
+                decimal_log_ticks(ax.xaxis)
             elif values:
                 ax.set_xlim(left=0.0)
             ax.set(xlabel=label)

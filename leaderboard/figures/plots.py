@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from simnav.leaderboard.figures.appearance import titled
 from simnav.leaderboard.figures.frames import (
+    decimal_log_ticks,
     legend_below,
     longest_time,
     named_lines,
-    plain_log_ticks,
     shade,
     time_panels,
     time_unit,
@@ -242,7 +242,7 @@ def error_cdf(bands: Sequence[Band], style: Style, *, label: str, title: str = "
         ax.set_xscale("log")
         if high > 0.0 and math.isfinite(low):
             ax.set_xlim(max(low, 1e-6 * high) * 0.8, high * 1.15)
-        plain_log_ticks(ax.xaxis)
+        decimal_log_ticks(ax.xaxis)
         ax.set(xlabel=label, ylabel="Share of epochs [%]", ylim=(0.0, 101.0), title=title)
         ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
     return fig
@@ -275,7 +275,7 @@ def dots(rows: Sequence[Dot], style: Style, *, label: str, title: str = "") -> F
                     mfc=PAPER if row.hollow else colour, zorder=4)  # fmt: skip
         if values:
             ax.set_xscale("log")
-            plain_log_ticks(ax.xaxis)
+            decimal_log_ticks(ax.xaxis)
         ax.set_xlim(right=min(ax.get_xlim()[1], limit))
         named_lines(ax, [f"{r.label}  {r.note}".rstrip() for r in rows])
         ax.set(xlabel=label, title=title)
@@ -401,4 +401,4 @@ def _log_scale(ax: Axes, floor: float) -> None:
     ax.set_yscale("log")
     if math.isfinite(floor) and floor > 0.0:
         ax.set_ylim(bottom=0.5 * floor)
-    plain_log_ticks(ax.yaxis)
+    decimal_log_ticks(ax.yaxis)

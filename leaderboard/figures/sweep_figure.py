@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.frames import grid_of_panels, legend_below, plain_log_ticks
+from simnav.leaderboard.figures.frames import decimal_log_ticks, grid_of_panels, legend_below
 from simnav.leaderboard.figures.plots import Array
 from simnav.leaderboard.figures.style import GREY, Style, figure, styled
 
@@ -95,13 +95,13 @@ def error_against_dial(
         values = values[np.isfinite(values) & (values > 0.0)]
         if len(values) and values.max() / values.min() > _DECADES:
             ax.set_yscale("log")
-            plain_log_ticks(ax.yaxis)
+            decimal_log_ticks(ax.yaxis)
         else:
             ax.set_ylim(bottom=0.0)
         dial = lines[0].dial
         if dial[0] > 0.0 and dial[-1] / dial[0] >= _DECADES:
             ax.set_xscale("log")
-            plain_log_ticks(ax.xaxis)
+            decimal_log_ticks(ax.xaxis)
         ax.set_xlabel(across)
         ax.set_ylabel(up)
         ax.set_title(title + (", triangles: twice the clean error" if breaks else ""))

@@ -18,7 +18,7 @@ from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Paper
 from simnav.leaderboard.papers.report import sheets, verdicts
 from simnav.leaderboard.papers.reproduction import fill, find_method, load_results
 from simnav.leaderboard.papers.sequential import LIMIT
-from simnav.leaderboard.papers.stored import load, provenance, save
+from simnav.leaderboard.papers.stored import provenance, save, shipped_reproduction
 from simnav.leaderboard.results.provenance import Provenance
 
 __all__ = ["FOLDER", "blocks", "overview", "replaced", "update"]
@@ -29,7 +29,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "docs" / "papers"
 
 def update(folder: Path = FOLDER) -> None:
     """Write the marked blocks of all pages."""
-    pages = {f"{key}.md": blocks(papers.load(key)) for key in PAPERS} | {"index.md": {"overview": overview()}}
+    pages = {f"{key}.md": blocks(papers.paper_of(key)) for key in PAPERS} | {"index.md": {"overview": overview()}}
     for name, texts in pages.items():
         path = folder / name
         path.write_text(replaced(path.read_text(encoding="utf-8"), texts), encoding="utf-8")
@@ -58,7 +58,7 @@ def replaced(page: str, texts: dict[str, str]) -> str:
 
 def blocks(paper: Paper) -> dict[str, str]:
     """The marked blocks of a paper's page: name -> Markdown."""
-    found = load(paper)
+    found = shipped_reproduction(paper)
     tables = [
         "\n".join(f"- {plural[0].upper()}{plural[1:]}: {text}." for kind, plural in KINDS_OF_ROWS.items()
                   if (text := verdicts(found, kind))),
@@ -87,8 +87,8 @@ def overview() -> str:
     """A table of the papers with the verdicts on their rows."""
     lines = [_line(("paper", "comparison", *KINDS_OF_ROWS.values())), _line(("---",) * (2 + len(KINDS_OF_ROWS)))]
     for key in PAPERS:
-        paper = papers.load(key)
-        found = load(paper)
+        paper = papers.paper_of(key)
+        found = shipped_reproduction(paper)
         counts = (verdicts(found, kind) or "none" for kind in KINDS_OF_ROWS)
         lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, *counts)))
     return "\n".join(lines)
@@ -116,7 +116,7 @@ def _store(folder: Path) -> None:
     for key in PAPERS:
         if not (folder / key / "results").is_dir():
             continue
-        paper = papers.load(key)
+        paper = papers.paper_of(key)
         stands_for = {m.name: find_method(m) for m in paper.methods}
         results = load_results(paper, stands_for, folder / key / "results", range(LIMIT))
         path = save(fill(paper, stands_for, results, range(max(r.seed for r in results) + 1)))

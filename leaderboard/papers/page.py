@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.papers.figures import Drawn
     from simnav.leaderboard.papers.reproduction import Reproduction
 
-__all__ = ["PaperPage", "find", "write"]
+__all__ = ["PaperPage", "pages_in", "write"]
 
 _FORMAT = 2  # of the document
 
@@ -129,7 +129,7 @@ def write(found: Reproduction, drawn: Sequence[Drawn], folder: Path) -> Path:
     return target
 
 
-def find(folder: Path) -> list[PaperPage]:
+def pages_in(folder: Path) -> list[PaperPage]:
     """The pages of the repeated comparisons, in the order of the papers.
 
     A comparison below the folder comes first. If there is none, or it is damaged or of another version, the page is
@@ -159,7 +159,7 @@ def _stored(folder: Path, key: str) -> PaperPage | None:
     from simnav.leaderboard.papers import paper, stored
 
     try:
-        return PaperPage(_document(stored.load(paper.load(key)), []), folder)
+        return PaperPage(_document(stored.shipped_reproduction(paper.paper_of(key)), []), folder)
     except ValueError:
         return None
 

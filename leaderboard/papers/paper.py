@@ -31,7 +31,7 @@ __all__ = [
     "Table",
     "Value",
     "kind_of",
-    "load",
+    "paper_of",
 ]
 
 #: A figure, or the lower and upper end of a range that a paper gives.
@@ -355,7 +355,7 @@ class Paper:
         return {s: [m.name for m in self.methods if m.name in names] for s, names in wanted.items()}
 
 
-def load(key: str) -> Paper:
+def paper_of(key: str) -> Paper:
     """The paper of a key or of one of its aliases.
 
     Raises

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["Finding", "Reproduction", "fill", "find", "find_method", "load_results", "reproduce"]
+__all__ = ["Finding", "Reproduction", "fill", "find_method", "finding_of", "load_results", "reproduce"]
 
 _UNEXPLAINED = "the reason is not known"
 
@@ -40,7 +40,7 @@ class Reproduction(Findings):
         return sum(f.verdict == verdict and kind in ("", kind_of(f.row)) for f in self.findings)
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The fields as values that JSON can hold."""
         return {
             "paper": self.paper.key,
             "title": self.paper.title,
@@ -206,11 +206,13 @@ def fill(
         by.setdefault((result.scenario, result.estimator), []).append(result)
     labels = {name: r.label for name, r in stands_for.items() if r is not None}
     ids = {name: paper.scenario(name).id for name in {row.scenario for row in paper.rows()}}
-    findings = [find(table.title, row, ids[row.scenario], labels, by) for table in paper.tables for row in table.rows]
+    findings = [
+        finding_of(table.title, row, ids[row.scenario], labels, by) for table in paper.tables for row in table.rows
+    ]
     return Reproduction(paper, seeds, findings, stands_for, results)
 
 
-def find(
+def finding_of(
     table: str,
     row: Row,
     scenario: str,

@@ -25,7 +25,7 @@ from simnav.leaderboard.results.result import Result
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest
 
-__all__ = ["FOLDER", "load", "provenance", "save"]
+__all__ = ["FOLDER", "provenance", "save", "shipped_reproduction"]
 
 #: Where the files are.
 FOLDER = Path(__file__).with_name("results")
@@ -63,7 +63,7 @@ def save(found: Reproduction, folder: Path = FOLDER) -> Path:
     return path
 
 
-def load(paper: Paper, folder: Path = FOLDER) -> Reproduction:
+def shipped_reproduction(paper: Paper, folder: Path = FOLDER) -> Reproduction:
     """The comparison from the stored results; nothing is run.
 
     Raises

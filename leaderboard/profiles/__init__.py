@@ -30,7 +30,7 @@ from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.scenario.catalogue import headers
 from simnav.spec import closest
 
-__all__ = ["KEYS", "Part", "Profile", "load", "profiles"]
+__all__ = ["KEYS", "Part", "Profile", "profiles", "read_profile"]
 
 _FOLDER = Path(__file__).parent
 
@@ -89,7 +89,7 @@ def profiles() -> list[str]:
     return sorted(p.stem for p in _FOLDER.glob("*.toml"))
 
 
-def load(profile: str | os.PathLike[str]) -> Profile:
+def read_profile(profile: str | os.PathLike[str]) -> Profile:
     """A profile by its name, or by the path of its file.
 
     Raises

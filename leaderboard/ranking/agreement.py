@@ -60,7 +60,7 @@ class RankCorrelation:
     leading_high: float = math.nan
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The fields as values that JSON can hold."""
         return asdict(self)
 
 

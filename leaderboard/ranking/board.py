@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from simnav.leaderboard.results.frame import frame
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -148,10 +148,10 @@ class Ranking:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts and lists for JSON; numbers that are not finite become None. Each row has its stored cost."""
-        found: dict[str, Any] = plain(vars(self))
+        found: dict[str, Any] = as_json(vars(self))
         for board in (*found["tracks"], *found["scenarios"]):
             for row in board["rows"]:
-                row["cost"] = plain(cost_of(row["estimator"], board["plain"], board["score"]))
+                row["cost"] = as_json(cost_of(row["estimator"], board["plain"], board["score"]))
         return found
 
     def to_frame(self) -> Any:

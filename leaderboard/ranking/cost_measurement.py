@@ -118,7 +118,7 @@ def _multiples(
     done = set[str]()
     for name, sea in suited:
         for smooth in (False, True):
-            plain = _plain(sea, smooth)
+            plain = _plain_row_for(sea, smooth)
             if not plain or plain in done or (smooth and not _smooths(request.make(), sea)):
                 continue
             done.add(plain)
@@ -126,7 +126,7 @@ def _multiples(
             yield CostMultiple(request.label, plain, name, m.value, m.low, m.high, m.rounds)
 
 
-def _plain(sea: Recording, smooth: bool) -> str:
+def _plain_row_for(sea: Recording, smooth: bool) -> str:
     """The plain row that suits a recording; empty if none does."""
     rows = plain_rows(SMOOTHED if smooth else "")
     return next((name for name in rows if not lacking(make(name).needs, sea.instruments)), "")

@@ -13,7 +13,7 @@ from simnav.leaderboard.ranking.failures import failures
 from simnav.leaderboard.ranking.standing import Standing
 from simnav.leaderboard.results.export import table
 from simnav.leaderboard.results.frame import frame
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.results.result import Result
 
 if TYPE_CHECKING:
@@ -106,6 +106,6 @@ class EvaluationReport(_Report):
             "scenarios": list(self.scenarios),
             "seeds": list(self.seeds),
             "ranking": self.ranking.to_dict(),
-            "comparisons": plain(self.standings),
+            "comparisons": as_json(self.standings),
             "results": None if self.folder is None else str(self.folder),
         }

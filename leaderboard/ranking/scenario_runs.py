@@ -135,7 +135,7 @@ class ScenarioRuns:
         self._smoothed = {n: _column(by[n], SMOOTHED) for n in SMOOTHERS if n in by}
         self._stored = reference_of(name, track.score, entries, self.recorded)
         self.divisor, self.reference = self._reference()
-        self.plain = plain_row(track.score, {n for n in entries if self._whole(n)})
+        self.plain = plain_row(track.score, {n for n in entries if self._is_complete(n)})
         self.cells = {n: self._cell(r) for n, r in entries.items()}
 
     def _said_to_be_recorded(self) -> bool:
@@ -148,7 +148,7 @@ class ScenarioRuns:
         """The error by seed; infinite where a run failed or has no position."""
         return _column(runs, self.track.score)
 
-    def _whole(self, name: str) -> bool:
+    def _is_complete(self, name: str) -> bool:
         """Whether a row has a finite error above zero on every seed that counts."""
         mine = self.errors.get(name, {})
         return bool(self.seeds) and all(0.0 < mine.get(seed, math.inf) < math.inf for seed in self.seeds)
@@ -157,8 +157,8 @@ class ScenarioRuns:
         """What is divided by, by seed, and in words: an oracle on the same runs, or else a fixed figure."""
         name = ORACLES.get(self.track.score, "oracle")
         if self.recorded:
-            name = plain_row(self.track.score, {n for n in self.errors if self._whole(n)})
-        if not name or not self._whole(name):
+            name = plain_row(self.track.score, {n for n in self.errors if self._is_complete(n)})
+        if not name or not self._is_complete(name):
             return dict.fromkeys(self.seeds, self._stored.value), self._stored
         mine = {seed: self.errors[name][seed] for seed in self.seeds}
         logs = np.log(list(mine.values()))

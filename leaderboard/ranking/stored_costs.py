@@ -72,7 +72,7 @@ class Costs:
     measured: Provenance
     rows: tuple[CostMultiple, ...]
 
-    def find(self, estimator: str, plains: Iterable[str]) -> CostMultiple | None:
+    def multiple_of(self, estimator: str, plains: Iterable[str]) -> CostMultiple | None:
         """The multiple of an estimator beside the first of the plain rows beside which it was measured."""
         mine = {r.plain: r for r in self.rows if r.estimator == estimator}
         return next((mine[p] for p in plains if p in mine), None)
@@ -171,7 +171,7 @@ def cost_of(estimator: str, plain: str, score: str) -> CostMultiple | None:
     score : str
         Key of `simnav.scoring.SCORES` that the board ranks.
     """
-    return stored().find(estimator, plain.split(" or ") if plain else plain_rows(score))
+    return stored().multiple_of(estimator, plain.split(" or ") if plain else plain_rows(score))
 
 
 def not_measured(estimators: Iterable[str]) -> str:

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.results.files import FORMULA, whole
+from simnav.leaderboard.results.files import FORMULA, complete_file
 from simnav.leaderboard.results.formats import writes
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.results.provenance import Provenance, benchmark_of, distinct
 from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.scoring import SCORES
@@ -100,8 +100,8 @@ class Document:
             "runs": len(self.results),
             "provenance": [p.to_dict() for p in distinct(r.provenance for r in self.results)],
             "scores": {name: {"title": s.title, "unit": s.unit, "better": s.better} for name, s in SCORES.items()},
-            "scenarios": plain(self.scenarios),
-            "ranking": plain(self.ranking),
+            "scenarios": as_json(self.scenarios),
+            "ranking": as_json(self.ranking),
         }
 
     def tables(self) -> Iterator[pa.Table]:
@@ -113,7 +113,7 @@ class Document:
 def _run(result: Result) -> dict[str, Any]:
     scores = ((name, float(result.scores.get(name, math.nan))) for name in SCORES)
     return {
-        **{name: plain(getattr(result, name)) for name in (*_FACTS, *_COSTS)},
+        **{name: as_json(getattr(result, name)) for name in (*_FACTS, *_COSTS)},
         **{column: getattr(result, name) for column, name in _ORIGIN.items()},
         "provenance": result.provenance.id,
         "scores": {name: value if math.isfinite(value) else None for name, value in scores},
@@ -129,7 +129,7 @@ def write_json(document: Document, path: Path) -> list[Path]:
     head = json.dumps(document._head(), indent=1, allow_nan=False, ensure_ascii=False)
     results = document.results if len(document.results) <= MOST_IN_JSON else ()
     lines = (json.dumps(_run(r), allow_nan=False, ensure_ascii=False, separators=(",", ":")) for r in results)
-    with whole(path) as part, open(part, "w", encoding="utf-8") as file:
+    with complete_file(path) as part, open(part, "w", encoding="utf-8") as file:
         file.write(head[: head.rindex("}")].rstrip() + ',\n "results": [')
         for k, line in enumerate(lines):
             file.write((",\n  " if k else "\n  ") + line)
@@ -177,7 +177,7 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
 def _write_tables(path: Path, tables: Iterator[pa.Table], writer: Callable[[Path, pa.Schema], Any]) -> list[Path]:
     """Write one table after the other, at least one, with a writer of pyarrow."""
     first = next(tables)
-    with whole(path) as part, writer(part, first.schema) as file:
+    with complete_file(path) as part, writer(part, first.schema) as file:
         for table in itertools.chain([first], tables):
             file.write_table(table)
     return [path]
@@ -196,7 +196,7 @@ def table(results: Sequence[Result]) -> pa.Table:
         values = [getattr(r, name) for r in results]
         if name in ("draws", "parameters", "learned"):  # runs share them
             texts = {id(v): v for v in values}
-            known = {key: json.dumps(plain(dict(v)), sort_keys=True) for key, v in texts.items()}
+            known = {key: json.dumps(as_json(dict(v)), sort_keys=True) for key, v in texts.items()}
             values = [known[id(v)] for v in values]
         columns[name] = pa.array(values, kinds.get(name, text))
     for name, scores in zip(SCORES, score_matrix([r.scores for r in results], list(SCORES)).T, strict=True):

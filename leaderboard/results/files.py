@@ -10,14 +10,14 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-__all__ = ["FORMULA", "cell", "csv_text", "whole", "write_whole"]
+__all__ = ["FORMULA", "cell", "complete_file", "csv_text", "write_whole"]
 
 #: Begin of a text that a spreadsheet would compute, as a regular expression; a text that is a number is no formula.
 FORMULA = r"^[=+\-@\t\r]"
 
 
 @contextlib.contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def complete_file(path: Path) -> Iterator[Path]:
     """A temporary path to write to, which is moved to its place at the end, so that a reader never sees a part of it.
 
     Raises
@@ -41,7 +41,7 @@ def write_whole(path: Path, content: str | bytes) -> Path:
     OSError
         If writing fails; an older file stays unchanged.
     """
-    with whole(path) as partial:
+    with complete_file(path) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
     return path
 

@@ -44,6 +44,7 @@ __all__ = [
     "atomic",
     "contents",
     "create",
+    "delete_unfinished",
     "described",
     "failure",
     "files_of",
@@ -53,7 +54,6 @@ __all__ = [
     "select",
     "set_aside",
     "steadily",
-    "sweep",
     "tables_of",
 ]
 
@@ -287,7 +287,7 @@ def steadily(scan: Callable[[], T]) -> T:
             return scan()
 
 
-def sweep(path: Path) -> None:
+def delete_unfinished(path: Path) -> None:
     """Delete temporary files that a killed process left."""
     folders = (path, *(path / name for name in (LOOSE, COMPACTED, TRIALS)))
     for temporary in [file for folder in folders for file in folder.glob(".*.tmp")]:

@@ -22,7 +22,7 @@ except ImportError:
 else:
     LOCKS = True
 
-__all__ = ["LOCKS", "scratch", "sweep"]
+__all__ = ["LOCKS", "delete_leftovers", "scratch"]
 
 #: A folder that is younger than this is left alone: its process may not have locked it yet [s].
 YOUNG = 60.0
@@ -43,7 +43,7 @@ def scratch(purpose: str, parent: Path | None = None, *, sweeping: bool = True) 
     """
     place = Path(tempfile.gettempdir()) if parent is None else parent
     if sweeping:
-        sweep(purpose, place)
+        delete_leftovers(purpose, place)
     folder = Path(tempfile.mkdtemp(prefix=_prefix(purpose, place), dir=place))
     lock = _held(folder)
     try:
@@ -54,7 +54,7 @@ def scratch(purpose: str, parent: Path | None = None, *, sweeping: bool = True) 
             os.close(lock)
 
 
-def sweep(purpose: str, place: Path) -> None:
+def delete_leftovers(purpose: str, place: Path) -> None:
     """Remove the folders for a purpose whose processes were killed."""
     if not LOCKS:
         return

@@ -36,6 +36,7 @@ from simnav.leaderboard.results.folder import (
     atomic,
     contents,
     create,
+    delete_unfinished,
     described,
     failure,
     files_of,
@@ -44,7 +45,6 @@ from simnav.leaderboard.results.folder import (
     select,
     set_aside,
     steadily,
-    sweep,
     tables_of,
 )
 from simnav.leaderboard.results.provenance import Provenance
@@ -156,7 +156,7 @@ def provenances(folder: str | os.PathLike[str]) -> dict[str, Provenance]:
 def keys(folder: str | os.PathLike[str]) -> dict[str, Ending]:
     """How each result that is there and whole ended, by key; damaged files are set aside."""
     path = opened(folder)
-    sweep(path)
+    delete_unfinished(path)
 
     def scan() -> dict[str, Ending]:
         found: dict[str, Ending] = {}

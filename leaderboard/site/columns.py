@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["SCORES_SHOWN", "Column", "glossary", "plain"]
+__all__ = ["SCORES_SHOWN", "Column", "column_dicts", "glossary"]
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Column:
         return found
 
 
-def plain(columns: Iterable[Column]) -> list[dict[str, Any]]:
+def column_dicts(columns: Iterable[Column]) -> list[dict[str, Any]]:
     """Columns for the page."""
     return [c.to_dict() for c in columns]
 

@@ -14,7 +14,7 @@ from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, cost_of
 from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.leaderboard.site import charts, curves
 from simnav.leaderboard.site.background import Background
-from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, plain
+from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, column_dicts
 from simnav.leaderboard.site.content import PLAIN, Fact
 from simnav.leaderboard.site.losses import losses
 from simnav.leaderboard.site.rounding import short, shorts
@@ -160,7 +160,7 @@ def estimator_data(
         "table": {
             "name": "main",
             "title": f"{label} by scenario",
-            "columns": plain((*_COLUMNS, *shown)),
+            "columns": column_dicts((*_COLUMNS, *shown)),
             "rows": rows,
         },
         "charts": [c.to_dict() for c in _profile(label, ranking, scenarios)],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from simnav.leaderboard.ranking.statistics import FAILURE
-from simnav.leaderboard.site.columns import Column, plain
+from simnav.leaderboard.site.columns import Column, column_dicts
 from simnav.leaderboard.site.facts import catalogued
 from simnav.leaderboard.site.rounding import short
 
@@ -79,7 +79,7 @@ def losses(label: str, other: str, ranking: Ranking, scenarios: Mapping[str, Sce
         "table": {
             "name": "lost",
             "title": f"Runs that {label} loses against {other}",
-            "columns": plain(_COLUMNS),
+            "columns": column_dicts(_COLUMNS),
             "rows": [_row(label, scenarios[scenario], ratio, score, run) for ratio, score, scenario, run in shown],
         },
     }

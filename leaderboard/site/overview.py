@@ -10,7 +10,7 @@ from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.ranking_table import score_caption, score_title
 from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, cost_of, not_measured
 from simnav.leaderboard.site.charts import accuracy_and_cost, columns, detection, spread, spread_data
-from simnav.leaderboard.site.columns import Column, plain
+from simnav.leaderboard.site.columns import Column, column_dicts
 from simnav.leaderboard.site.rounding import short
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def board_columns(
         Column("bar", "On a log scale", f"{title} with its 95 % interval on a logarithmic scale.", "bar", scale=scale),
         Column("interval", "95 % interval", "Interval of the score.", "interval", hidden=True),
     )
-    return plain((*_BEFORE, *score, *_AFTER, *more))
+    return column_dicts((*_BEFORE, *score, *_AFTER, *more))
 
 
 def board_row(

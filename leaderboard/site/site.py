@@ -92,7 +92,7 @@ def build(
     workers : int
         Processes that write the pages of scenarios, and the results in other formats.
     papers : sequence of ExtraPage, optional
-        Reproductions of papers (`simnav.leaderboard.papers.page.find`).
+        Reproductions of papers (`simnav.leaderboard.papers.page.pages_in`).
     editions : sequence of ExtraPage, optional
         Editions of the board (`simnav.leaderboard.standard.editions.pages_of`).
     runs_shown : int
@@ -100,7 +100,7 @@ def build(
     figures : bool
         Write the charts as SVG and PNG, too, for print.
     sweeps : sequence of SweepFile
-        Over dials of the scenarios (`simnav.leaderboard.site.sweeps.find`).
+        Over dials of the scenarios (`simnav.leaderboard.site.sweeps.sweeps_in`).
 
     Returns
     -------

@@ -14,12 +14,12 @@ from typing import Any
 
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.site.charts import Chart, columns, dial
 from simnav.leaderboard.site.rounding import short
 from simnav.leaderboard.sweep.report import Sweep
 
-__all__ = ["SweepFile", "find", "write"]
+__all__ = ["SweepFile", "sweeps_in", "write"]
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,11 @@ def write(sweep: Sweep) -> Path:
     """Leave what a sweep found in the folder of its results."""
     name = "-".join(d.name if d.name != "value" else d.key for d in sweep.dials)
     safe = "".join(c if c.isalnum() or c in "-_" else "-" for c in name)
-    content = json.dumps(plain(sweep.to_dict()), indent=1, allow_nan=False)
+    content = json.dumps(as_json(sweep.to_dict()), indent=1, allow_nan=False)
     return write_whole(sweep.summary.folder / f"sweep-{safe}.json", content + "\n")
 
 
-def find(folder: Path) -> list[SweepFile]:
+def sweeps_in(folder: Path) -> list[SweepFile]:
     """What sweeps left in the folders inside a folder.
 
     Raises

@@ -67,7 +67,7 @@ class Outdated:
         return said
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain."""
+        """The fields as values that JSON can hold."""
         return {**vars(self), "current": not self}
 
 

@@ -24,7 +24,7 @@ from simnav.estimator.registry import is_own
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.admission import is_scenario_id, label_fault, lookalikes
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
-from simnav.leaderboard.results.files import whole
+from simnav.leaderboard.results.files import complete_file
 from simnav.leaderboard.submission.archive import digest_of, opened, unpack, write_archive
 from simnav.leaderboard.submission.requirement import requirement
 
@@ -209,7 +209,7 @@ def write_bundle(
     )  # fmt: skip
     files[_MANIFEST] = (json.dumps(contents.model_dump(), indent=1, sort_keys=True) + "\n").encode()
     try:
-        with whole(path) as part:
+        with complete_file(path) as part:
             write_archive(part, files)
     except OSError as error:
         raise RequestError(f"{path} cannot be written: {error.strerror or error}") from None

@@ -21,8 +21,8 @@ from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.sampling import findable, sample_size
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
-from simnav.leaderboard.profiles import load as load_profile
 from simnav.leaderboard.profiles import profiles
+from simnav.leaderboard.profiles import read_profile as load_profile
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -142,7 +142,7 @@ class SubmissionReport:
         return bool(self.repeated) and not (self.findings or self.different or self.undecided or self.worse)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain."""
+        """The fields as values that JSON can hold."""
         return asdict(self) | {"passed": self.passed}
 
 

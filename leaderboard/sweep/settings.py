@@ -156,7 +156,7 @@ def settings(scenario: Scenario, dials: Sequence[tuple[Dial, Sequence[float]]]) 
         if any(dial.name == "value" for dial, _ in dials):  # a key path: its name is no part of a scenario's
             parts = [f"{_slug_of_key(dial.key)}-{_slug(v)}" for (dial, _), v in zip(dials, values, strict=True)]
         changes: dict[str, object] = {"name": "-".join([scenario.name, "at", *parts])}
-        changes |= {dial.key: _whole(v) for (dial, _), v in zip(dials, values, strict=True)}
+        changes |= {dial.key: _integral(v) for (dial, _), v in zip(dials, values, strict=True)}
         with mistakes(ValueError):
             found.append(Setting(tuple(values), scenario.with_values(changes)))
     return found
@@ -170,6 +170,6 @@ def _slug_of_key(key: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", key.lower()).strip("-")
 
 
-def _whole(value: float) -> float | int:
+def _integral(value: float) -> float | int:
     """A number as a person would type it: some keys take whole numbers only."""
     return int(value) if value.is_integer() else value

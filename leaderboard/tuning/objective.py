@@ -67,7 +67,7 @@ class Figures:
     failed: int
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The fields as values that JSON can hold."""
         return asdict(self)
 
 

@@ -30,7 +30,7 @@ def test_the_stored_comparison(tmp_path):
 @pytest.mark.parametrize("key", PAPERS)
 def test_the_pages_of_the_papers_hold_the_stored_results(key):
     page = text(f"papers/{key}.md")
-    assert documentation.replaced(page, documentation.blocks(papers.load(key))) == page
+    assert documentation.replaced(page, documentation.blocks(papers.paper_of(key))) == page
 
 
 def test_the_overview_of_the_papers_holds_the_stored_results():
@@ -44,7 +44,7 @@ def test_stored_results_are_small_and_complete():
     assert sorted(f.stem for f in files) == sorted(PAPERS)
     assert sum(f.stat().st_size for f in files) < 1_000_000
     for key in PAPERS:
-        found = stored.load(papers.load(key))
+        found = stored.shipped_reproduction(papers.paper_of(key))
         assert found.count("absent") == 0
         assert all(f.ours is not None for f in found.findings if f.verdict not in ("failed", "unsuitable"))
 

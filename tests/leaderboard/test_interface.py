@@ -24,7 +24,7 @@ from simnav.leaderboard.cli.derived import requested
 from simnav.leaderboard.cli.new_estimator import write_estimator
 from simnav.leaderboard.interface import results_of, scenario_of
 from simnav.leaderboard.results.frame import frame
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 from simnav.recording import Recording
 from simnav.warmup import warmup
 from tests.cases import POND
@@ -158,11 +158,11 @@ def commands() -> dict[str, Callable[..., Any]]:
 def test_a_command_and_its_call_say_the_same(here: Path, name: str) -> None:
     words, call = CALLS[name]
     if name == "leaderboard":
-        called = timeless(plain(call()))
+        called = timeless(as_json(call()))
         said = command(*words)
     else:
         said = command(*words)
-        called = timeless(plain(call()))
+        called = timeless(as_json(call()))
     if name == "list":
         said = {
             "estimators": [e["name"] for e in said["estimators"]],

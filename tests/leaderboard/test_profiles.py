@@ -8,7 +8,7 @@ import pytest
 
 import simnav
 from simnav.estimator import describe, names
-from simnav.leaderboard.profiles import Part, load, profiles
+from simnav.leaderboard.profiles import Part, profiles, read_profile
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scenario.catalogue import headers
 
@@ -17,18 +17,18 @@ def test_the_profiles_that_come_with_simnav():
     assert profiles() == ["full", "quick", "smoke", "standard"]
     known, rows = {h.name: h for h in headers()}, names()
     for name in profiles():
-        profile = load(name)
+        profile = read_profile(name)
         assert profile.title.startswith(name)
         for part in profile.parts:
             assert set(part.scenarios) <= known.keys()
             assert set(part.estimators) <= set(rows)
             assert len(set(part.estimators)) == len(part.estimators)
-    sizes = {name: load(name).results for name in profiles()}
+    sizes = {name: read_profile(name).results for name in profiles()}
     assert sizes["smoke"] < sizes["quick"] < sizes["standard"] < sizes["full"]
 
 
 def test_quick_has_few_rows_and_seeds_enough_to_decide():
-    profile = load("quick")
+    profile = read_profile("quick")
     assert len({e for p in profile.parts for e in p.estimators}) <= 20
     assert all(p.runs == 10 and len(p.estimators) > 5 for p in profile.parts)
     assert not any(describe(e).slow for p in profile.parts for e in p.estimators)
@@ -37,7 +37,7 @@ def test_quick_has_few_rows_and_seeds_enough_to_decide():
 def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
     known = {h.name: h for h in headers()}
     most: dict[tuple[str, str], int] = {}
-    for part in load("standard").parts:
+    for part in read_profile("standard").parts:
         for scenario in part.scenarios:
             for row in part.estimators:
                 most[scenario, row] = max(part.runs, most.get((scenario, row), 0))
@@ -55,7 +55,7 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
 def test_a_profile_of_ones_own(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text('[[part]]\nscenarios = ["open-sea"]\nestimators = ["ekf"]\nruns = 3\n')
-    assert load(file).parts == (Part(("open-sea",), ("ekf",), 3),)
+    assert read_profile(file).parts == (Part(("open-sea",), ("ekf",), 3),)
     for text, says in (
         ("", r"tables \[\[part\]\]"),
         ('[[part]]\nscenarios = ["a"]\nruns = 0', "runs = 0 should be a number of seeds"),
@@ -74,9 +74,9 @@ def test_a_profile_of_ones_own(tmp_path: Path):
     ):
         file.write_text(text)
         with pytest.raises(RequestError, match=says):
-            load(file)
+            read_profile(file)
     with pytest.raises(RequestError, match="no profile 'quik'; did you mean 'quick'"):
-        load("quik")
+        read_profile("quik")
 
 
 def test_a_campaign_runs_the_parts_of_a_profile(tmp_path: Path):

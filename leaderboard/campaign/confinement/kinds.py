@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from simnav.kinds import INSTRUMENTS
-from simnav.leaderboard.campaign.session_class import carry, is_session
+from simnav.leaderboard.campaign.session_class import is_session, pickle_class
 from simnav.plugins import is_file_module, load_plugin
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def homes_of_kinds(instruments: Instruments) -> list[Home]:
         if is_file_module(module):
             found.append((kind, module, str(sys.modules[module].__file__), b""))
         else:
-            found.append((kind, module, "", carry(cls) if is_session(module) else b""))
+            found.append((kind, module, "", pickle_class(cls) if is_session(module) else b""))
     return found
 
 

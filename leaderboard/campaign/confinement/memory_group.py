@@ -34,7 +34,7 @@ class MemoryGroup:
         self._limit, self._kills = "", ""
         for parent, limit, kills in _candidates():
             with contextlib.suppress(OSError):
-                _sweep(parent)
+                _delete_empty_groups(parent)
                 folder = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))
                 self._folder, self._limit, self._kills = folder, limit, kills
                 try:
@@ -80,7 +80,7 @@ class MemoryGroup:
                 time.sleep(0.01)
 
 
-def _sweep(parent: Path) -> None:
+def _delete_empty_groups(parent: Path) -> None:
     """Remove the empty groups of processes that were killed."""
     for folder in parent.glob(f"{_PREFIX}*-*"):
         owner = folder.name.removeprefix(_PREFIX).partition("-")[0]

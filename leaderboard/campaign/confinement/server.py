@@ -65,7 +65,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     become_reaper()
     keep_freed_memory()
-    _load()
+    _load_kernels()
     with scratch("estimator") as own:
         _serve(control, own)
 
@@ -94,7 +94,7 @@ def _serve(control: socket.socket, own: Path) -> None:
         _remove(own)
 
 
-def _load() -> None:
+def _load_kernels() -> None:
     """simnav's own estimators and all their kernels; plug-ins of others are loaded in their own processes only."""
     from simnav.compiled import cache_directory, kernels
     from simnav.estimator.registry import discover_own

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from simnav.leaderboard.campaign.fingerprint import estimator_source
-from simnav.leaderboard.campaign.session_class import carry, is_session, receive, source_of
+from simnav.leaderboard.campaign.session_class import is_session, pickle_class, receive, source_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from tests.cases import POND
@@ -114,7 +114,7 @@ class Mine:
 
 
 def test_a_class_is_carried_with_what_it_uses(session: Any) -> None:
-    data = carry(session(BASE).Mine)
+    data = pickle_class(session(BASE).Mine)
     del sys.modules["a_session"]
     assert receive(data)().two == 2
 
@@ -218,7 +218,7 @@ def test_the_file_of_the_class_of_a_value_counts(session: Any, tmp_path: Path, m
 def test_what_cannot_be_sent_is_told(session: Any) -> None:
     made = session(BASE.replace("FACTOR = 2", "import threading\nFACTOR = threading.Lock()"))
     with pytest.raises(RequestError, match=r"Mine cannot be sent to a worker .* put it into a file"):
-        carry(made.Mine)
+        pickle_class(made.Mine)
 
 
 def test_a_class_of_a_module_beside_the_script_takes_part(tmp_path: Path):

@@ -26,12 +26,12 @@ from simnav.leaderboard.papers.comparison import GAIN, TOLERANCE, judge, judge_g
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.figures import ERRORS
 from simnav.leaderboard.papers.measures import measure, value_of
-from simnav.leaderboard.papers.page import find as find_pages
+from simnav.leaderboard.papers.page import pages_in as find_pages
 from simnav.leaderboard.papers.paper import Figure, Gain, Method, NotShown, Paper, Table, Value
 from simnav.leaderboard.papers.report import paper_tables, summary, write_csv
-from simnav.leaderboard.papers.reproduction import Reproduction, fill, find, find_method
+from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method, finding_of
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.result import Result
 from simnav.scenario import load
@@ -39,7 +39,7 @@ from simnav.scoring import SCORES
 from tests.cases import ship
 
 ROOT = Path(__file__).parents[3]
-ALL = [papers.load(key) for key in PAPERS]
+ALL = [papers.paper_of(key) for key in PAPERS]
 
 
 # -- the rule ------------------------------------------------------------------------------------------------
@@ -170,7 +170,7 @@ def found(row, results, labels=None):
     by = {}
     for r in results:
         by.setdefault((r.scenario, r.estimator), []).append(r)
-    return find("table", row, "pond-v1", labels or {"A": "a", "B": "b"}, by)
+    return finding_of("table", row, "pond-v1", labels or {"A": "a", "B": "b"}, by)
 
 
 def test_a_row_that_agrees_gives_no_reason():
@@ -244,7 +244,7 @@ def test_kinds_of_rows_are_counted_apart():
     results = [result(e, seed, **scores) for e in "ab" for seed in range(3)]
     findings = [found(row, results) for row in rows]
     assert [f.verdict for f in findings] == ["agrees", "agrees", "agrees", "differs", "ours"]
-    nothing = Reproduction(papers.load("guo-2026"), range(3), findings, {}, [])
+    nothing = Reproduction(papers.paper_of("guo-2026"), range(3), findings, {}, [])
     assert summary(nothing).endswith(
         "figures: 1 agrees; one-sided bounds: 1 agrees; one-sided bounds on time and memory: 1 agrees, 1 differs"
     )
@@ -312,7 +312,7 @@ def test_stored_results_come_back(pond_paper, tmp_path):
     before.results[1] = dataclasses.replace(before.results[1], provenance=Provenance(commit="abc", cpu="fast"))
     before = fill(paper, before.stands_for, before.results, before.seeds)
     stored.save(before, tmp_path)
-    after = stored.load(paper, tmp_path)
+    after = stored.shipped_reproduction(paper, tmp_path)
     assert [f.verdict for f in after.findings] == [f.verdict for f in before.findings]
     assert {"timeout", "ok"} == {r.status for r in after.results}
     for a, b in zip(after.findings, before.findings, strict=True):
@@ -323,7 +323,7 @@ def test_stored_results_come_back(pond_paper, tmp_path):
 @pytest.mark.parametrize("paper", ALL, ids=lambda p: p.key)
 def test_what_is_undecided_in_the_stored_results_is_so_for_no_lack_of_runs(paper):
     """Its interval is narrower than the band of figures that agree, and lies across one end of it."""
-    for f in stored.load(paper).findings:
+    for f in stored.shipped_reproduction(paper).findings:
         if f.verdict != "undecided":
             continue
         assert f.ours is not None
@@ -337,10 +337,10 @@ def test_what_is_undecided_in_the_stored_results_is_so_for_no_lack_of_runs(paper
 
 def test_stored_results_that_are_missing_or_damaged_get_a_sentence(tmp_path):
     with pytest.raises(ValueError, match=r"no stored results of guo-2026: .*guo-2026.parquet is missing"):
-        stored.load(papers.load("guo-2026"), tmp_path)
+        stored.shipped_reproduction(papers.paper_of("guo-2026"), tmp_path)
     (tmp_path / "guo-2026.parquet").write_bytes(b"PAR1 not really")
     with pytest.raises(ValueError, match="cannot be read"):
-        stored.load(papers.load("guo-2026"), tmp_path)
+        stored.shipped_reproduction(papers.paper_of("guo-2026"), tmp_path)
 
 
 # -- the papers ----------------------------------------------------------------------------------------------
@@ -410,18 +410,18 @@ def test_filters_are_there_and_fit(paper):
 
 def test_papers_figures():
     """Table 2 of Mao, Wang and Fu (2025) and Table 3 of Zhan et al. (2026), as printed."""
-    rows = {(r.method, r.score): r.paper for r in papers.load("mao-2025").rows() if isinstance(r, Value)}
+    rows = {(r.method, r.score): r.paper for r in papers.paper_of("mao-2025").rows() if isinstance(r, Value)}
     east, north = (
         [figure for (_, score), figure in rows.items() if score == f"sigma_{axis}_rmse" and figure is not None]
         for axis in ("east", "north")
     )
     assert east == [3.65, 1.86, 1.28, 1.20]
     assert north == [3.55, 1.65, 1.37, 1.07]
-    first = [r for r in papers.load("zhan-2026").tables[0].rows if isinstance(r, Value)]
+    first = [r for r in papers.paper_of("zhan-2026").tables[0].rows if isinstance(r, Value)]
     position = {r.method: r.paper for r in first if r.score == "east_rmse"}
     assert position["KF"] == 2.6649
     # The gains that the paper prints follow from its table.
-    claims = {r.score: r.paper for r in papers.load("zhan-2026").rows() if isinstance(r, Gain)}
+    claims = {r.score: r.paper for r in papers.paper_of("zhan-2026").rows() if isinstance(r, Gain)}
     for score in ("east_rmse", "north_rmse"):
         of = {r.method: r.paper for r in first if r.score == score}
         assert 1.0 - of["ADKF, three segments"] / of["KF"] == pytest.approx(claims[score], abs=5e-4)
@@ -434,7 +434,7 @@ def test_second_set_of_intervals():
 
 
 def test_a_variant_is_a_scenario_of_its_own():
-    paper = papers.load("zhan-2026")
+    paper = papers.paper_of("zhan-2026")
     clean = paper.scenario("uuv-lake-clean")
     assert clean.id == "uuv-lake-clean-v1"
     assert {f.kind for f in clean.faults} == {"multipath"}
@@ -623,7 +623,7 @@ def test_the_command_and_its_call_say_the_same(tiny):
     done = call("mao-2025", "--workers", "1", "--output", "out", "--json")
     document = json.loads(done.stdout)
     found = simnav.reproduce("mao-2025", output="out", workers=1)
-    called = plain(found.to_dict())
+    called = as_json(found.to_dict())
     assert {key: document[key] for key in called} == called
     assert set(document) - set(called) == {"contents", "csv", "page", "figures"}
     assert len(found.to_frame()) == len(document["rows"])
@@ -671,7 +671,7 @@ def test_mistakes_get_a_sentence(tmp_path, monkeypatch):
 def test_tables_hold_every_figure_of_the_papers(tmp_path):
     """Without any estimator all rows with a figure are shown as not registered."""
     for paper in ALL:
-        findings = [find(t.title, row, "x", {}, {}) for t in paper.tables for row in t.rows]
+        findings = [finding_of(t.title, row, "x", {}, {}) for t in paper.tables for row in t.rows]
         nothing = Reproduction(paper, range(3), findings, dict.fromkeys(m.name for m in paper.methods), [])
         assert nothing.count("absent") == len(findings)
         shown = list(paper_tables(nothing))
@@ -683,7 +683,7 @@ def test_tables_hold_every_figure_of_the_papers(tmp_path):
 
 def test_keys_and_aliases():
     assert [key_of(alias) for alias in ALIASES] == list(PAPERS)
-    assert papers.load("003") is papers.load("zhan-2026")
+    assert papers.paper_of("003") is papers.paper_of("zhan-2026")
     for paper in ALL:
         assert paper.doi or paper.key == "mao-2025"
         assert paper.title in paper.citation
@@ -699,7 +699,7 @@ def test_options_that_contradict_each_other_get_a_sentence():
 
 def test_a_paper_can_be_cut_to_some_methods():
     """So that a comparison of two quick filters can have its 200 runs."""
-    whole = papers.load("jiang-2026")
+    whole = papers.paper_of("jiang-2026")
     part = whole.only(["EKF", "UKF"])
     assert {m.name for m in part.methods} == {"EKF", "UKF"}
     assert 0 < len(list(part.rows())) < len(list(whole.rows()))

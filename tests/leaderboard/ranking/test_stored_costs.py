@@ -57,10 +57,10 @@ def test_the_table_that_comes_with_simnav_has_all_its_rows():
     assert costs.measured.cpu
     ship = record(load("fishing-vessel").model_copy(update={"duration": 20.0}), 0)
     for name in mine:
-        with_imu, without = (costs.find(name, [plain]) for plain in ("ekf", "ship-ekf"))
+        with_imu, without = (costs.multiple_of(name, [plain]) for plain in ("ekf", "ship-ekf"))
         assert with_imu is not None
         assert (without is None) == bool(lacking(make(name).needs, ship.instruments)), name
-    own = [costs.find(name, [name]) for name in ("ekf", "ship-ekf", "ekf-rts", "ship-ekf-rts")]
+    own = [costs.multiple_of(name, [name]) for name in ("ekf", "ship-ekf", "ekf-rts", "ship-ekf-rts")]
     assert all(c is not None and 0.9 < c.value < 1.1 for c in own)
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from simnav.leaderboard.results.plain import plain
+from simnav.leaderboard.results.plain import as_json
 
 
 def test_json_has_no_nan_and_knows_arrays():
     value = {"a": np.array([1.0, np.nan]), "b": float("inf"), "c": Path("x"), 3: np.float64(2.5), "d": (True, None)}
-    assert plain(value) == {"a": [1.0, None], "b": None, "c": "x", "3": 2.5, "d": [True, None]}
+    assert as_json(value) == {"a": [1.0, None], "b": None, "c": "x", "3": 2.5, "d": [True, None]}
 
 
 def test_dataclasses_become_dicts_all_the_way_down():
@@ -20,4 +20,4 @@ def test_dataclasses_become_dicts_all_the_way_down():
     class Point:
         x: float
 
-    assert plain({"p": (Point(1.0), Point(float("nan")))}) == {"p": [{"x": 1.0}, {"x": None}]}
+    assert as_json({"p": (Point(1.0), Point(float("nan")))}) == {"p": [{"x": 1.0}, {"x": None}]}

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from simnav.leaderboard import standard
-from simnav.leaderboard.profiles import load
+from simnav.leaderboard.profiles import read_profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.runs import group
@@ -42,7 +42,7 @@ def test_its_versions_are_those_of_today() -> None:
 
 
 def test_the_readme_and_the_history_are_made_from_it(results: list[Result], ranking: Ranking) -> None:
-    lacking = sum(missing(load(standard.PROFILE), results).values())
+    lacking = sum(missing(read_profile(standard.PROFILE), results).values())
     text = readme.marked(ROOT / "README.md")
     assert text == readme.tables(ranking, results, len(results) + lacking)
     assert ("Preliminary" in text) == bool(lacking)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import simnav
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.site.sweeps import find
+from simnav.leaderboard.site.sweeps import sweeps_in
 from simnav.leaderboard.sweep.breaking import breaking_point, crossing
 from simnav.leaderboard.sweep.settings import chosen_dials, parse_dials, settings
 from simnav.scenario import Scenario, load
@@ -136,7 +136,7 @@ def test_a_whole_sweep(sweep, scenario: Scenario):
     assert len(table) == 3
     assert json.loads(json.dumps(sweep.to_dict()))["scenario"] == scenario.id
     assert len(sweep.plot().axes) == 1
-    (left,) = find(sweep.summary.folder.parent)  # for the site
+    (left,) = sweeps_in(sweep.summary.folder.parent)  # for the site
     assert left.scenario == scenario.id
     assert left.section(0)["breaking"][1]["value"] == pytest.approx(limit.value.value, rel=1e-3)
 
