@@ -401,7 +401,8 @@ def test_who_was_killed_from_outside_is_tried_once_more(
     reason = "the process died (SIGKILL) without an answer"
     killed = Attempt("error", reason, None, 1.0, 0, "landlock")
     answers = [killed] * times + [Attempt("ok", "", None, 1.0, 0, "landlock")]
-    monkeypatch.setattr(attempt_module, "_once", lambda *_: answers.pop(0))
+    monkeypatch.setattr(attempt_module, "prepare", lambda *_, **__: None)
+    monkeypatch.setattr(attempt_module, "attempt", lambda *_: answers.pop(0))
     monkeypatch.setattr(attempt_module, "_SETTLE", 0.0)
     found = attempt_module.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
     assert (found.status, found.reason) == (("ok", "") if times == 1 else ("error", reason))

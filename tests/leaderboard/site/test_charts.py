@@ -6,8 +6,10 @@ import re
 
 import pytest
 
-from simnav.leaderboard.site import charts
+from simnav.leaderboard.figures import appearance, style
+from simnav.leaderboard.site import charts, print_figures
 from simnav.leaderboard.site.library import VEGA_LITE
+from simnav.leaderboard.site.pages import TEMPLATES
 from simnav.leaderboard.site.print_figures import filled
 
 FONT = 11
@@ -54,3 +56,16 @@ def test_a_long_name_in_the_middle_is_not_cut() -> None:
         {"rows": front | {"low": [0.99, 1.0], "high": [1.01, 1.02], "cost": [1.0, 1.01], "error": [3.0, 2.0]}},
     )
     assert names_of(chart, 620)["last-" + "x" * 40][0] == "end"
+
+
+def test_scripts_of_the_site_have_no_colours_of_rows_of_their_own() -> None:
+    """Colours, lines and inks of all charts are in one file, which the site hands to the browser."""
+    text = (TEMPLATES / "charts.js").read_text()
+    assert text.count("$APPEARANCE") == 1
+    told = appearance.for_browser()
+    for light, dark in appearance.PALETTE:
+        assert light not in text
+        assert dark not in text
+    assert told["palettes"]["light"][0] == style.PALETTE[0][0] == print_figures._INKS["$strong"]
+    assert {*told["inks"]} == {*told["palettes"]} == {"light", "dark"}
+    assert len(told["dashes"]) == len(appearance.LINES)
