@@ -29,5 +29,5 @@ def require_links(package: Path) -> None:
         if not (package / name).is_dir():
             raise ImportError(
                 f"{package / name} should be a symbolic link to ../{name}, and this copy of simnav has no symbolic "
-                "links: clone it with 'git clone -c core.symlinks=true' (Windows: in developer mode), or install a wheel"
+                "links: clone it with 'git clone -c core.symlinks=true' (Windows: developer mode), or install a wheel"
             )
