@@ -15,7 +15,7 @@ from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers import paper as papers
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Paper
-from simnav.leaderboard.papers.report import sheets, verdicts
+from simnav.leaderboard.papers.report import sheets, single_run_sentence, verdicts
 from simnav.leaderboard.papers.reproduction import fill, find_method, load_results
 from simnav.leaderboard.papers.sequential import LIMIT
 from simnav.leaderboard.papers.stored import load, provenance, save
@@ -62,6 +62,7 @@ def blocks(paper: Paper) -> dict[str, str]:
     tables = [
         "\n".join(f"- {plural[0].upper()}{plural[1:]}: {text}." for kind, plural in KINDS_OF_ROWS.items()
                   if (text := verdicts(found, kind))),
+        single_run_sentence(found),
         *(f"Computed on {p.date} with {_versions(p)}, on {p.cpu}." for p in provenance(paper)),
     ]  # fmt: skip
     for sheet in sheets(found):
@@ -85,12 +86,15 @@ def _versions(p: Provenance) -> str:
 
 def overview() -> str:
     """A table of the papers with the verdicts on their rows."""
-    lines = [_line(("paper", "comparison", *KINDS_OF_ROWS.values())), _line(("---",) * (2 + len(KINDS_OF_ROWS)))]
+    titles = ("paper", "comparison", *KINDS_OF_ROWS.values(), "a single run of ours")
+    lines = [_line(titles), _line(("---",) * len(titles))]
     for key in PAPERS:
         paper = papers.load(key)
         found = load(paper)
         counts = (verdicts(found, kind) or "none" for kind in KINDS_OF_ROWS)
-        lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, *counts)))
+        inside, known = found.single_runs
+        single = f"{inside} of {known} that do not agree" if known else "–"
+        lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, *counts, single)))
     return "\n".join(lines)
 
 

@@ -22,7 +22,16 @@ from simnav.leaderboard.figures.panels import Bar, bars, broken
 from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.papers import ALIASES, PAPERS, key_of, sequential, stored
 from simnav.leaderboard.papers import paper as papers
-from simnav.leaderboard.papers.comparison import GAIN, TOLERANCE, judge, judge_gain
+from simnav.leaderboard.papers.comparison import (
+    FEWEST,
+    GAIN,
+    MANY,
+    TOLERANCE,
+    judge,
+    judge_gain,
+    judge_single,
+    single_runs,
+)
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.figures import ERRORS
 from simnav.leaderboard.papers.measures import measure, value_of
@@ -171,6 +180,53 @@ def found(row, results, labels=None):
     for r in results:
         by.setdefault((r.scenario, r.estimator), []).append(r)
     return find("table", row, "pond-v1", labels or {"A": "a", "B": "b"}, by)
+
+
+@pytest.mark.parametrize("runs", [FEWEST, 10, MANY, 200])
+def test_the_range_of_single_runs_holds_95_percent_of_further_runs(runs):
+    """One more run of the same kind, 4000 times: log-normal errors, as those of navigation are."""
+    rng = np.random.default_rng(runs)
+    inside = 0
+    for _ in range(4000):
+        *seen, another = np.exp(0.5 * rng.standard_normal(runs + 1))
+        inside += judge_single(single_runs(seen), another) == "inside"
+    assert inside / 4000 == pytest.approx(0.95, abs=0.015)
+
+
+def test_too_few_single_runs_decide_nothing():
+    assert judge_single(single_runs([1.0] * (FEWEST - 1)), 1.0) == ""
+    assert judge_single(single_runs([0.0, 1.0, 2.0]), 1.0) == ""  # no logarithm
+    assert judge_single(single_runs([1.0, 2.0, 3.0, math.nan]), 2.0) == "inside"
+
+
+def single_row(row, *runs):
+    """A row from the figures of each run, for each of its methods."""
+    names = ("a", "b")[: len(runs)]
+    made = {
+        ("s-v1", n): [Result("s-v1", k, n, {}, False, "ok", "", {"heading_rmse": v}) for k, v in enumerate(values)]
+        for n, values in zip(names, runs, strict=True)
+    }
+    return find("t", row, "s-v1", {n: n for n in names}, made)
+
+
+def test_a_printed_run_may_lie_in_the_range_where_the_mean_differs():
+    spread = np.radians(np.exp(np.linspace(-1.0, 1.0, 60)))
+    found = single_row(Value("s", "a", "heading_rmse", 2.2), spread)
+    assert (found.verdict, found.single_verdict) == ("differs", "inside")
+    assert found.single.low == pytest.approx(math.exp(-0.95), rel=0.05)
+    far = single_row(Value("s", "a", "heading_rmse", 9.0), spread)
+    assert (far.verdict, far.single_verdict) == ("differs", "above")
+    assert single_row(Value("s", "a", "heading_rmse", 9.0, "at-most"), spread).single is None
+
+
+def test_the_range_of_a_gain_is_of_the_ratios_on_the_same_seeds():
+    theirs = np.radians(np.exp(np.linspace(-1.0, 1.0, 60)))
+    found = single_row(Gain("s", "a", "b", "heading_rmse", 0.3), 0.9 * theirs, theirs)
+    assert (found.verdict, found.single_verdict) == ("differs", "above")  # the paper's gain is above ours
+    assert found.single.low == pytest.approx(0.9)
+    assert found.single.high == pytest.approx(0.9)
+    scattered = 0.9 * theirs * np.exp(0.5 * np.sin(np.arange(60.0)))
+    assert single_row(Gain("s", "a", "b", "heading_rmse", 0.3), scattered, theirs).single_verdict == "inside"
 
 
 def test_a_row_that_agrees_gives_no_reason():
