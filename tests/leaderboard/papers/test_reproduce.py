@@ -37,6 +37,7 @@ from simnav.leaderboard.papers.figures import ERRORS
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.page import find as find_pages
 from simnav.leaderboard.papers.paper import Figure, Gain, Method, NotShown, Paper, Table, Value
+from simnav.leaderboard.papers.ratio_figure import ratio_figure, ratios
 from simnav.leaderboard.papers.report import paper_tables, summary, write_csv
 from simnav.leaderboard.papers.reproduction import Reproduction, fill, find, find_method
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
@@ -620,7 +621,7 @@ def test_the_command(tiny):
     assert float(rows[1]["ours"]) == 2.0
     assert [os.path.basename(p) for p in document["figures"]] == [
         "figure-1.png", "figure-2.png", "figure-2-b.png", "figure-4.png", "figure-4-route.png", "figure-5.png",
-        "figure-6.png", "distribution.png",
+        "figure-6.png", "distribution.png", "sigma.png", "claims.png",
     ]  # fmt: skip
     assert [(c["number"], c["where"]) for c in document["contents"]] == [
         ("Table 1", "table 'Sigma'"),
@@ -663,7 +664,7 @@ def test_the_site_shows_what_was_reproduced(tiny):
     assert site.exit_code == 0, site.output
     page = Path("site/paper-mao-2025.html").read_text(encoding="utf-8")
     shown = re.findall(r'<img src="([^"]+)"', page)
-    assert len(shown) == 8
+    assert len(shown) == 10  # two of them are of its tables
     assert all((Path("site") / name).is_file() for name in shown)
     assert 'href="paper-mao-2025.html"' in Path("site/index.html").read_text(encoding="utf-8")
     assert 'href="index.html"' in page
@@ -735,6 +736,39 @@ def test_tables_hold_every_figure_of_the_papers(tmp_path):
         assert f"{len(findings)} rows without a registered estimator" in summary(nothing)
         with write_csv(nothing, tmp_path / "t.csv").open(encoding="utf-8") as file:
             assert len(file.readlines()) == len(findings) + 1
+
+
+def test_the_pages_show_every_drawn_figure_and_no_other():
+    folder = ROOT / "docs" / "papers"
+    shown = {image for page in folder.glob("*.md") for image in re.findall(r"\((figures/[^)]*)\)", page.read_text())}
+    assert shown == {p.relative_to(folder).as_posix() for p in folder.glob("figures/*/*.png")}
+    assert len(shown) > len(PAPERS)
+
+
+def a_ratio(value: float, paper: float = 1.0):
+    """A row whose 60 runs have a figure, beside a paper's."""
+    spread = np.radians(value * np.exp(0.1 * np.linspace(-1.0, 1.0, 60)))
+    return single_row(Value("s", "a", "heading_rmse", paper), spread)
+
+
+def test_figures_over_the_papers_are_drawn_within_the_axis():
+    """A method that is 600 times worse is written at the edge, and does not change where the others are."""
+    near, far = ratios([a_ratio(1.1), a_ratio(600.0)])
+    assert near.value == pytest.approx(1.1, rel=0.01)
+    assert near.single_low < near.low < near.high < near.single_high
+    assert (near.verdict, far.verdict) == ("agrees", "differs")
+    fig = ratio_figure([near, far], "Errors")
+    (ax,) = fig.axes
+    assert ax.get_xlim()[1] < 6.0
+    assert ["600 times" in text.get_text() or "601 times" in text.get_text() for text in ax.texts] == [True]
+
+
+def test_of_a_gain_the_ratio_of_the_errors_is_compared():
+    theirs = np.radians(np.exp(np.linspace(-1.0, 1.0, 60)))
+    (found,) = ratios([single_row(Gain("s", "a", "b", "heading_rmse", 0.5), 0.5 * theirs, theirs)])
+    assert found.value == pytest.approx(1.0)
+    assert found.band == pytest.approx((0.5**0.5, 0.5 ** (1.0 / 1.5 - 1.0)))
+    assert ratios([single_row(Gain("s", "a", "b", "heading_rmse"), theirs, theirs)]) == []  # the paper has no figure
 
 
 def test_keys_and_aliases():
