@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from simnav.leaderboard.papers.comparison import Single
 from simnav.leaderboard.papers.paper import Paper, Row
 from simnav.leaderboard.ranking.statistics import Interval
 
@@ -37,6 +38,12 @@ class Finding:
         Labels of the estimators that stand for the row's methods.
     failed : int
         Number of runs that failed.
+    single : Interval or None
+        The range that holds 95 % of our single runs, in the unit of ``ours``
+        (`simnav.leaderboard.papers.comparison.single_runs`). None where the paper has a bound or no figure.
+    single_verdict : str
+        Whether the paper's figure lies in this range: ``inside``, ``below`` or ``above``; empty where it is not known.
+        For a gain it is the gain that is below or above.
     """
 
     table: str
@@ -46,6 +53,8 @@ class Finding:
     why: str = ""
     estimators: tuple[str, ...] = ()
     failed: int = 0
+    single: Interval | None = None
+    single_verdict: Single = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.campaign import run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest, split_estimators
-from simnav.leaderboard.papers.comparison import Verdict, as_gain, judge, judge_gain
+from simnav.leaderboard.papers.comparison import Single, Verdict, as_gain, judge, judge_gain, judge_single, single_runs
 from simnav.leaderboard.papers.figures import draw
 from simnav.leaderboard.papers.findings import Finding, Findings
 from simnav.leaderboard.papers.measures import measure, value_of
@@ -38,6 +38,13 @@ class Reproduction(Findings):
     def count(self, verdict: str, kind: str = "") -> int:
         """Number of rows with a verdict; of one kind (`simnav.leaderboard.papers.paper.kind_of`), or of all."""
         return sum(f.verdict == verdict and kind in ("", kind_of(f.row)) for f in self.findings)
+
+    @property
+    def single_runs(self) -> tuple[int, int]:
+        """Of the figures and gains that differ, or are undecided: how many lie in the range of our single runs, of how
+        many with such a range."""
+        known = [f for f in self.findings if f.verdict in ("differs", "undecided") and f.single_verdict]
+        return sum(f.single_verdict == "inside" for f in known), len(known)
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as values that JSON can hold."""
@@ -84,6 +91,7 @@ def _row_dict(f: Finding) -> dict[str, Any]:
     gain = isinstance(f.row, Gain)
     paper: Any = f.row.paper
     ours = as_gain(f.ours) if gain and f.ours is not None else f.ours
+    single = as_gain(f.single) if gain and f.single is not None else f.single
     return {
         "table": f.table,
         "scenario": f.row.scenario,
@@ -102,6 +110,9 @@ def _row_dict(f: Finding) -> dict[str, Any]:
         "high": None if ours is None else ours.high,
         "runs": 0 if ours is None else ours.runs,
         "failed": f.failed,
+        "single_low": None if single is None else single.low,
+        "single_high": None if single is None else single.high,
+        "single_verdict": f.single_verdict,
         "verdict": f.verdict,
         "why": f.why,
     }
@@ -257,6 +268,11 @@ def finding_of(
         if row.paper is None:
             return Finding(table, row, ours, "ours", "", names, failed)
         verdict = judge_gain(ours, 1.0 - row.paper)
+        single = single_runs(a / values[1][s] for s, a in values[0].items() if values[1].get(s, 0.0) > 0.0)
+        # A ratio below the range is a gain above it.
+        found = judge_single(single, 1.0 - row.paper)
+        of_gain: dict[Single, Single] = {"below": "above", "above": "below"}
+        word = of_gain.get(found, found)
         # The side is that of the ratio: a higher ratio is a smaller gain.
         why = {-1: row.higher, 1: row.lower}
     else:
@@ -267,9 +283,13 @@ def finding_of(
             return Finding(table, row, ours, "ours", "", names, failed)
         verdict = judge(ours, row.paper, row.rule)
         why = {-1: row.lower, 1: row.higher}
+        single, word = None, ""
+        if kind_of(row) == "figure":
+            single = single_runs(values[0].values())
+            word = judge_single(single, row.paper)
     if failures[0] or (failed and isinstance(row, Gain)):  # a run that failed is worse than any figure
         verdict = Verdict("differs", 1 if failures[0] else -1)
     sentence = ""
     if verdict.word == "differs":
         sentence = why[verdict.side] or _UNEXPLAINED
-    return Finding(table, row, ours, verdict.word, sentence, names, failed)
+    return Finding(table, row, ours, verdict.word, sentence, names, failed, single, word)
