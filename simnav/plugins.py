@@ -18,6 +18,7 @@ import traceback
 import types
 import warnings
 from collections.abc import Callable, Iterator
+from functools import wraps
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -28,12 +29,15 @@ __all__ = [
     "Registry",
     "code_digest",
     "code_text",
+    "declared_in",
     "exception_of",
     "import_file",
     "is_file_module",
     "load_plugin",
     "place_of",
+    "registered_kind",
     "source_digest",
+    "with_named_errors",
 ]
 
 C = TypeVar("C")
@@ -158,6 +162,79 @@ def code_digest(source: bytes) -> str:
     with contextlib.suppress(SyntaxError, ValueError):
         source = code_text(ast.parse(source)).encode(errors="surrogatepass")
     return hashlib.blake2b(source, digest_size=16).hexdigest()
+
+
+def declared_in(cls: type[Any]) -> str:
+    """Name and file of a class, for messages."""
+    return f"{cls.__qualname__} in {Path(place_of(cls)[0]).name}"
+
+
+def registered_kind(cls: Any, base: type[Any], *, decorator: str, sort: str, example: str) -> str:
+    """The kind that a specification declares: the default of its field ``kind``.
+
+    Parameters
+    ----------
+    cls : object
+        What was decorated.
+    base : type
+        Class that it should be derived from.
+    decorator : str
+        Name of the decorator, for messages.
+    sort : str
+        What is registered, such as ``vessel``, for messages.
+    example : str
+        A kind, for messages.
+
+    Raises
+    ------
+    PluginError
+        If it is not derived from ``base``, declares no kind, or one of its fields hides an attribute of ``base``.
+    """
+    from simnav.spec import hidden_attribute  # late: pydantic takes long to import
+
+    if not (isinstance(cls, type) and issubclass(cls, base)):
+        home = base.__module__.rpartition(".")[0]
+        raise PluginError(f"@{decorator}: {cls!r} is not a subclass of {home}.{base.__qualname__}")
+    name = cls.model_fields["kind"].default  # type: ignore[attr-defined]
+    if not isinstance(name, str):
+        raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal[{example!r}] = {example!r}")
+    hidden = hidden_attribute(cls, base)
+    if hidden is not None:
+        raise PluginError(f"{sort} {name!r}: the field {hidden!r} of {cls.__qualname__} hides {base.__name__}.{hidden}")
+    return name
+
+
+def with_named_errors(
+    method: Callable[..., Any],
+    error: type[Exception],
+    label: Callable[..., str],
+    passed: tuple[type[Exception], ...] = (MemoryError,),
+) -> Callable[..., Any]:
+    """Wrap a method of a specification, so that its errors name the kind and the place of its code.
+
+    Parameters
+    ----------
+    method : callable
+        The method.
+    error : type
+        Class of the exception that is raised.
+    label : callable
+        Gives the begin of the message; called with the arguments of the method.
+    passed : tuple of type
+        Exceptions that are raised as they are.
+    """
+
+    @wraps(method)
+    def named(self: Any, *args: Any, **rest: Any) -> Any:
+        try:
+            return method(self, *args, **rest)
+        except passed:
+            raise
+        except Exception as cause:
+            cls = type(self)
+            raise error(f"{label(self, *args, **rest)} ({declared_in(cls)}): {exception_of(cls, cause)}") from cause
+
+    return named
 
 
 def place_of(cls: Any) -> tuple[str, int]:

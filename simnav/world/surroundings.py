@@ -13,16 +13,14 @@ those that it needs, at its place and time; so a new part changes no signature. 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import wraps
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from simnav.plugins import PluginError, Registry, exception_of, place_of
-from simnav.spec import Spec, SpecError, closest, hidden_attribute
+from simnav.plugins import Registry, registered_kind, with_named_errors
+from simnav.spec import Spec, SpecError, closest
 from simnav.types import Array
 from simnav.world.current import Current, WaterFlow
 from simnav.world.sea import Sea, Waves
@@ -83,38 +81,15 @@ def register_surrounding(cls: type[S]) -> type[S]:
     PluginError
         If the class is not a subclass of `SurroundingSpec`, another class has its name, or a field hides an attribute.
     """
-    if not (isinstance(cls, type) and issubclass(cls, SurroundingSpec)):
-        raise PluginError(f"@register_surrounding: {cls!r} is not a subclass of simnav.world.SurroundingSpec")
-    name = cls.model_fields["kind"].default
-    if not isinstance(name, str):
-        raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['sky'] = 'sky'")
-    hidden = hidden_attribute(cls, SurroundingSpec)
-    if hidden is not None:
-        raise PluginError(
-            f"surrounding {name!r}: the field {hidden!r} of {cls.__qualname__} hides SurroundingSpec.{hidden}"
-        )
+    name = registered_kind(cls, SurroundingSpec, decorator="register_surrounding", sort="surrounding", example="sky")
     SURROUNDINGS.add(name, cls)
-    cls.build = _named(cls.build)  # type: ignore[method-assign]
+    build = with_named_errors(cls.build, SurroundingsError, _label, (SpecError, MemoryError))
+    cls.build = build  # type: ignore[method-assign]
     return cls
 
 
-def _named(build: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap ``build`` of a part, so that its errors name the part."""
-
-    @wraps(build)
-    def named(self: SurroundingSpec, name: str, seed: int) -> Any:
-        try:
-            return build(self, name, seed)
-        except (SpecError, MemoryError):
-            raise
-        except Exception as error:
-            cls = type(self)
-            file = Path(place_of(cls)[0]).name
-            raise SurroundingsError(
-                f"surroundings.{name} of kind {self.kind!r} ({cls.__qualname__} in {file}): {exception_of(cls, error)}"
-            ) from error
-
-    return named
+def _label(spec: SurroundingSpec, name: str, seed: int) -> str:
+    return f"surroundings.{name} of kind {spec.kind!r}"
 
 
 class Surroundings:

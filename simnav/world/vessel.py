@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import Field
 
-from simnav.plugins import PluginError, Registry, exception_of, place_of
-from simnav.spec import NonNegative, Positive, Spec, SpecError, hidden_attribute, quantity
+from simnav.plugins import Registry, declared_in, registered_kind, with_named_errors
+from simnav.spec import NonNegative, Positive, Spec, SpecError, quantity
 from simnav.world.manoeuvres import Manoeuvre
 from simnav.world.start import Start
 from simnav.world.trajectory import Trajectory, Voyage
@@ -98,42 +97,31 @@ def register_vessel(cls: type[V]) -> type[V]:
     PluginError
         If the class is not a subclass of `Vessel`, another class has its name, or a field hides an attribute.
     """
-    if not (isinstance(cls, type) and issubclass(cls, Vessel)):
-        raise PluginError(f"@register_vessel: {cls!r} is not a subclass of simnav.world.Vessel")
-    name = cls.model_fields["kind"].default
-    if not isinstance(name, str):
-        raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_vessel'] = 'my_vessel'")
-    hidden = hidden_attribute(cls, Vessel)
-    if hidden is not None:
-        raise PluginError(f"vessel {name!r}: the field {hidden!r} of {cls.__qualname__} hides Vessel.{hidden}")
+    name = registered_kind(cls, Vessel, decorator="register_vessel", sort="vessel", example="my_vessel")
     VESSELS.add(name, cls)
-    cls.trajectory = _named(cls.trajectory)  # type: ignore[method-assign]
+    named = with_named_errors(cls.trajectory, VesselError, _label, (SpecError, MemoryError))
+    cls.trajectory = _checked(named)  # type: ignore[method-assign]
     return cls
 
 
-def _named(make: Callable[..., Any]) -> Callable[..., Trajectory]:
-    """Wrap ``trajectory`` of a vessel, so that its errors name the vessel."""
+def _checked(make: Callable[..., Any]) -> Callable[..., Trajectory]:
+    """Wrap ``trajectory`` of a vessel, so that it returns a trajectory or raises."""
 
     @wraps(make)
-    def named(self: Vessel, voyage: Voyage) -> Trajectory:
-        try:
-            made = make(self, voyage)
-        except (SpecError, MemoryError):
-            raise
-        except Exception as error:
-            raise VesselError(f"{_label(self)}: {exception_of(type(self), error)}") from error
+    def checked(self: Vessel, voyage: Voyage) -> Trajectory:
+        made = make(self, voyage)
         if not isinstance(made, Trajectory):
             raise VesselError(
-                f"{_label(self)}: trajectory() returned {type(made).__name__}, where a Trajectory is wanted"
+                f"{_label(self, voyage)} ({declared_in(type(self))}): trajectory() returned {type(made).__name__}, where "
+                "a Trajectory is wanted"
             )
         return made
 
-    return named
+    return checked
 
 
-def _label(vessel: Vessel) -> str:
-    cls = type(vessel)
-    return f"vessel of kind {vessel.kind!r} ({cls.__qualname__} in {Path(place_of(cls)[0]).name})"
+def _label(vessel: Vessel, voyage: Voyage) -> str:
+    return f"vessel of kind {vessel.kind!r}"
 
 
 class KinematicVessel(Vessel):
