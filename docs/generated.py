@@ -24,9 +24,39 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         "reference/scores.md": scores(),
         "reference/instruments.md": instruments(),
     }
+    (python,) = (file for file in files if file.src_uri == "reference/python.md")
+    files.remove(python)
+    pages["reference/python.md"] = f"{python.content_string}\n{calls()}"
     for path, text in pages.items():
         files.append(File.generated(config, path, content=text))
     return files
+
+
+def calls() -> str:
+    """All calls of ``import simnav`` with their options, which come from their requests."""
+    from simnav.leaderboard import costing, inspection, publishing, running
+
+    parts = []
+    for module in (running, inspection, costing, publishing):
+        for name in (n for n in module.__all__ if inspect.isfunction(getattr(module, n))):
+            call = getattr(module, name)
+            doc, taken = inspect.getdoc(call) or "", inspect.signature(call).parameters
+            text, meanings = _sections(doc)
+            shown = [f"{p}" if p.kind is p.VAR_KEYWORD else p.name for p in taken.values()]
+            parts += [f"## simnav.{name}", f"`simnav.{name}({', '.join(shown)})`", _escaped(text)]
+            lines = (
+                _line((
+                    f"`{p.name}`", "required" if p.default is p.empty else f"`{p.default!r}`",
+                    _escaped(meanings.get(p.name, "")),
+                ))
+                for p in taken.values()
+                if p.name in meanings
+            )  # fmt: skip
+            parts.append("\n".join((*_head("argument", "default", "meaning"), *lines)))
+            ends = re.findall(r"\n\n(Returns|Raises)\n-+\n(.*?)(?=\n\n\w[\w ]*\n-{4,}\n|\Z)", doc, re.DOTALL)
+            parts += [f"{section}: {_escaped(re.sub(chr(10) + '    ', ': ', body).replace(chr(10), ' '))}"
+                      for section, body in ends]  # fmt: skip
+    return "\n\n".join(parts) + "\n"
 
 
 def commands() -> str:

@@ -158,6 +158,7 @@ def call(request: Callable[P, R]) -> Callable[[Callable[[R], T]], Call[P, R, T]]
         ends = inspect.cleandoc(function.__doc__ or "").partition("\n\n")[2]
         called.__doc__ = f"{request.__doc__}\n\n{ends}".strip()
         vars(called)["of"] = function
+        del vars(called)["__wrapped__"]  # tools for documentation would show the function of the request
         return cast("Call[P, R, T]", called)
 
     return decorate

@@ -111,10 +111,8 @@ def _checked(make: Callable[..., Any]) -> Callable[..., Trajectory]:
     def checked(self: Vessel, voyage: Voyage) -> Trajectory:
         made = make(self, voyage)
         if not isinstance(made, Trajectory):
-            raise VesselError(
-                f"{_label(self, voyage)} ({declared_in(type(self))}): trajectory() returned {type(made).__name__}, where "
-                "a Trajectory is wanted"
-            )
+            place = f"{_label(self, voyage)} ({declared_in(type(self))})"
+            raise VesselError(f"{place}: trajectory() returned {type(made).__name__}, where a Trajectory is wanted")
         return made
 
     return checked

@@ -586,7 +586,7 @@ def tiny(tmp_path, monkeypatch):
         not_shown=(NotShown("Figure 7", "The pond", "a photograph"),),
         notes=("One note.",),
     )
-    monkeypatch.setattr("simnav.leaderboard.papers.paper.load", lambda key: paper)
+    monkeypatch.setattr("simnav.leaderboard.papers.paper.paper_of", lambda key: paper)
 
     def none_are_stored(paper: Paper) -> Reproduction:
         raise ValueError
