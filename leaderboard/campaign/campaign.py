@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+from simnav.leaderboard.campaign.confinement.privileges import PrivilegesWarning, kept_rights
 from simnav.leaderboard.campaign.confinement.session import Limits, ServerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
@@ -201,6 +202,11 @@ def run_campaign(
     -------
     Summary
 
+    Warns
+    -----
+    PrivilegesWarning
+        If root runs the campaign, and the system does not let estimators give their capabilities up.
+
     Raises
     ------
     RequestError
@@ -250,6 +256,12 @@ def run_campaign(
 
     with mistakes():
         chosen = chosen_confinement(confinement)
+    if chosen == "process" and (why := kept_rights()):  # bubblewrap takes them away itself, or does not start
+        warnings.warn(
+            f"estimators keep capabilities of root ({why}), so one of them may change what belongs to others; run the "
+            "campaign as another user, or with confinement = 'bubblewrap'",
+            PrivilegesWarning, stacklevel=2,
+        )  # fmt: skip
     path = store.create(Path(folder).resolve())
     if not by_version:
         _require_local(path, [s.id for s in scenarios])
