@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.campaign import MEMORY
-from simnav.leaderboard.campaign.comparison import claims, differing, listed, too_quick
+from simnav.leaderboard.campaign.comparison import CLAIMED, claims, differing, listed, proven, too_quick
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.sampling import findable, sample_size
@@ -102,6 +102,10 @@ class SubmissionReport:
         Runs that the repetition does not confirm, such as one that meets a limit of time on one machine only.
     unconfirmed : tuple of str
         What the results say of commit, processor, system and confinement, and cannot be confirmed here.
+    unconfirmed_fields, claimed : tuple of str
+        Names of the fields in ``unconfirmed``, and of all that no repetition proves.
+    summary : str
+        What is proven and what is only claimed, in one sentence.
     finds : str
         What the sample can find.
     unknown : tuple of str
@@ -129,6 +133,9 @@ class SubmissionReport:
     finds: str
     unknown: tuple[str, ...]
     sealed: tuple[SealedRuns, ...]
+    unconfirmed_fields: tuple[str, ...] = ()
+    claimed: tuple[str, ...] = CLAIMED
+    summary: str = ""
 
     @property
     def worse(self) -> tuple[SealedRuns, ...]:
@@ -199,15 +206,16 @@ def verify_bundle(
         findings.append(f"{missing} runs of the sample gave no answer")
     different += too_quick(pairs)
     used = next((a.confinement for a in again if a.confinement), "")
-    contradicted, unconfirmed = claims(results, replace(where, confinement=used))
-    findings += contradicted
     contents = bundle.contents
+    said_of = claims(results, replace(where, confinement=used), contents.requires)
+    findings += said_of.different
     return SubmissionReport(
         str(path), bundle.digest, contents.title, tuple(r.label for r in contents.estimators), contents.profile,
         len(results), tuple(findings), f"{'present' if present else 'clean'} environment: {_versions(where)}",
         len(chosen), identical, close, tolerance, tuple(different), tuple(undecided),
-        tuple(unconfirmed), findable(len(results), len(chosen)), tuple(unknown),
-        _compared(results, [a for a in again if a.sealed]),
+        tuple(said_of.unconfirmed), findable(len(results), len(chosen)), tuple(unknown),
+        _compared(results, [a for a in again if a.sealed]), tuple(said_of.fields),
+        summary=proven(identical + close, said_of.fields),
     )  # fmt: skip
 
 
