@@ -33,7 +33,7 @@ from simnav.leaderboard.campaign.plan import Plan
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
-from simnav.leaderboard.campaign.resolution import resolve, variant_of
+from simnav.leaderboard.campaign.resolution import own_files, resolve, variant_of
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
@@ -196,7 +196,8 @@ def run_campaign(
         May derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
     by_version : bool
         True: results are known by their declared versions (`simnav.leaderboard.results.versions`), as what comes with
-        simnav is. False: by digests of the code, and by the libraries and the processor that computed them.
+        simnav is; of other estimators a digest of their own files counts, too. False: by digests of the code, and by
+        the libraries and the processor that computed them.
 
     Returns
     -------
@@ -277,6 +278,7 @@ def run_campaign(
     if not seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
         require_unseen(entrants, scenarios, seeds)
     if by_version:
+        entrants = [replace(e, source=own_files(e) or e.source) for e in entrants]
         recordings = dict.fromkeys((s.id for s in scenarios), declared_recording(SIMULATOR_VERSION))
     else:
         recordings = {s.id: seal.recording(recording_digest(s, simulator)) for s in scenarios}
@@ -284,8 +286,8 @@ def run_campaign(
     def variant(entrant: Entrant, scenario: str) -> str:
         if by_version:
             return declared_variant(
-                scenario, SIMULATOR_VERSION, entrant.label, entrant.version, entrant.parameters
-            )  # fmt: skip
+                scenario, SIMULATOR_VERSION, entrant.label, entrant.version, entrant.parameters, own_files(entrant)
+            )
         return variant_of(entrant, recordings[scenario])
 
     variants = {s.id: {e.label: variant(e, s.id) for e in entrants} for s in scenarios}

@@ -18,6 +18,7 @@ import numpy as np
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
 from simnav.leaderboard.results.impossible import impossible
 from simnav.leaderboard.results.provenance import distinct, is_commit
+from simnav.leaderboard.results.versions import is_declared
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.provenance import Provenance
@@ -49,6 +50,10 @@ _LIMIT = 0.25
 _NOT_REPEATED = ("commit", "dirty", "cpu", "system", "confinement")
 _VERSIONS = ("simnav", "python", "numpy", "numba", "gtsam", "scipy", "filterpy")
 _LATER = ("scipy", "filterpy")  # which results of older formats do not say
+#: What says that a run was made by the code that repeats it: by declared versions, or by digests of code. Versions do
+#: not change with a wording or a comment, so results of an older commit hold.
+_VERSIONED = ("simulator_version", "estimator_version")
+_BY_DIGEST = ("scenario_digest", "estimator_digest", "simnav")
 #: What a repetition proves of a run, and what of a result nobody can prove who was not there.
 _PROVEN = "status, note, parameters, draws and scores of the runs that were repeated, and the versions"
 CLAIMED = ("commit", "dirty", "cpu", "system", "confinement", "cores", "date", "seconds", "peak_memory")
@@ -103,7 +108,7 @@ def differing(stored: Result, again: Result) -> tuple[list[str], list[str]]:
     from simnav.scoring import SCORES
 
     different, undecided = list[str](), list[str]()
-    for name in ("scenario_digest", "estimator_digest", "simnav", "parameters", "reference"):
+    for name in (*(_VERSIONED if is_declared(stored.recording) else _BY_DIGEST), "parameters", "reference"):
         _unequal(different, name, getattr(stored, name), getattr(again, name))
     if again.learned and not stored.learned:
         undecided.append(

@@ -201,7 +201,9 @@ def missing_seeds(results: Sequence[Result]) -> tuple[str, ...]:
 
 def _same_address(stored: Result, again: Result) -> bool:
     """Whether a result is that of a run: by declared versions, if it came with simnav, otherwise by its key."""
-    if not is_declared(stored.recording):
+    from simnav.estimator.registry import is_own
+
+    if not is_declared(stored.recording) or not is_own(stored.estimator.partition("(")[0]):
         return stored.key == again.key
     return [r.key for r in declared([stored])] == [r.key for r in declared([again])]
 
@@ -215,11 +217,14 @@ def _repeat(
 ) -> Result:
     scenario = known.get(result.scenario) or catalogued_scenario(result.scenario)
     request = requests.get(result.estimator) or request_of(result)
+    by_version = is_declared(result.recording) and not seal.secret
+    folder = folder / ("by-version" if by_version else "by-digest")
     usual = time_limit(scenario)  # a run that is said to have met a tiny limit is given the usual one
     run_campaign(
         [scenario], [request], [result.seed], folder, workers=1,
         timeout=min(max(result.time_limit, usual), _MOST_TIME * usual),
         memory=min(max(result.memory_limit, MEMORY), _MOST_MEMORY * MEMORY), seal=seal,
+        by_version=by_version,
     )  # fmt: skip
     mine = (result.scenario, result.estimator, result.seed)
     found = (r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)

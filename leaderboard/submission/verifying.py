@@ -27,6 +27,7 @@ from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance, benchmark_of, distinct
 from simnav.leaderboard.results.scratch import scratch
+from simnav.leaderboard.results.versions import is_declared
 from simnav.leaderboard.submission.bundle import Bundle, open_bundle
 from simnav.leaderboard.submission.environment import clean_python, install_requirements, search_variables
 from simnav.leaderboard.submission.repetition import Again, Asked, Wanted
@@ -182,6 +183,7 @@ def verify_bundle(
             install_requirements(python, bundle.contents.requires, home / "packages")
         asked = Asked(
             str(home / "runs"), bundle.requests(home / "packages"), wanted, seal.key.hex(), confinement,
+            all(is_declared(r.recording) for r in results),
         )  # fmt: skip
         again, where = repeat(python, asked, home, not present, report)
     known = {(r.scenario, r.estimator, r.seed): r for r in chosen}
@@ -416,16 +418,22 @@ def _difference(before: Result, again: Again, tolerance: float, where: Provenanc
 
 
 def _other_code(before: Result, again: Result, where: Provenance) -> str:
+    """Why a run is not the same: another simulator or scenario, other files of the submitter; empty where it is."""
     if again.recording != before.recording:
         made = before.provenance
         return (
-            "the scenario or the simulator is not that of the results, which were made with simnav "
-            f"{made.simnav} at commit {made.commit[:12] or 'unknown'}{' with changes' if made.dirty else ''}; here is "
-            f"{where.simnav} at commit {where.commit[:12] or 'unknown'}"
+            f"the scenario or the simulator is not that of the results, which were made with simnav {made.simnav}"
+            f"{_at(made)} ({before.recording:.40}); here is {where.simnav}{_at(where)} ({again.recording:.40})"
         )
-    if again.key != before.key:
+    if again.estimator_version != before.estimator_version:
+        return f"the estimator declares version {again.estimator_version}, the results {before.estimator_version}"
+    if again.key != before.key or (is_declared(before.recording) and again.estimator_digest != before.estimator_digest):
         return "the results were not made with this source, this name and these parameters"
     return ""
+
+
+def _at(made: Provenance) -> str:
+    return f" at commit {made.commit[:12] or 'unknown'}{' with changes' if made.dirty else ''}"
 
 
 def _worst_score(before: Result, again: Again, tolerance: float) -> str:
