@@ -146,7 +146,7 @@ def submit(request: SubmitRequest) -> Submission:
             raise RequestError(f"{target.parent} is no folder")
         report = campaign(
             estimators=list(source.requests), output=folder, profile=request.profile, workers=request.workers,
-            minutes=request.minutes, confinement=confinement, oracle=False, progress=request.progress,
+            minutes=request.minutes, confinement=confinement, oracle=False, by_version=True, progress=request.progress,
         )  # fmt: skip
         if report.summary.left:
             raise RequestError(

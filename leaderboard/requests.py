@@ -145,6 +145,11 @@ class CampaignRequest(CampaignOptions):
     oracle: bool = option(
         default=True, help="Run the oracles on simulated scenarios, too: the reference of a board, not ranked."
     )
+    by_version: bool = option(
+        default=False,
+        help="Know results by declared versions of simnav, and by the user's own files, as in a submission.",
+        hidden=True,
+    )
     progress: CampaignProgress = option(default=None, help=_CAMPAIGN_PROGRESS, hidden=True)
 
 

@@ -22,6 +22,7 @@ from typing import TypeAlias
 from simnav.leaderboard.calls import call, option, request
 from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+from simnav.leaderboard.campaign.confinement.privileges import PrivilegesWarning, kept_rights
 from simnav.leaderboard.campaign.confinement.session import Limits, ServerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
@@ -31,7 +32,7 @@ from simnav.leaderboard.campaign.plan import Plan
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
-from simnav.leaderboard.campaign.resolution import resolve, variant_of
+from simnav.leaderboard.campaign.resolution import own_files, resolve, variant_of
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
@@ -166,8 +167,8 @@ class Campaign(CampaignOptions):
     by_version: bool = option(
         default=False,
         help="True: results are known by their declared versions (`simnav.leaderboard.results.versions`), as what "
-        "comes with simnav is. False: by digests of the code, and by the libraries and the processor that computed "
-        "them.",
+        "comes with simnav is; of other estimators a digest of their own files counts, too. False: by digests of the "
+        "code, and by the libraries and the processor that computed them.",
     )
     progress: Callable[[Progress], None] | None = option(default=None, help="Called with a `Progress` now and then.")
 
@@ -221,6 +222,11 @@ def run_campaign(asked: Campaign) -> Summary:
     -------
     Summary
 
+    Warns
+    -----
+    PrivilegesWarning
+        If root runs the campaign, and the system does not let estimators give their capabilities up.
+
     Raises
     ------
     RequestError
@@ -235,6 +241,12 @@ def run_campaign(asked: Campaign) -> Summary:
     started = time.monotonic()
     with mistakes():
         confinement = chosen_confinement(asked.confinement)
+    if confinement == "process" and (why := kept_rights()):  # bubblewrap takes them away itself, or does not start
+        warnings.warn(
+            f"estimators keep capabilities of root ({why}), so one of them may change what belongs to others; run the "
+            "campaign as another user, or with confinement = 'bubblewrap'",
+            PrivilegesWarning, stacklevel=3,
+        )  # fmt: skip
     path = store.create(Path(asked.folder).resolve())
     if not asked.by_version:
         _require_local(path, [s.id for s in asked.scenarios])
@@ -277,6 +289,8 @@ def _entrants(asked: Campaign, confinement: str, path: Path) -> list[Entrant]:
         raise CampaignError(str(error)) from None
     if not asked.seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
         require_unseen(entrants, asked.scenarios, asked.numbers)
+    if asked.by_version:
+        return [replace(e, source=own_files(e) or e.source) for e in entrants]
     return entrants
 
 
@@ -287,7 +301,8 @@ def _keyed(asked: Campaign, entrants: Sequence[Entrant], path: Path) -> _Keyed:
         if asked.by_version:
             recording = declared_recording(SIMULATOR_VERSION)
             variants = {
-                e.label: declared_variant(s.id, SIMULATOR_VERSION, e.label, e.version, e.parameters) for e in entrants
+                e.label: declared_variant(s.id, SIMULATOR_VERSION, e.label, e.version, e.parameters, own_files(e))
+                for e in entrants
             }
         else:
             recording = asked.seal.recording(recording_digest(s, simulator_version()))

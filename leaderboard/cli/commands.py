@@ -169,7 +169,9 @@ class ReferenceCommand:
 
 @request
 class VerifyCommand(VerifyRequest, BundleOptions):
-    """Check results or a submission, and repeat some of the runs, bit for bit."""
+    """Check results or a submission, and repeat some of the runs, bit for bit.
+    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    """
 
 
 @request

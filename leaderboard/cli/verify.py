@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.comparison import CLOSE
 from simnav.leaderboard.cli.commands import VerifyCommand
-from simnav.leaderboard.cli.console import FAILED, Output
+from simnav.leaderboard.cli.console import CLAIMED, FAILED, Output
 from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.inspection import verify
 from simnav.leaderboard.publishing import verify_bundle
@@ -21,7 +21,10 @@ __all__ = ["show"]
 
 
 def show(out: Output, request: VerifyCommand) -> None:
-    """Check results or a submission, and repeat some of the runs, bit for bit."""
+    """Check results or a submission, and repeat some of the runs, bit for bit.
+
+    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    """
     if absolute(request.results).is_file():
         bundle = VerifyBundleRequest(
             request.results, key=request.key, sample=request.sample, present=request.present,
@@ -49,9 +52,14 @@ def show(out: Output, request: VerifyCommand) -> None:
     same = done.same
     more = f", {len(done.close)} more within {CLOSE:.0e}" if done.close else ""
     lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")
-    lines.append(done.finds)
+    lines += [done.finds, done.summary]
     out.print(*lines)
-    out.code = 0 if done.passed else FAILED
+    out.code = _code(done.passed, done.unconfirmed_fields)
+
+
+def _code(passed: bool, unconfirmed: Sequence[str]) -> int:
+    """Exit code: a script learns whether something is left that only the results say."""
+    return (CLAIMED if unconfirmed else 0) if passed else FAILED
 
 
 def _unknown(scores: Sequence[str]) -> str:
@@ -80,7 +88,7 @@ def _print(out: Output, report: SubmissionReport) -> None:
         f"{report.identical} of {report.repeated} repeated runs are the same to the bit, {report.close} more within "
         f"{report.tolerance:.0e}"
     )
-    lines.append(report.finds)
+    lines += [report.finds, report.summary]
     lines.append("the submission holds" if report.passed else "the submission does not hold")
     out.print(*lines)
-    out.code = 0 if report.passed else FAILED
+    out.code = _code(report.passed, report.unconfirmed_fields)
