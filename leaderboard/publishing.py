@@ -14,7 +14,7 @@ from simnav.leaderboard.calls import call, whole_number
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.given import absolute, results_of
 from simnav.leaderboard.inspection import rank
-from simnav.leaderboard.requests import (
+from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     CheckStandardRequest,
     PublishRequest,

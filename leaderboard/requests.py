@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from simnav.leaderboard.calls import option, request
-from simnav.leaderboard.campaign.options import CampaignOptions, PathLike, RunOptions, part_of
+from simnav.leaderboard.campaign.options import CampaignOptions, PathLike, RunOptions
 from simnav.leaderboard.papers import PAPERS
 
 if TYPE_CHECKING:
@@ -22,29 +22,21 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
 __all__ = [
-    "AuditRequest",
     "BenchRequest",
     "BoundRequest",
-    "BundleOptions",
     "CampaignRequest",
-    "CheckStandardRequest",
     "CiteRequest",
     "CostsRequest",
     "EvaluateRequest",
     "MergeRequest",
-    "PublishRequest",
     "RankRequest",
     "RecordRequest",
     "ReproduceRequest",
     "RescoreRequest",
     "RunRequest",
     "SealRequest",
-    "SiteRequest",
-    "StandardRequest",
-    "SubmitRequest",
     "SweepRequest",
     "TuneRequest",
-    "VerifyBundleRequest",
     "VerifyRequest",
 ]
 
@@ -58,11 +50,11 @@ _SCENARIO = "Name, versioned id, or path of a TOML file."
 _SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
 _SCENARIOS = "Names, tracks or TOML files, separated by commas. Default: all."
 _ESTIMATORS = "Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter."
-_PARAMETERS = "Value of a parameter of the estimators."
+PARAMETERS = "Value of a parameter of the estimators."
 _EACH_GETS = "Each estimator gets the parameters that it has."
-_PROGRESS = "Called with the number of finished parts, the number of all parts, and the next part as ``note=``."
-_CAMPAIGN_PROGRESS = "Called with a `simnav.leaderboard.campaign.campaign.Progress` from time to time."
-_FOLDER = "Folder that a campaign wrote."
+PROGRESS = "Called with the number of finished parts, the number of all parts, and the next part as ``note=``."
+CAMPAIGN_PROGRESS = "Called with a `simnav.leaderboard.campaign.campaign.Progress` from time to time."
+FOLDER = "Folder that a campaign wrote."
 _PROFILE = "What is run: smoke, quick, standard, full, or a TOML file of your own."
 _OWN_SCENARIOS = "TOML files of scenarios outside the catalogue."
 _FIRST_SEED = "Seed of the first run; the others count up."
@@ -84,8 +76,8 @@ class RunRequest:
     estimators: Estimators = option("--estimator", "-e", default=None, help=f"{_ESTIMATORS} Default: all.")
     _: KW_ONLY
     seed: int = option(default=0, help="Seed of the run.", least=0)
-    parameters: Parameters = option("--set", default=None, help=_PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
-    progress: Bar = option(default=None, help=_PROGRESS, hidden=True)
+    parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
+    progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
 @request
@@ -106,10 +98,10 @@ class EvaluateRequest(RunOptions):
         default=None, help="Baselines, separated by commas. Default: all that suit the scenario."
     )
     parameters: Parameters = option(
-        "--set", default=None, help=_PARAMETERS, more="Of the estimators under test.", metavar="NAME=VALUE"
+        "--set", default=None, help=PARAMETERS, more="Of the estimators under test.", metavar="NAME=VALUE"
     )
     results: PathLike | None = option(default=None, help="Keep the results in this folder. Default: they are not kept.")
-    progress: CampaignProgress = option(default=None, help=_CAMPAIGN_PROGRESS, hidden=True)
+    progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 
 
 @request
@@ -134,7 +126,7 @@ class CampaignRequest(CampaignOptions):
         more="``scenarios``, ``estimators`` and ``runs`` replace those of the profile.",
         cli=str | None,
     )
-    parameters: Parameters = option("--set", default=None, help=_PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
+    parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
     sealed: PathLike | None = option(
         "--sealed",
         default=None,
@@ -150,7 +142,7 @@ class CampaignRequest(CampaignOptions):
         help="Know results by declared versions of simnav, and by the user's own files, as in a submission.",
         hidden=True,
     )
-    progress: CampaignProgress = option(default=None, help=_CAMPAIGN_PROGRESS, hidden=True)
+    progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 
 
 @request
@@ -180,9 +172,9 @@ class SweepRequest(RunOptions):
     output: PathLike | None = option(
         "--output", "-o", default=None, help="Folder of the results. Default: results/sweep-SCENARIO."
     )
-    parameters: Parameters = option("--set", default=None, help=_PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
+    parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
     seed: int = option("--seed", default=0, help=_FIRST_SEED, least=0)
-    progress: CampaignProgress = option(default=None, help=_CAMPAIGN_PROGRESS, hidden=True)
+    progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 
 
 @request
@@ -227,7 +219,7 @@ class TuneRequest:
         default="differential-evolution", help="differential-evolution or nelder-mead.", cli=str
     )
     search_seed: int = option(default=0, help="Seed of the search.", least=0)
-    progress: Bar = option(default=None, help=_PROGRESS, hidden=True)
+    progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
 @request
@@ -263,9 +255,9 @@ class BenchRequest:
         default=21, help="Runs; the smallest time of an epoch counts, and the median of the multiples.", least=1
     )
     parameters: Parameters = option(
-        "--set", default=None, help=_PARAMETERS, more="Of the estimators under test.", metavar="NAME=VALUE"
+        "--set", default=None, help=PARAMETERS, more="Of the estimators under test.", metavar="NAME=VALUE"
     )
-    progress: Bar = option(default=None, help=_PROGRESS, hidden=True)
+    progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
 @request
@@ -328,7 +320,7 @@ class RescoreRequest:
     _: KW_ONLY
     scenarios: Scenarios = option("--scenario", "-s", default=None, help=_OWN_SCENARIOS)
     key: PathLike | None = option(default=None, metavar="KEYFILE", help="Key file, if the seeds are sealed.")
-    progress: Bar = option(default=None, help=_PROGRESS, hidden=True)
+    progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
 @request
@@ -376,7 +368,7 @@ class CiteRequest:
     """How to cite this version of simnav, or the results of a campaign."""
 
     results: PathLike | None = option(
-        default=None, help=f"{_FOLDER} Default: simnav itself.", argument=True, metavar="RESULTS"
+        default=None, help=f"{FOLDER} Default: simnav itself.", argument=True, metavar="RESULTS"
     )
 
 
@@ -393,7 +385,7 @@ class BoundRequest:
     _: KW_ONLY
     runs: int = option("--runs", "-n", default=12, help="Seeds over which it is averaged.", least=1)
     smoothed: bool = option("--smoothed", default=False, help="Bound of smoothed output, not of real-time output.")
-    progress: Bar = option(default=None, help=_PROGRESS, hidden=True)
+    progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
 @request
@@ -432,42 +424,7 @@ class VerifyRequest:
         read=lambda given: given or (),
         help="Of a folder: repeat runs of this row only; repeatable.",
     )
-    progress: Bar = option(default=None, help=_PROGRESS, hidden=True)
-
-
-@request
-class BundleOptions:
-    """How the runs of a bundle are repeated."""
-
-    _LAST = True
-    _: KW_ONLY
-    present: bool = option(
-        "--present",
-        default=False,
-        help="For a bundle: use the installed packages, not a new environment.",
-        more="That is quick and needs no network.",
-    )
-    tolerance: float | None = option(
-        default=None,
-        least=0.0,
-        help="For a bundle: relative difference that is accepted. [1e-6]",
-        more="Differences of bits are counted.",
-    )
-
-
-@request
-class VerifyBundleRequest(BundleOptions):
-    """Check a submission, and repeat a sample of its runs in confined processes."""
-
-    bundle: PathLike = option(help="Bundle that `submit` wrote.", argument=True)
-    _: KW_ONLY
-    key: PathLike | None = option(
-        default=None,
-        help="File of a secret key. The estimators also run on seeds that are derived from it, which the submission "
-        "cannot know, and should be no worse there.",
-    )
-    sample: int | None = option(default=None, help="As for `verify`.")
-    progress: Bar = option(default=None, help=_PROGRESS)
+    progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
 @request
@@ -507,158 +464,3 @@ class ReproduceRequest:
     progress: Callable[[str, Progress], None] | None = option(
         default=None, help="Called with the name of the scenario and the campaign's progress.", hidden=True
     )
-
-
-@request
-class SiteRequest:
-    """Rank the results of a campaign, and write the site."""
-
-    results: PathLike = option(help=_FOLDER, argument=True, metavar="RESULTS")
-    _: KW_ONLY
-    output: PathLike = option(
-        "--output", "-o", default="site", help="Folder of the site.", more="An older site there is replaced."
-    )
-    papers: PathLike = option(default="reproduced", help="Folder that 'simnav reproduce' wrote; its papers get pages.")
-    sweeps: PathLike = option(
-        default="results", help="Folder with the folders of sweeps; the pages of scenarios show them."
-    )
-    runs_shown: int = option(default=2, help="Runs of each scenario of which the site has track and errors.", least=1)
-    figures: bool = option("--print", default=False, help="Write the charts as SVG and PNG, too.")
-    against: PathLike | None = option(
-        default=None, metavar="FOLDER", help="Results of another campaign, for the rank correlation."
-    )
-    workers: int = option(default=2, help="Number of processes.", least=1)
-    progress: Bar = option(default=None, help="Called with how many of how many pages are done.", hidden=True)
-
-
-@request
-class SubmitRequest:
-    """Run an estimator on a profile, and write its source and results as a bundle."""
-
-    estimator: str = option(
-        help="my_filter.py, or an installed package with estimators.",
-        more="Or the name of one of its estimators.",
-        argument=True,
-        metavar="FILE_OR_PACKAGE",
-    )
-    _: KW_ONLY
-    profile: PathLike = option(default="standard", help="What is run: a profile of simnav.", cli=str)
-    parameters: Parameters = option("--set", default=None, help=_PARAMETERS, metavar="NAME=VALUE")
-    requires: Sequence[str] = option(
-        default=(),
-        help="Package that a file needs beside simnav; repeatable.",
-        more="As pip takes them. Those of a package are known.",
-    )
-    output: PathLike | None = option("--output", "-o", default=None, help="The bundle. Default: NAME.simnav.zip.")
-    results: PathLike | None = option(
-        default=None,
-        help="Keep the results in this folder. Default: results/submit-NAME.",
-        more="The same call continues there.",
-    )
-    workers: int = option(default=2, help="Number of processes.", least=1)
-    minutes: float | None = option(
-        default=None, least=0.0, help="Start no run after so many minutes. The same command continues."
-    )
-    progress: CampaignProgress = option(default=None, help=_CAMPAIGN_PROGRESS, hidden=True)
-
-
-_WORKING = "results/standard"
-
-
-@request
-class StandardRequest:
-    """Run the missing and outdated parts of the standard result. The same command continues.
-
-    A new folder starts with the results that come with simnav. So only rows and scenarios with a new version are run.
-    Results are known by their declared versions: an edit without a new version runs nothing, but for ``force``.
-    """
-
-    _: KW_ONLY
-    minutes: float | None = option(
-        default=110.0, least=0.0, help="Start no run after so many minutes. The same command continues."
-    )
-    profile: PathLike = option(default="standard", help="What is run: a profile of simnav, or a file.", cli=str)
-    results: PathLike = option("--results", default=_WORKING, help="Folder to work in.")
-    shipped: PathLike | None = option(default=None, help="Folder of the packed results. Default: that of simnav.")
-    workers: int = option(default=2, help="Number of processes.", least=1)
-    force: Sequence[str] = option(
-        default=(), metavar="NAME", help="Run this estimator anew; several are separated by commas."
-    )
-    shard: tuple[int, int] = option(
-        default=(1, 1),
-        metavar="K/N",
-        cli=str,
-        cli_default="1/1",
-        read=part_of,
-        help="Do part K of N of the runs; 'simnav merge' puts the parts together.",
-    )
-    progress: CampaignProgress = option(default=None, help=_CAMPAIGN_PROGRESS, hidden=True)
-
-
-@request
-class CheckStandardRequest:
-    """Say which rows and scenarios have another version than the standard result; nothing is run."""
-
-    results: PathLike | None = option("--results", default=None, help="Folder of results. Default: those of simnav.")
-
-
-@request
-class AuditRequest:
-    """Repeat a random sample of the standard result with the code of today, and compare the scores.
-
-    Declared versions alone say which results are up to date. The audit tests whether they are.
-    """
-
-    _: KW_ONLY
-    sample: int = option(
-        default=20,
-        help="Results that are repeated, drawn at random.",
-        more="The audit says which share of wrong results such a sample would find.",
-        least=1,
-    )
-    results: PathLike | None = option("--results", default=None, help="Folder of results. Default: those of simnav.")
-    progress: Bar = option(default=None, help=_PROGRESS, hidden=True)
-
-
-@request
-class PublishRequest:
-    """Pack the standard result, and make its site, the README's tables and the history of rows from it.
-
-    Results that the profile does not name, as those of submissions, are published as long as they are not out of date.
-    """
-
-    _: KW_ONLY
-    results: PathLike = option(
-        "--results",
-        default=_WORKING,
-        help="Folder to work in.",
-        more="If it is not there, the results that come with simnav are taken.",
-    )
-    profile: PathLike = option(
-        default="standard",
-        help="What is run: a profile of simnav, or a file.",
-        more="The results should contain it completely.",
-        cli=str,
-    )
-    shipped: PathLike | None = option(default=None, help="Folder of the packed results. Default: that of simnav.")
-    history: PathLike | None = option(default=None, help="File of the editions. Default: that of simnav.")
-    readme: PathLike | None = option(
-        default=None,
-        help="Whose tables are written. Default: of the command, README.md, if it is here; of the call, none.",
-        more="They stand between the marks of `simnav.leaderboard.standard.readme`.",
-    )
-    site: PathLike | None = option(
-        default=None,
-        cli=Path,
-        cli_default="site",
-        help="Folder of the site.",
-        more="Default: no site is drawn.",
-    )
-    workers: int = option(default=2, help="Number of processes.", least=1)
-    preliminary: bool = option(
-        "--preliminary",
-        default=False,
-        help="Publish also if runs are missing.",
-        more="The tables then say how many are there, and there is no edition.",
-    )
-    progress: Bar = option(default=None, help="Called with how many of how many pages are done.", hidden=True)

@@ -9,27 +9,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
-from simnav.leaderboard.requests import (
+from simnav.leaderboard.publishing_requests import (
     AuditRequest,
+    BundleOptions,
+    CheckStandardRequest,
+    PublishRequest,
+    SiteRequest,
+    StandardRequest,
+    SubmitRequest,
+)
+from simnav.leaderboard.requests import (
     BenchRequest,
     BoundRequest,
-    BundleOptions,
     CampaignRequest,
-    CheckStandardRequest,
     CiteRequest,
     EvaluateRequest,
     MergeRequest,
     Parameters,
-    PublishRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
     RunRequest,
     Scenarios,
     SealRequest,
-    SiteRequest,
-    StandardRequest,
-    SubmitRequest,
     SweepRequest,
     TuneRequest,
     VerifyRequest,

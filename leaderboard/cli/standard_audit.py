@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from simnav.leaderboard.cli.console import FAILED, Output
 from simnav.leaderboard.publishing import audit_standard
-from simnav.leaderboard.requests import AuditRequest
+from simnav.leaderboard.publishing_requests import AuditRequest
 
 __all__ = ["show"]
 

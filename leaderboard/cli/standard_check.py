@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from simnav.leaderboard.cli.console import FAILED, Output
 from simnav.leaderboard.publishing import check_standard
-from simnav.leaderboard.requests import CheckStandardRequest
+from simnav.leaderboard.publishing_requests import CheckStandardRequest
 
 __all__ = ["show"]
 

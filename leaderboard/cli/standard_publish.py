@@ -7,7 +7,7 @@ from pathlib import Path
 
 from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.publishing import publish_standard
-from simnav.leaderboard.requests import PublishRequest
+from simnav.leaderboard.publishing_requests import PublishRequest
 from simnav.leaderboard.standard.readme import BEGIN
 
 __all__ = ["show"]

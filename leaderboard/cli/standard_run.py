@@ -7,7 +7,7 @@ from dataclasses import replace
 from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.cli.options import campaign_progress
 from simnav.leaderboard.publishing import run_standard
-from simnav.leaderboard.requests import StandardRequest
+from simnav.leaderboard.publishing_requests import StandardRequest
 
 __all__ = ["show"]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.cli.options import campaign_progress
 from simnav.leaderboard.publishing import submit
-from simnav.leaderboard.requests import SubmitRequest
+from simnav.leaderboard.publishing_requests import SubmitRequest
 
 __all__ = ["show"]
 

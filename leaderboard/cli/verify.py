@@ -12,7 +12,7 @@ from simnav.leaderboard.cli.console import CLAIMED, FAILED, Output
 from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.inspection import verify
 from simnav.leaderboard.publishing import verify_bundle
-from simnav.leaderboard.requests import VerifyBundleRequest
+from simnav.leaderboard.publishing_requests import VerifyBundleRequest
 
 if TYPE_CHECKING:
     from simnav.leaderboard.submission.verifying import SubmissionReport
