@@ -224,7 +224,7 @@ def test_a_call_shows_its_options(name: str) -> None:
     """The request is the one place: signature, documentation and defaults of the call come from it."""
     call = getattr(simnav, name)
     request = inspect.signature(call.of).parameters["request"].annotation
-    declared = vars(requests)[request].__dataclass_fields__
+    declared = call.of.__globals__[request].__dataclass_fields__
     shown = inspect.signature(call).parameters
     assert {*shown} == {*declared}
     text = inspect.getdoc(call) or ""
