@@ -275,7 +275,7 @@ def _equip(cls: type[Row]) -> None:
     lacking = [name for name in _required(recipe["solver"]) if name not in recipe]
 
     def __init__(self: Row, **values: Any) -> None:  # noqa: N807 (it becomes the class's)
-        values = under_present_names(former_names(cls), values, cls.__name__)
+        values = under_present_names(former_names(type(self)), values, type(self).__name__)
         given: dict[str, dict[str, Any]] = {keyword: {} for keyword in recipe}
         for name, value in values.items():
             if name not in place:

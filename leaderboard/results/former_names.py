@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["present_label", "present_parameters"]
+__all__ = ["present_label", "present_parameters", "under_present_labels"]
 
 
 def present_label(label: str) -> str:
@@ -31,6 +31,16 @@ def present_parameters(label: str, parameters: Mapping[str, Any]) -> Mapping[str
     """
     names = _former(label)
     return {names.get(name, name): value for name, value in parameters.items()} if names else parameters
+
+
+def under_present_labels(values: Mapping[str, str]) -> dict[str, str]:
+    """Values by label, under the present labels; what is already under one of them comes before an older value.
+
+    >>> under_present_labels({"rae(window=9)": "a", "rae(window=8)": "b", "rae(innovations=8)": "c"})
+    {'rae(innovations=9)': 'a', 'rae(innovations=8)': 'c'}
+    """
+    present = {label: value for label, value in values.items() if present_label(label) == label}
+    return {present_label(label): value for label, value in values.items()} | present
 
 
 def _former(label: str) -> Mapping[str, str]:
