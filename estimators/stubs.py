@@ -183,7 +183,7 @@ def main(names: Sequence[str]) -> int:
         modules.append(found)
     for module in modules:
         path = Path(inspect.getfile(module)).with_suffix(".pyi")
-        path.write_text(stub_of(module), encoding="utf-8")
+        path.write_text(stub_of(module), encoding="utf-8", newline="\n")
         print(path)
     return 0
 
