@@ -67,6 +67,14 @@ class FaultLabel:
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
 
+def _no_channel() -> NDArray[np.int16]:
+    return np.empty(0, np.int16)
+
+
+def _no_sides() -> Array:
+    return np.empty((0, 0))
+
+
 @dataclass(frozen=True, eq=False)
 class AidStream:
     """All k measurements of one aiding instrument in an interval of time, with their labels.
@@ -87,6 +95,16 @@ class AidStream:
         Standard deviation of the true white noise of the measurement, in the same units.
     dropped : (m,) array
         Times [s] of measurements that are missing because of an outage or a lost bottom lock.
+    channels : tuple of str
+        Identifiers of the channels of the instrument (``Datasheet.channels``). Without channels this and the rest are
+        empty.
+    channel : (k,) int16 array
+        For each reading, the index of its channel in ``channels``. Readings of one time follow each other, in the order
+        of the channels.
+    side : (k, s) array
+        Side information of each reading; components as in ``KINDS[kind].side``.
+    dropped_channel : (m,) int16 array
+        The channel of each missing measurement.
     """
 
     name: str
@@ -97,6 +115,10 @@ class AidStream:
     fault_error: Array
     sigma: Array
     dropped: Array
+    channels: tuple[str, ...] = ()
+    channel: NDArray[np.int16] = field(default_factory=_no_channel)
+    side: Array = field(default_factory=_no_sides)
+    dropped_channel: NDArray[np.int16] = field(default_factory=_no_channel)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -104,9 +126,18 @@ class AidStream:
     @staticmethod
     def concatenate(parts: Sequence[AidStream]) -> AidStream:
         """Join the measurements of consecutive intervals."""
-        names = ("time", "value", "faults", "fault_error", "sigma", "dropped")
+        names = _CHANNEL_ARRAYS if parts[0].channels else _AID_ARRAYS
         joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in names}
-        return AidStream(parts[0].name, parts[0].kind, **joined)
+        return AidStream(parts[0].name, parts[0].kind, **joined, channels=parts[0].channels)
+
+    def measurements(self) -> Iterator[Measurement]:
+        """The readings as an estimator receives them, in order."""
+        if not self.channels:
+            for t, v in zip(self.time, self.value, strict=True):
+                yield Measurement(float(t), self.name, self.kind, v)
+            return
+        for t, v, c, side in zip(self.time, self.value, self.channel, self.side, strict=True):
+            yield Measurement(float(t), self.name, self.kind, v, self.channels[c], side)
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,11 +316,7 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
     Measurements
         The packet of each step: the IMU samples and aiding measurements within it.
     """
-    aids = [
-        Measurement(float(t), s.name, s.kind, v)
-        for s in data.aids.values()
-        for t, v in zip(s.time, s.value, strict=True)
-    ]
+    aids = [m for s in data.aids.values() for m in s.measurements()]
     aids.sort(key=lambda m: m.time)  # stable: ties keep the scenario's order of instruments
     # Times are multiples of the sample interval up to rounding: half a microsecond decides.
     edges = np.asarray(ends) + 0.5e-6
@@ -306,6 +333,7 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
 
 
 _AID_ARRAYS = ("time", "value", "faults", "fault_error", "sigma", "dropped")
+_CHANNEL_ARRAYS = (*_AID_ARRAYS, "channel", "side", "dropped_channel")
 _IMU_ARRAYS = ("time", "interval", "angular_rate", "specific_force")
 _STATE_ARRAYS = ("time", "position", "velocity", "attitude")
 _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
@@ -316,7 +344,7 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
     """A datasheet as a dictionary for JSON, without ``details`` and ``blocks`` if they are empty."""
-    return {k: _plain(v) for k, v in asdict(sheet).items() if k not in ("details", "blocks") or v}
+    return {k: _plain(v) for k, v in asdict(sheet).items() if k not in ("details", "blocks", "channels") or v}
 
 
 def _sheets(instruments: Instruments) -> dict[str, Any]:

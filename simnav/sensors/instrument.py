@@ -232,6 +232,15 @@ class AidSpec(Spec):
         """
         return ()
 
+    def channels(self) -> tuple[str, ...]:
+        """The identifiers of the channels of this instrument (satellites, beams, beacons); none, unless a subclass says
+        so.
+
+        With channels `Instrument.observe` returns readings of the shape (n, c, d): for each of n times one of each of
+        the c channels.
+        """
+        return ()
+
     def actual(self) -> Self:
         """The instrument with its true figures: those of the datasheet times ``times_datasheet``."""
         return times_datasheet(self)
@@ -258,6 +267,7 @@ class AidSpec(Spec):
             np.broadcast_to(np.asarray(self.figure("lever_arm"), dtype=np.float64), (3,)).copy(),
             {detail: getattr(self, detail) for detail in self.definition.datasheet},
             self.blocks(),
+            self.channels(),
         )
 
     def build(self, name: str, seed: int) -> Instrument:
