@@ -8,12 +8,17 @@ import itself is quick.
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path as _Path
 from typing import TYPE_CHECKING, Any
 
 from gymnasium.envs.registration import register as _register_env
 from gymnasium.envs.registration import registry as _registry
 
-from simnav.scenario.catalogue import headers as _headers
+from simnav.checkout import require_links as _require_links
+
+_require_links(_Path(__file__).parent)
+
+from simnav.scenario.catalogue import headers as _headers  # noqa: E402
 
 if TYPE_CHECKING:
     from simnav.blocks import StateBlock
