@@ -77,7 +77,8 @@ class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Obse
     ``<name>.age`` (end of the step minus time of validity [s]), ``<name>.valid`` and ``<name>.value``, with channels
     ``<name>.side``; the IMU has ``imu.angular_rate`` and ``imu.specific_force``. Positions are north, east, down from
     the start, divided by 1000 m; depths are divided by 1000 m, speeds by 10 m/s, angular rates by 0.1 rad/s, specific
-    forces by 9.81 m/s^2; angles are in rad. ``start`` is the velocity divided by 10 m/s, the attitude [rad], and the nine sigmas in m, m/s and rad.
+    forces by 9.81 m/s^2; angles are in rad. ``start`` is the velocity divided by 10 m/s, the attitude [rad], and the
+    nine sigmas in m, m/s and rad.
 
     Parameters
     ----------

@@ -73,7 +73,6 @@ def each_channel(stream: AidStream, channels: tuple[str, ...], apply: Callable[[
 
 def _part(stream: AidStream, name: str, rows: NDArray[np.bool_], lost: NDArray[np.bool_]) -> AidStream:
     """Some readings of a stream, as a stream of this name without channels."""
-    columns: dict[str, Any] = {n: getattr(stream, n)[rows] for n in _ROWS} | {
-        n: getattr(stream, n)[lost] for n in _LOST
-    }
+    columns: dict[str, Any] = {n: getattr(stream, n)[rows] for n in _ROWS}
+    columns |= {n: getattr(stream, n)[lost] for n in _LOST}
     return replace(stream, name=name, channels=(), **columns)
