@@ -6,20 +6,24 @@ import csv
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from simnav.estimator import Estimator
+from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.figures.run_figure import outage_spans, run_figure
 from simnav.leaderboard.results import trials
 from simnav.leaderboard.results.formats import write
+from simnav.plugins import load_plugin
+from simnav.recording import Recording
 from simnav.scoring import errors
 from simnav.scoring.detection import detection
 from simnav.scoring.outages import outages
 from simnav.source import record
-from simnav.testing.contract_check import _altered, _digests
+from simnav.testing.contract_check import _altered, _digests, check, contract_recording
 from simnav.trial import run_trial
 from simnav.trial.wire import PacketDecoder, PacketEncoder
 from simnav.types import Estimate
-from tests.cases.fjord import WITH_CHANNELS, fjord
+from tests.cases.fjord import CHANNEL_CASES, WITH_CHANNELS, fjord
 
 FAULTS = """
 [[fault]]
@@ -187,3 +191,30 @@ def test_an_outage_of_channels_is_named(recording):
     spans = outage_spans(recording)
     assert {name for _, _, name in spans} <= {"no beacons:A", "no beacons:C", "no beacons:A, beacons:C"}
     assert (min(a for a, _, _ in spans), max(b for _, b, _ in spans)) == (25.0, 30.0)
+
+
+# --- the contract test
+
+
+def test_the_contract_test_has_them_among_its_instruments(plugins):
+    load_plugin(plugins / "moving_beacons.py")
+    load_plugin(plugins / "janus.py")
+    recording = contract_recording(0)
+    assert set(recording.data.aids["janus"].channels) == {"1", "2", "3", "4"}
+    assert len(recording.data.aids["moving_beacons"]) > len(recording.data.truth)
+    assert check("dead-reckoning").passed
+
+
+def test_the_command_says_how_many_channels_there_are(plugins, tmp_path):
+    file, tables = CHANNEL_CASES["beacons"]
+    text = (plugins / "fjord.toml").read_text().partition("[instruments.fix]")[0]
+    text = text.replace("magnetometer.py", (plugins / file).as_posix()).replace("_s = 120.0", "_s = 10.0")
+    fault = '[[fault]]\nkind = "frozen"\ninstruments = "beacons"\nchannels = ["B", "D"]\n'
+    (tmp_path / "sound.toml").write_text(text + tables + fault)
+    names = [str(tmp_path / name) for name in ("sound.toml", "run.npz", "csv")]
+    arguments = ["simulate", names[0], "-o", names[1], "--csv", names[2]]
+    shown = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
+    assert shown.exit_code == 0, shown.output
+    assert "moving_beacons (5 channels)" in shown.output
+    assert Recording.load(tmp_path / "run.npz").faults[0].channels == ("B", "D")
+    assert (tmp_path / "csv" / "beacons.csv").read_text().startswith("time_s,channel,range_m")
