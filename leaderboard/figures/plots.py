@@ -348,7 +348,7 @@ def run_chart(
                 colour, line = by_channel.get(c.channel) or (style.colour(c.label), style.line(c.label))
                 ax.plot(
                     c.time * factor, c.values, color=colour, ls=line, lw=0.8 if c.channel else 1.1,
-                    label=c.channel if by_channel else c.label,
+                    label=(c.channel or "mean") if by_channel else c.label,
                 )  # fmt: skip
                 single = _alone(c.values)
                 ax.plot(c.time[single] * factor, c.values[single], ".", ms=4.5, mew=0.0, color=colour)

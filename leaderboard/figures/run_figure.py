@@ -182,7 +182,8 @@ def _label(name: str, unit: str) -> str:
 def _diagnostics(shown: Sequence[tuple[str, Trial, Array]], recording: Recording) -> dict[str, list[Curve]]:
     """The diagnostics that most estimators give, one panel each; of an array, its mean over the components.
 
-    Those of the channels of one instrument (``nis.INSTRUMENT:CHANNEL``) have one panel together.
+    Those of the channels of one instrument (``nis.INSTRUMENT:CHANNEL``) have one panel together, with the mean over its
+    channels (``nis.INSTRUMENT``) where an estimator gives it.
 
     Where not all can be shown, those of an instrument or of the motion go before counters.
     """

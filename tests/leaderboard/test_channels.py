@@ -187,6 +187,13 @@ def test_a_legend_names_twelve_channels_at_most(recording):
     assert len(ax.get_legend().get_texts()) == 12
 
 
+def test_the_mean_over_channels_is_named(recording):
+    trial = run_trial(Flags(lambda m: []), recording)
+    trial.diagnostics["nis.beacons"] = trial.diagnostics["nis.beacons:B"] + 1.0
+    ax = panel(run_figure(recording, [("flags", trial)]), "nis\nbeacons [-]")
+    assert sorted(text.get_text() for text in ax.get_legend().get_texts()) == ["A", "B", "C", "D", "E", "mean"]
+
+
 def test_an_outage_of_channels_is_named(recording):
     spans = outage_spans(recording)
     assert {name for _, _, name in spans} <= {"no beacons:A", "no beacons:C", "no beacons:A, beacons:C"}
