@@ -32,6 +32,7 @@ __all__ = [
     "HORIZONTAL_POSITION",
     "INSTRUMENTS",
     "KINDS",
+    "NO_SIDE",
     "POSITION",
     "VELOCITY",
     "WATER_SPEED",
@@ -71,8 +72,12 @@ _COMPONENTS_OF = {
 LARGEST_SPEED, LARGEST_HEIGHT = 200.0, 20000.0
 #: What the name of a component looks like: it is a column of files, and the end of a field of a specification.
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
-#: Filters and graphs keep a measurement in arrays of this many components.
+#: Filters and graphs keep a reading in arrays of this many components. An instrument that reads more at one time has
+#: channels, each with a reading of its own.
 MOST_COMPONENTS = 3
+#: The side information of a reading that has none.
+NO_SIDE: Array = np.empty(0)
+NO_SIDE.flags.writeable = False
 
 
 class NavigationPoint(NamedTuple):
@@ -92,6 +97,10 @@ class NavigationPoint(NamedTuple):
         Angular rate of the body relative to the Earth, body axes [rad/s].
     blocks : mapping of str to array
         Values of the states that the instrument brings along, by the name of their block (`simnav.blocks.StateBlock`).
+    channel : str
+        The channel whose reading is predicted; empty for an instrument without channels.
+    side : (s,) array
+        Side information of the reading, components as in `Kind.side`.
     """
 
     time: float
@@ -100,6 +109,8 @@ class NavigationPoint(NamedTuple):
     dcm: Array
     angular_rate: Array
     blocks: Mapping[str, Array] = MappingProxyType({})
+    channel: str = ""
+    side: Array = NO_SIDE
 
 
 @kernel()
@@ -141,6 +152,12 @@ def _add_errors(positions: int, cyclic: int, values: Array, errors: Array) -> No
 #: in it is differentiated by differences; so is all if it returns the reading alone. It returns None if there is no
 #: reading at the state.
 Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array | Mapping[str, Array]] | Array | None"]
+
+
+#: The standard deviation (d,) of the white noise of one reading, from its (s,) side information and the datasheet: for
+#: an instrument whose noise differs from reading to reading in a way that it knows, like that of a satellite with its
+#: elevation.
+ReadingSigma = Callable[[Array, "Datasheet"], Array]
 
 
 @dataclass(frozen=True)
@@ -214,6 +231,11 @@ class Kind:
     log_columns : tuple of str
         Columns that are read from a log of NMEA sentences if its scenario names none. By default they are the names of
         the components.
+    side : tuple of Component
+        Components of the side information that each reading of a channel carries, with their units (empty for a number
+        without a unit); names differ from those of ``components``.
+    reading_sigma : callable or None
+        The sigma of a reading from its side information (`ReadingSigma`). None: it is that of the datasheet.
 
     Raises
     ------
@@ -229,18 +251,20 @@ class Kind:
     geodetic: bool = False
     datasheet: tuple[str, ...] = ()
     log_columns: tuple[str, ...] = ()
+    side: tuple[Component, ...] = ()
+    reading_sigma: ReadingSigma | None = None
     _limits: tuple[float, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.role not in get_args(Role):
             raise PluginError(f"role = {self.role!r} of a kind should be one of: {', '.join(get_args(Role))}")
-        for name, wanted in (("components", Component), ("datasheet", str), ("log_columns", str)):
+        for name, wanted in (("components", Component), ("side", Component), ("datasheet", str), ("log_columns", str)):
             given = getattr(self, name)
             if not isinstance(given, tuple) or not all(isinstance(item, wanted) for item in given):
                 raise PluginError(f"{name} = {given!r} of a kind should be a tuple of {wanted.__name__}")
         if not 1 <= len(self.components) <= MOST_COMPONENTS:
             raise PluginError(f"a kind has one to {MOST_COMPONENTS} components, not {len(self.components)}")
-        for names in (self.values, self.errors):
+        for names in ((*self.values, *self.side_names), self.errors):
             for name in names:
                 if not isinstance(name, str) or not _NAME.fullmatch(name):
                     raise PluginError(f"the name of a component, {name!r}, should be in snake_case, like 'slant_range'")
@@ -272,6 +296,11 @@ class Kind:
     def errors(self) -> tuple[str, ...]:
         """Name of each component of the error and of ``Datasheet.sigma``: that of the value, except for positions."""
         return tuple(c.error for c in self.components)
+
+    @cached_property
+    def side_names(self) -> tuple[str, ...]:
+        """Name of each component of the side information of a reading."""
+        return tuple(c.name for c in self.side)
 
     @cached_property
     def observation(self) -> Observation | None:
@@ -418,6 +447,9 @@ class Datasheet:
         What the datasheet of this kind holds beyond the above (``KINDS[kind].datasheet``), SI units and radians.
     blocks : tuple of StateBlock
         The states that the instrument brings along.
+    channels : tuple of str
+        Identifiers of its channels (satellites, beams, beacons), in a fixed order: it gives at most one reading of each
+        at a time. Empty: it has no channels, and gives one reading at a time.
     """
 
     name: str
@@ -433,6 +465,7 @@ class Datasheet:
     lever_arm: Array = field(default_factory=_zeros3)
     details: Mapping[str, Any] = field(default_factory=dict)
     blocks: tuple[StateBlock, ...] = ()
+    channels: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from simnav.blocks import StateBlock
 from simnav.compiled import Array, Flags, Integers
-from simnav.kinds import KINDS, Datasheet, Kind, Role
+from simnav.kinds import KINDS, NO_SIDE, Datasheet, Kind, Role
 
 __all__ = [
     "COMPONENTS",
     "KINDS",
+    "NO_SIDE",
     "Array",
     "Datasheet",
     "Estimate",
@@ -183,7 +184,10 @@ class ImuSamples:
 
 
 class Measurement(NamedTuple):
-    """One measurement of an aiding instrument.
+    """One reading of an aiding instrument.
+
+    An instrument with channels (satellites, beams, beacons) gives one `Measurement` for each channel that it reads at a
+    time; their number may differ from one time to the next. An estimator uses them one by one.
 
     Attributes
     ----------
@@ -193,12 +197,24 @@ class Measurement(NamedTuple):
         Name in the scenario, and key of `KINDS`.
     value : (d,) array
         Components as in ``KINDS[kind].values``.
+    channel : str
+        Which channel it is, one of ``Datasheet.channels``; empty for an instrument without channels.
+    side : (s,) array
+        What else the instrument says about the reading, which is no measurement: the position of the satellite, the
+        direction of the beam. Components as in ``KINDS[kind].side``.
     """
 
     time: float
     instrument: str
     kind: str
     value: Array
+    channel: str = ""
+    side: Array = NO_SIDE
+
+    @property
+    def source(self) -> str:
+        """The instrument, or ``INSTRUMENT:CHANNEL``: what an estimator flags, weighs and tests by itself."""
+        return f"{self.instrument}:{self.channel}" if self.channel else self.instrument
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -273,8 +289,9 @@ class Estimate:
         filter may not estimate height, roll and pitch. None: all components of the given vectors are estimated.
     diagnostics : dict
         Named scalars or small arrays, which are recorded at each epoch.
-    flagged : sequence of (instrument, time)
-        The measurements of this step that the estimator considers faulty. They are scored against the true faults.
+    flagged : sequence of (source, time)
+        The measurements of this step that the estimator considers faulty, by `Measurement.source` and time: the name of
+        the instrument, with its channel if it has channels. They are scored against the true faults.
     states : mapping of str to (array, array)
         Further states by name, each with its value (k,) and its standard deviation (k,): those that instruments bring
         along (`simnav.blocks`). A trial keeps them as the diagnostics ``state.NAME`` and ``sigma.NAME``.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.cli.commands import SimulateCommand
 from simnav.leaderboard.cli.console import Output
@@ -13,6 +13,9 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.running import record
+
+if TYPE_CHECKING:
+    from simnav.recording import AidStream
 
 __all__ = ["show"]
 
@@ -40,7 +43,7 @@ def show(out: Output, request: SimulateCommand) -> None:
             "csv": [str(p) for p in written],
         }
     )
-    rows: list[list[Any]] = [[s.name, s.kind, len(s), len(s.dropped), int((s.faults != 0).sum())]
+    rows: list[list[Any]] = [[s.name, _kind(s), len(s), len(s.dropped), int((s.faults != 0).sum())]
                              for s in data.aids.values()]  # fmt: skip
     if data.imu is not None:
         rows.insert(0, ["imu", "imu", len(data.imu), 0, 0])
@@ -49,3 +52,8 @@ def show(out: Output, request: SimulateCommand) -> None:
     out.print(table, f"recording: {target}")
     if written:
         out.print(f"CSV: {written[0].parent}")
+
+
+def _kind(stream: AidStream) -> str:
+    """The kind of an instrument, with the number of its channels."""
+    return f"{stream.kind} ({len(stream.channels)} channels)" if stream.channels else stream.kind
