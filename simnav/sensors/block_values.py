@@ -7,22 +7,37 @@ whatever rates they sample it, and a run in many blocks gives the same numbers a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol, Self
 
 import numpy as np
 
 from simnav.blocks import StateBlock
+from simnav.kinds import Kind
 from simnav.spec import SpecError
 from simnav.streams import stream
 from simnav.types import Array
-
-if TYPE_CHECKING:
-    from simnav.sensors.instrument import AidSpec
 
 __all__ = ["BlockValues", "check_blocks"]
 
 #: Step of the grid [s]; that of a Gauss-Markov process is at most this part of its correlation time.
 STEP, PART = 1.0, 0.05
+
+
+class Declares(Protocol):
+    """A specification that declares blocks of states."""
+
+    @property
+    def definition(self) -> Kind:
+        """Properties of its kind."""
+        ...
+
+    def blocks(self) -> tuple[StateBlock, ...]:
+        """The states that it brings along."""
+        ...
+
+    def ideal(self) -> Self:
+        """The same specification without errors."""
+        ...
 
 
 class BlockValues:
@@ -85,7 +100,7 @@ class BlockValues:
         self._nodes = np.concatenate([self._nodes, more])
 
 
-def check_blocks(spec: AidSpec, source: str) -> None:
+def check_blocks(spec: Declares, source: str) -> None:
     """Check the blocks of an example: an observation uses them, and an ideal instrument has none of their errors.
 
     Raises

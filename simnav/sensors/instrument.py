@@ -21,7 +21,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, wraps
 from math import inf
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -30,10 +29,12 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from simnav.blocks import StateBlock
 from simnav.kinds import INSTRUMENTS, Kind
-from simnav.plugins import PluginError, exception_of, place_of
+from simnav.plugins import PluginError
 from simnav.recording import AidStream
 from simnav.sensors.block_values import BlockValues, check_blocks
+from simnav.sensors.errors import InstrumentError, label_of, raised
 from simnav.sensors.processes import GaussMarkov
+from simnav.sensors.turning import turn_to_body, turn_to_ned
 from simnav.spec import (
     UNITS,
     NonNegative,
@@ -81,21 +82,6 @@ _CHANNEL, _MOST_CHANNELS = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*"), 1000
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 
-class InstrumentError(SpecError):
-    """An instrument cannot be built or read. The message names it, its file, and what would be right."""
-
-
-def label_of(name: str, kind: str, cls: type) -> str:
-    """An instrument and its file, for a message."""
-    file = Path(place_of(cls)[0]).name
-    return f"instrument {name!r} of kind {kind!r} ({cls.__qualname__} in {file})"
-
-
-def raised(label: str, cls: type, error: Exception) -> InstrumentError:
-    """The error for an exception in the code of an instrument."""
-    return InstrumentError(f"{label}: {exception_of(cls, error)}")
-
-
 def _spread(n: int) -> BeforeValidator:
     return BeforeValidator(lambda x: (x,) * n if isinstance(x, (int, float)) and not isinstance(x, bool) else x)
 
@@ -105,44 +91,6 @@ Pair = Annotated[tuple[float, float], _spread(2)]
 Triple = Annotated[Vector, _spread(3)]
 SigmaPair = Annotated[tuple[NonNegative, NonNegative], _spread(2)]
 SigmaTriple = Annotated[tuple[NonNegative, NonNegative, NonNegative], _spread(3)]
-
-
-def turn_to_ned(attitude: Array, vector: Array) -> Array:
-    """Turn vectors from body axes to north-east-down, C v, for n attitudes.
-
-    The rotation is computed as three rotations about one axis each. This is faster than a matrix for one vector, and
-    the result of a row does not depend on the number of rows, as it may with a matrix product.
-
-    Parameters
-    ----------
-    attitude : (n, 3) array
-        Roll, pitch, yaw [rad].
-    vector : (n, 3) or (3,) array
-        Vectors in body axes (forward, starboard, down): one for all attitudes, or one for each.
-
-    Returns
-    -------
-    (n, 3) array
-        The vectors north-east-down.
-    """
-    (sr, sp, sy), (cr, cp, cy) = np.sin(attitude).T, np.cos(attitude).T
-    x, y, z = vector.T
-    y, z = cr * y - sr * z, sr * y + cr * z
-    x, z = cp * x + sp * z, cp * z - sp * x
-    out = np.empty(attitude.shape)
-    out[:, 0], out[:, 1], out[:, 2] = cy * x - sy * y, sy * x + cy * y, z
-    return out
-
-
-def turn_to_body(attitude: Array, vector: Array) -> Array:
-    """Turn vectors from north-east-down to body axes, C' v: the inverse of `turn_to_ned`."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin(attitude).T, np.cos(attitude).T
-    x, y, z = vector.T
-    x, y = cy * x + sy * y, cy * y - sy * x
-    x, z = cp * x - sp * z, sp * x + cp * z
-    out = np.empty(attitude.shape)
-    out[:, 0], out[:, 1], out[:, 2] = x, cr * y + sr * z, cr * z - sr * y
-    return out
 
 
 def figures_of(cls: type[Spec], errors: Sequence[str]) -> list[str]:
