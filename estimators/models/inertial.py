@@ -74,6 +74,7 @@ from simnav.geometry.rotation import dcm_from_rpy
 from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.types import (
     KINDS,
+    NO_SIDE,
     Array,
     Datasheet,
     Estimate,
@@ -369,7 +370,7 @@ class InertialModel(ErrorModel):
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         name = measurement.instrument
         if name in self.own:
-            found = self._linearise_own(name, measurement.time, measurement.value, self._state())
+            found = self._linearise_own(name, measurement.time, measurement.value, self._state(), measurement.side)
             if found is None:
                 return None
             noise = self.noise[name] if found[2] is None else self.noise[name] + found[2]
@@ -385,17 +386,19 @@ class InertialModel(ErrorModel):
     def _state(self) -> State:
         return self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration
 
-    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+    ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is position, velocity, DCM, angular rate, bias and calibration."""
-        found = self._linearise_own(name, time, value, state)
+        found = self._linearise_own(name, time, value, state, side)
         return None if found is None else found[:2]
 
     def _linearise_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...]
+        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array
     ) -> tuple[Array, Array, Array | None] | None:
         position, velocity, dcm, rate, bias, calibration = state
         own, size = self.own[name], _NAV + len(calibration)
-        point = own.point(time, position, velocity, dcm, rate, bias, calibration)
+        point = own.point(time, position, velocity, dcm, rate, bias, calibration, side)
         return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:

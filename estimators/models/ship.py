@@ -47,7 +47,7 @@ from simnav.estimators.models.ship_kernels import (
 )
 from simnav.estimators.models.ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
 from simnav.estimators.models.state_blocks import StateBlocks
-from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 
@@ -221,16 +221,18 @@ class ShipModel(ErrorModel):
         """Linearise one measurement."""
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
-            return own.measure(measurement.time, measurement.value, self.position, self.x)
+            return own.measure(measurement.time, measurement.value, self.position, self.x, measurement.side)
         code, aid, m = self.aids[measurement.instrument]
         residual, jacobian, noise = np.empty(m), np.zeros((m, self.size)), np.empty((m, m))
         first, second = float(measurement.value[0]), float(measurement.value[m - 1])
         observe_ship(code, aid, self.position, self.x, first, second, residual, jacobian, noise)
         return Linearised(residual, jacobian, noise)
 
-    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+    ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
-        found = self.own[name].measure(time, value, *state)
+        found = self.own[name].measure(time, value, *state, side)
         return None if found is None else (found.innovation, found.jacobian)
 
     def correct(self, dx: Array) -> None:

@@ -50,7 +50,7 @@ class ShipPoints(ShipModel, PointModel):
         """What the instrument should read at the points, minus what it should read at the state."""
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
-            return own.differences_at(measurement.time, self.position, self.x, errors)
+            return own.differences_at(measurement.time, self.position, self.x, errors, measurement.side)
         reading = self.read(measurement, self.states(np.concatenate([np.zeros((1, self.size)), errors])))
         difference = reading[1:] - reading[0]
         if self.instruments[measurement.instrument].equation == HEADING:
