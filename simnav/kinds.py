@@ -232,8 +232,8 @@ class Kind:
         Columns that are read from a log of NMEA sentences if its scenario names none. By default they are the names of
         the components.
     side : tuple of Component
-        Components of the side information that each reading of a channel carries, with their units; names differ from
-        those of ``components``.
+        Components of the side information that each reading of a channel carries, with their units (empty for a number
+        without a unit); names differ from those of ``components``.
     reading_sigma : callable or None
         The sigma of a reading from its side information (`ReadingSigma`). None: it is that of the datasheet.
 

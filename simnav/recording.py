@@ -58,6 +58,8 @@ class FaultLabel:
     parameters : mapping
         The parameters of the fault in the scenario (sizes, probability, correlation time), as fields of its
         specification, SI units.
+    channels : tuple of str
+        The channels of the instruments that it affects; empty: all.
     """
 
     kind: str
@@ -65,6 +67,7 @@ class FaultLabel:
     start: float
     end: float
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    channels: tuple[str, ...] = ()
 
 
 def _no_channel() -> NDArray[np.int16]:
@@ -129,6 +132,14 @@ class AidStream:
         names = _CHANNEL_ARRAYS if parts[0].channels else _AID_ARRAYS
         joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in names}
         return AidStream(parts[0].name, parts[0].kind, **joined, channels=parts[0].channels)
+
+    def places(self, time: Array, channel: NDArray[np.int16]) -> NDArray[np.intp]:
+        """The rows of readings of this stream, from their (m,) times and, with channels, the (m,) indices of those."""
+        if not self.channels:
+            return np.searchsorted(self.time, time)
+        times, c = np.unique(self.time), len(self.channels)
+        own = np.searchsorted(times, self.time) * c + self.channel
+        return np.searchsorted(own, np.searchsorted(times, time) * c + channel)
 
     def measurements(self) -> Iterator[Measurement]:
         """The readings as an estimator receives them, in order."""
@@ -343,7 +354,7 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
-    """A datasheet as a dictionary for JSON, without ``details`` and ``blocks`` if they are empty."""
+    """A datasheet as a dictionary for JSON, without ``details``, ``blocks`` and ``channels`` if they are empty."""
     return {k: _plain(v) for k, v in asdict(sheet).items() if k not in ("details", "blocks", "channels") or v}
 
 
@@ -371,7 +382,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         "end": data.end,
         **_sheets(instruments),
         "streams": {name: s.kind for name, s in data.aids.items()},
-        "faults": [asdict(f) for f in recording.faults],
+        "faults": [{k: v for k, v in asdict(f).items() if k != "channels" or v} for f in recording.faults],
         "start_time": recording.start.time,
     }
     if recording.draws:
@@ -393,7 +404,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
     if data.imu_labels is not None:
         add("imu_labels", data.imu_labels, ("faults", "fault_error"))
     for name, stream in data.aids.items():
-        add(f"aid.{name}", stream, _AID_ARRAYS)
+        add(f"aid.{name}", stream, _CHANNEL_ARRAYS if stream.channels else _AID_ARRAYS)
     return arrays
 
 
@@ -406,9 +417,11 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
     aids = []
     for aid in sheets["aids"]:
         fields: dict[str, Any] = {
-            k: np.array(v, dtype=np.float64) if isinstance(v, list) and k != "blocks" else v for k, v in aid.items()
+            k: np.array(v, dtype=np.float64) if isinstance(v, list) and k not in ("blocks", "channels") else v
+            for k, v in aid.items()
         }
         fields["blocks"] = tuple(StateBlock(**block) for block in aid.get("blocks", ()))
+        fields["channels"] = tuple(aid.get("channels", ()))
         aids.append(Datasheet(**fields))
     return Instruments(aids, imu, step)
 
@@ -418,12 +431,19 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         return [arrays[f"{prefix}.{n}"] for n in names]
 
     kind = TapStates if "truth.water_velocity" in arrays else NavigationStates
+    channels = {aid["name"]: tuple(aid.get("channels", ())) for aid in meta["aids"]}
+
+    def stream(name: str, kind: str) -> AidStream:
+        names = _CHANNEL_ARRAYS if channels.get(name) else _AID_ARRAYS
+        arrays_of = dict(zip(names, get(f"aid.{name}", names), strict=True))
+        return AidStream(name, kind, **arrays_of, channels=channels.get(name, ()))
+
     data = Block(
         meta["begin"],
         meta["end"],
         ImuSamples(*get("imu", _IMU_ARRAYS)) if "imu.time" in arrays else None,
         ImuLabels(*get("imu_labels", ("faults", "fault_error"))) if "imu_labels.faults" in arrays else None,
-        {n: AidStream(n, kind, *get(f"aid.{n}", _AID_ARRAYS)) for n, kind in meta["streams"].items()},
+        {name: stream(name, kind) for name, kind in meta["streams"].items()},
         kind(*get("truth", _STATES_OF[kind])),
     )
     return Recording(
@@ -433,7 +453,14 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         NavigationStates(*get("initial_truth", _STATE_ARRAYS)),
         InitialState(meta["start_time"], *get("start", ("position", "velocity", "attitude", "covariance"))),
         tuple(
-            FaultLabel(f["kind"], tuple(f["instruments"]), f["start"], f["end"], f.get("parameters", {}))
+            FaultLabel(
+                f["kind"],
+                tuple(f["instruments"]),
+                f["start"],
+                f["end"],
+                f.get("parameters", {}),
+                tuple(f.get("channels", ())),
+            )
             for f in meta["faults"]
         ),
         data,

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from simnav.kinds import INSTRUMENTS
+from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.compass import Gyrocompass, MagneticCompass
 from simnav.sensors.depth import Depth
 from simnav.sensors.dvl import Dvl
@@ -26,6 +27,7 @@ __all__ = [
     "AidSpec",
     "AnyFault",
     "AnyInstrument",
+    "ChannelInstrument",
     "Depth",
     "Dvl",
     "FaultLayer",

@@ -16,6 +16,7 @@ delivered or not.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, wraps
@@ -59,6 +60,8 @@ __all__ = [
     "SigmaTriple",
     "Triple",
     "figures_of",
+    "label_of",
+    "raised",
     "register_instrument",
     "times_datasheet",
     "turn_to_body",
@@ -71,6 +74,9 @@ T = TypeVar("T", bound=Spec)
 _RESERVED = ("imu", "interval", "position", "velocity", "attitude")
 #: Figures for which a specification may have a separate field for each component.
 _BY_COMPONENT = ("sigma", "bias", "bias_instability", "fixed_bias")
+#: What the identifier of a channel looks like (it stands in tables, in the TOML of faults, and after a colon), and the
+#: largest number of channels of an instrument.
+_CHANNEL, _MOST_CHANNELS = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*"), 1000
 #: Default of a vector.
 ZERO: Vector = (0.0, 0.0, 0.0)
 
@@ -79,12 +85,13 @@ class InstrumentError(SpecError):
     """An instrument cannot be built or read. The message names it, its file, and what would be right."""
 
 
-def _label(name: str, kind: str, cls: type) -> str:
+def label_of(name: str, kind: str, cls: type) -> str:
+    """An instrument and its file, for a message."""
     file = Path(place_of(cls)[0]).name
     return f"instrument {name!r} of kind {kind!r} ({cls.__qualname__} in {file})"
 
 
-def _raised(label: str, cls: type, error: Exception) -> InstrumentError:
+def raised(label: str, cls: type, error: Exception) -> InstrumentError:
     """The error for an exception in the code of an instrument."""
     return InstrumentError(f"{label}: {exception_of(cls, error)}")
 
@@ -236,10 +243,24 @@ class AidSpec(Spec):
         """The identifiers of the channels of this instrument (satellites, beams, beacons); none, unless a subclass says
         so.
 
-        With channels `Instrument.observe` returns readings of the shape (n, c, d): for each of n times one of each of
-        the c channels.
+        With channels `build` returns a `simnav.sensors.ChannelInstrument`, whose `observe` returns readings of the
+        shape (n, c, d): for each of n times one of each of the c channels.
         """
         return ()
+
+    @model_validator(mode="after")
+    def _proper_channels(self) -> Self:
+        channels = self.channels()
+        if not isinstance(channels, tuple) or not all(isinstance(c, str) and _CHANNEL.fullmatch(c) for c in channels):
+            raise ValueError(
+                f"channels {channels!r}: should be a tuple of identifiers of letters, digits and the signs _ . + -"
+            )
+        if len(set(channels)) < len(channels):
+            twice = next(c for c in channels if channels.count(c) > 1)
+            raise ValueError(f"channel {twice!r} is there more than once; each channel has an identifier of its own")
+        if len(channels) > _MOST_CHANNELS:
+            raise ValueError(f"{len(channels)} channels are too many; there are at most {_MOST_CHANNELS}")
+        return self
 
     def actual(self) -> Self:
         """The instrument with its true figures: those of the datasheet times ``times_datasheet``."""
@@ -296,7 +317,7 @@ class AidSpec(Spec):
         except (InstrumentError, MemoryError):
             raise
         except Exception as error:
-            raise _raised(_label(name, self.kind, type(self)), type(instrument), error) from error
+            raise raised(label_of(name, self.kind, type(self)), type(instrument), error) from error
         return instrument
 
 
@@ -350,6 +371,12 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
                         f"kind {name!r}: the unit {unit!r} is unknown; simnav.spec.register_unit adds one; "
                         f"there are: {', '.join(UNITS)}"
                     )
+        for component in kind.side:
+            if component.unit and component.unit not in UNITS:
+                raise PluginError(
+                    f"kind {name!r}: the unit {component.unit!r} of its side information {component.name!r} is "
+                    f"unknown; it is empty for a number without a unit, or one of: {', '.join(UNITS)}"
+                )
         for detail in kind.datasheet:
             if detail not in cls.model_fields:
                 raise PluginError(
@@ -368,6 +395,11 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
                 raise PluginError(
                     f"{source}: its figures do not fit its components ({', '.join(kind.errors)}): {error}"
                 ) from None
+            if (kind.side or kind.reading_sigma is not None) and not spec.channels():
+                raise PluginError(
+                    f"{source} has no channels, but its kind has side information or a sigma of a reading, which only "
+                    "readings of channels have"
+                )
         cls.build = _named(cls.build)  # type: ignore[method-assign]
         return cls
 
@@ -379,15 +411,20 @@ def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
 
     @wraps(build)
     def named(self: AidSpec, name: str, seed: int) -> Instrument:
-        label = partial(_label, name, self.kind, type(self))  # late: it reads the source of the class
+        label = partial(label_of, name, self.kind, type(self))  # late: it reads the source of the class
         try:
             made = build(self, name, seed)
         except (InstrumentError, MemoryError):
             raise
         except Exception as error:
-            raise _raised(label(), type(self), error) from error
+            raise raised(label(), type(self), error) from error
         if not isinstance(made, Instrument):
             raise InstrumentError(f"{label()}: build() returned {type(made).__name__}, where an Instrument is wanted")
+        if made.channels != self.channels():
+            raise InstrumentError(
+                f"{label()}: build() returned an instrument with the channels {made.channels}, but the specification "
+                f"has {self.channels()}; an instrument with channels is a simnav.sensors.ChannelInstrument"
+            )
         return made
 
     return named
@@ -419,9 +456,12 @@ class Instrument(ABC):
         True if the lever arm is not zero.
     surroundings : Surroundings
         Sea, current, bottom and other parts, which the instrument may ask at its places and times (`enter`).
+    channels : tuple of str
+        Identifiers of its channels (`simnav.sensors.ChannelInstrument`); empty for an instrument without channels.
     """
 
     surroundings: Surroundings = Surroundings()
+    channels: tuple[str, ...] = ()
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
         self.name, self.kind, self.definition = name, spec.kind, spec.definition
@@ -559,7 +599,7 @@ class Instrument(ABC):
 
 def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
     """The checked reading. A mistake in it is an error of the instrument, not of the estimator that receives it."""
-    label = partial(_label, instrument.name, instrument.kind, type(instrument))
+    label = partial(label_of, instrument.name, instrument.kind, type(instrument))
     try:
         value, sigma, there = instrument.reading(tap)
         value = _checked_rows(instrument, "observe()", value, tap)
@@ -568,7 +608,7 @@ def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Arr
     except (InstrumentError, MemoryError):
         raise
     except Exception as error:
-        raise _raised(label(), type(instrument), error) from error
+        raise raised(label(), type(instrument), error) from error
     n = len(tap.time)
     if there is not None and (there.shape != (n,) or there.dtype != np.bool_):
         raise InstrumentError(
@@ -599,7 +639,7 @@ def _checked_rows(instrument: Instrument, method: str, array: Array, tap: TapSta
         return array.reshape(shape)
     if array.shape != shape:
         raise InstrumentError(
-            f"{_label(instrument.name, instrument.kind, type(instrument))}: {method} returned an array of shape "
+            f"{label_of(instrument.name, instrument.kind, type(instrument))}: {method} returned an array of shape "
             f"{array.shape}, where {shape} is wanted: a row for each of {shape[0]} times, a column for each component "
             f"({', '.join(components)})"
         )

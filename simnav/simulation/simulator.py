@@ -273,7 +273,7 @@ def ideal(scenario: Scenario, seed: int) -> Recording:
     clean = _recording(Simulator(perfect, seed, truth=truth)).data
     aids = {}
     for name, stream in real.data.aids.items():
-        value = clean.aids[name].value[np.searchsorted(clean.aids[name].time, stream.time)]
+        value = clean.aids[name].value[clean.aids[name].places(stream.time, stream.channel)]
         aids[name] = replace(stream, value=value, fault_error=np.zeros_like(stream.fault_error))
     state, start = real.initial_truth, real.start
     start = InitialState(start.time, state.position[0], state.velocity[0], state.attitude[0], start.covariance)
