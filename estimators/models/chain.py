@@ -238,8 +238,8 @@ class Chain(ABC):
         The aiding factors in ascending order of their nodes: ``node`` (number since the start of the run), ``fold``
         (number since the start of the run, or -1), ``instrument`` (index into ``names``), ``components``, ``time``,
         ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 if the noise of the motion has not been added to
-        the noise yet); of the last linearisation ``residual`` (3,), ``jacobian`` (3, n); ``weight``; if readings have side
-        information, ``side``.
+        the noise yet); ``side`` if readings have side information; of the last linearisation ``residual`` (3,),
+        ``jacobian`` (3, n); ``weight``.
     folds : Columns
         Times between nodes with measurements: ``node`` (number of the previous node), ``time``, ``transition`` and
         ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since the prediction, the predicted
@@ -500,7 +500,7 @@ class Chain(ABC):
             d = len(own[name].kind.components)
             aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
             at = tuple(column[row[i]] for column in state)
-            side = self.side_of(i)
+            side = self.side_of(int(i))
             found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at, side)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d

@@ -63,21 +63,21 @@ def _apart(sheet: Datasheet) -> list[Datasheet]:
 
 def reading_of(measurement: Measurement) -> Measurement:
     """The measurement of a channel as one of an instrument of its own; its side information stays with it."""
-    return Measurement(
-        measurement.time, measurement.source, measurement.kind, measurement.value, side=measurement.side
-    )
+    return Measurement(measurement.time, measurement.source, measurement.kind, measurement.value, side=measurement.side)
 
 
 def of_channels(stream: AidStream) -> list[AidStream]:
-    """The readings of each channel of a recorded stream, named after their source; the stream itself without channels."""
+    """The recorded readings of each channel of an instrument, named after their source; itself without channels."""
     if not stream.channels:
         return [stream]
     found = []
     for c, channel in enumerate(stream.channels):
         rows = stream.channel == c
-        parts = (stream.time, stream.value, stream.faults, stream.fault_error, stream.sigma)
-        lost = stream.dropped[stream.dropped_channel == c]
-        found.append(AidStream(f"{stream.name}:{channel}", stream.kind, *(part[rows] for part in parts), lost))
+        part = AidStream(
+            f"{stream.name}:{channel}", stream.kind, stream.time[rows], stream.value[rows], stream.faults[rows],
+            stream.fault_error[rows], stream.sigma[rows], stream.dropped[stream.dropped_channel == c],
+        )  # fmt: skip
+        found.append(part)
     return found
 
 

@@ -199,10 +199,10 @@ class GeneralModel(PointModel):
             error = np.zeros(self.size)
             error[j] = self._steps[j]
             ends, length = [reading, reading], 0.0
-            for side, sign in enumerate((1.0, -1.0)):
+            for end, sign in enumerate((1.0, -1.0)):
                 there = self.read(self.retract(x, sign * error[:m]), time, sheet, extra + sign * error[m:], side)
                 if there is not None:
-                    ends[side] = there
+                    ends[end] = there
                     length += error[j]
             if length:
                 jacobian[:, j] = kind.difference(ends[0], ends[1]) / length
@@ -217,9 +217,7 @@ class GeneralModel(PointModel):
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement at the present state."""
         name = measurement.instrument
-        found = self.linearise(
-            name, measurement.time, measurement.value, self.x, self.extra, measurement.side
-        )
+        found = self.linearise(name, measurement.time, measurement.value, self.x, self.extra, measurement.side)
         if found is None:
             return None
         noise, own = self._white[name], self.own.get(name)
@@ -300,7 +298,7 @@ class GeneralChain(Chain):
             name = self.names[aids["instrument"][i]]
             d = len(self.front._white[name])
             aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
-            side = self.side_of(i) if name in self.front.own else NO_SIDE
+            side = self.side_of(int(i)) if name in self.front.own else NO_SIDE
             found = self.front.linearise(name, aids["time"][i], aids["value"][i, :d], x[row[i]], extra[row[i]], side)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d

@@ -232,7 +232,8 @@ class ShipModel(ErrorModel):
         self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
     ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
-        found = self.own[name].measure(time, value, *state, side)
+        position, x = state
+        found = self.own[name].measure(time, value, position, x, side)
         return None if found is None else (found.innovation, found.jacobian)
 
     def correct(self, dx: Array) -> None:

@@ -50,9 +50,7 @@ class ShipObservation(OwnObservation):
         self._bias_at, self._white, self._sway = bias_at, np.diag(white), sway
         self._unknown = np.diag([0.0, 0.0, height, 0.0, 0.0, VERTICAL_SPEED**2, HEEL**2, HEEL**2, 0.0])
 
-    def measure(
-        self, time: float, value: Array, position: Array, x: Array, side: Array = NO_SIDE
-    ) -> Linearised | None:
+    def measure(self, time: float, value: Array, position: Array, x: Array, side: Array = NO_SIDE) -> Linearised | None:
         """Linearise one measurement.
 
         Parameters
@@ -88,9 +86,7 @@ class ShipObservation(OwnObservation):
         noise = noise if more is None else noise + more
         return Linearised(self.kind.difference(value, reading), jacobian, noise)
 
-    def differences_at(
-        self, time: float, position: Array, x: Array, errors: Array, side: Array = NO_SIDE
-    ) -> Array:
+    def differences_at(self, time: float, position: Array, x: Array, errors: Array, side: Array = NO_SIDE) -> Array:
         """What the instrument should read at k states, minus what it should read at one.
 
         Parameters

@@ -53,9 +53,7 @@ class StateBlocks:
 
     def __init__(self, sheets: Iterable[Datasheet], first: int):
         self._sheets = {sheet.name: sheet for sheet in sheets}
-        self.blocks: Mapping[str, StateBlock] = blocks_of(
-            (instrument_of(s), s.blocks) for s in self._sheets.values()
-        )
+        self.blocks: Mapping[str, StateBlock] = blocks_of((instrument_of(s), s.blocks) for s in self._sheets.values())
         self.at: dict[str, slice] = {}
         self.states: list[tuple[float, float, float]] = []
         self._clocks: list[tuple[int, StateBlock]] = []

@@ -2,7 +2,7 @@
 
 The main filter uses all instruments, sub-filter i all except instrument i. If instrument i is wrong, sub-filter i is
 right and the main filter is wrong. Then their estimates differ by more than the test of
-`simnav.estimators.solvers.separation` allows. The channels of an instrument are instruments of their own here: a spoofed
+`simnav.estimators.solvers.separation` allows. Each channel of an instrument counts as an instrument here: a spoofed
 satellite is excluded by itself.
 
 **Exclusion.** If a test fails, one instrument is excluded. The suspects are the instruments with a large separation,

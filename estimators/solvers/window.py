@@ -27,8 +27,8 @@ If the cost of a window is improbable (`simnav.estimators.solvers.cost_consisten
 The weight of a measurement has two parts: an `Adaptation` chooses its noise when it arrives, from the innovation, as in
 a filter; a `Weighting` receives all factors of the window at every iteration.
 
-Each channel of an instrument with channels is a source of factors of its own (`simnav.estimators.models.channels`), with
-its own residual, weight and flag. The diagnostics of the instrument are the means over its channels.
+The readings of each channel of an instrument are factors with a residual, a weight and a flag of their own
+(`simnav.estimators.models.channels`). The diagnostics of the instrument are the means over its channels.
 
 Sources: Guo et al. (2026), section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); Mao, Wang and
 Fu (2025), section 2;
