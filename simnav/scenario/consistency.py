@@ -142,7 +142,9 @@ def _check_log(s: Description, log: RecordedSpec) -> None:
     for name in log.instruments:
         if name not in aids:
             raise ValueError(f"log.instruments.{name}: there is no [instruments.{name}] datasheet{closest(name, aids)}")
-    for name in aids:
+    for name, spec in s.aids.items():
+        if spec.channels():
+            raise ValueError(f"instruments.{name}: an instrument with channels cannot be read from a log")
         if name not in log.instruments:
             raise ValueError(f"instruments.{name}: the log says not where it comes from; add [log.instruments.{name}]")
     if (log.imu is None) != (s.imu is None):
@@ -152,9 +154,11 @@ def _check_log(s: Description, log: RecordedSpec) -> None:
 
 def _check_faults(s: Description) -> None:
     kinds = {name: spec.kind for name, spec in s.aids.items()}
+    channels = {name: spec.channels() for name, spec in s.aids.items()}
     for i, fault in enumerate(s.faults):
         try:
             fault.check(kinds, imu=s.imu is not None)
+            fault.check_channels(kinds, channels)
         except SpecError as error:
             raise ValueError(f"fault[{i}] {str(error).removeprefix('fault ')}") from None
         first = fault.intervals[0][0] if fault.intervals else fault.start

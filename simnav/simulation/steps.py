@@ -5,8 +5,8 @@ stretch), by the classes of the block form (`Simulator.advance`), from the same 
 `simnav.world.motion.advance` and `sense`, compute all that depends on the motion, for all runs. The numbers are those
 of the block form, bit for bit.
 
-Vessels, instruments and faults of third parties have the block form only. A run with one of them is advanced in blocks
-of one step.
+Vessels, instruments and faults of third parties have the block form only, and so have instruments with channels. A run
+with one of them is advanced in blocks of one step.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class SteppedRuns:
     truth : (n, 9) array
         Position, velocity, roll, pitch and yaw at the end of the last step.
     count : (n,) int array
-        Number of measurements in the last step. For measurement k of run b: ``who[b, k]`` is the number of its
-        instrument in ``names[b]``, ``when[b, k]`` its time [s], ``value[b, k]`` its value and ``faults[b, k]`` its
-        label.
+        Number of measurements in the last step, each reading of a channel by itself. For measurement k of run b:
+        ``who[b, k]`` is the number of its instrument in ``names[b]``, ``when[b, k]`` its time [s], ``value[b, k]`` its
+        value and ``faults[b, k]`` its label.
     samples : (n,) int array
         Number of IMU samples in the last step. The samples of run b are ``imu_time[b]``, ``imu_interval[b]``,
         ``rate[b]`` and ``force[b]``.
@@ -64,6 +64,7 @@ class SteppedRuns:
         self.kinds: list[list[str]] = [[] for _ in range(n)]
         self.step, self.truth = np.zeros(n, np.int64), np.zeros((n, 9))
         self.samples, self.count = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        self._packets: list[Measurements | None] = [None] * n  # of runs that have only the block form
         self._compiled, self._stretch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
         self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # within the stretch, and its steps
         self._imu = np.zeros(n, np.bool_)
@@ -82,7 +83,7 @@ class SteppedRuns:
         """Start a run at index b. Its simulator must be at time 0."""
         self.simulators[b] = simulator
         self.step[b] = self._at[b] = self._end[b] = self.count[b] = self.samples[b] = 0
-        self._stretch[b] = FIRST_STRETCH
+        self._stretch[b], self._packets[b] = FIRST_STRETCH, None
         aids = simulator.aids
         self.names[b], self.kinds[b] = list(aids), [a.kind for a in aids.values()]
         layers = [layer for layer in simulator.layers if layer.operation != DISTURBS_IMU]
@@ -208,6 +209,9 @@ class SteppedRuns:
 
     def packet(self, b: int) -> Measurements:
         """The measurements of the last step of a run, in arrays of their own."""
+        packet = self._packets[b]
+        if packet is not None:
+            return packet
         simulator, n = self.simulators[b], int(self.samples[b])
         assert simulator is not None
         imu = None
@@ -314,6 +318,7 @@ class SteppedRuns:
         truth = block.truth
         self.truth[b] = np.concatenate([truth.position[-1], truth.velocity[-1], truth.attitude[-1]])
         (packet,) = packets(block, truth.time)
+        self._packets[b] = Measurements(*self.interval_of(b), packet.imu, packet.aids)
         self.samples[b] = 0
         if packet.imu is not None:
             imu = packet.imu
@@ -326,10 +331,10 @@ class SteppedRuns:
         self.count[b] = n = len(packet.aids)
         self._room(n)
         value, faults = np.zeros((n, 3)), np.zeros(n, np.uint32)
-        for j, m in enumerate(packet.aids):
+        rows = {name: iter(stream.faults.tolist()) for name, stream in block.aids.items()}
+        for j, m in enumerate(packet.aids):  # it has all rows of the block, those of a stream in their order
             value[j, : len(m.value)] = m.value
-            stream = block.aids[m.instrument]
-            faults[j] = stream.faults[int(np.searchsorted(stream.time, m.time))]
+            faults[j] = next(rows[m.instrument])
         self._put("who", b, np.array([self.names[b].index(m.instrument) for m in packet.aids], np.int64))
         self._put("when", b, np.array([m.time for m in packet.aids]))
         self._put("value", b, value)

@@ -5,7 +5,8 @@ and answers are sent in this form. The same form is used within one process, so 
 
 A **packet** is a header (number of IMU samples, of other measurements, of float64 of the latter; start and end of the
 step) and float64 numbers: times, intervals, angular rates and specific forces of the IMU, then for each measurement
-the number of its instrument, its time and its components. An **answer** is a header (`ANSWER`), float64 numbers
+the number of its instrument, its time and its components, and with channels the index of its channel and its side
+information. An **answer** is a header (`ANSWER`), float64 numbers
 (position, velocity, attitude, covariance, diagnostics, each only where it was given) and, where there is more to say
 than numbers, a tail in JSON: the names and shapes of diagnostics when they first appear, and what was flagged.
 """
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.recording import Block
+from simnav.recording import AidStream, Block
 from simnav.types import Array, Estimate, ImuSamples, Measurement, Measurements
 
 __all__ = [
@@ -82,31 +83,33 @@ class PacketEncoder:
 
     Attributes
     ----------
-    streams : list of (str, str, int)
-        Name, kind and number of components of each aiding instrument, for `PacketDecoder`.
+    streams : list of (str, str, int, tuple of str, int)
+        For each aiding instrument its name, kind and number of components, its channels and the number of components of
+        their side information, for `PacketDecoder`.
     """
 
     def __init__(self, data: Block, ends: Array):
         streams = list(data.aids.values())
-        self.streams = [(s.name, s.kind, s.value.shape[1]) for s in streams]
+        self.streams = [(s.name, s.kind, s.value.shape[1], s.channels, s.side.shape[1]) for s in streams]
+        numbers = [_numbers(s) for s in streams]
         self._ends = [float(t) for t in ends]
         self._start = float(data.start)
         # Times are multiples of the sample interval up to rounding: half a microsecond decides.
         edges = np.asarray(ends) + 0.5e-6
         times = np.concatenate([s.time for s in streams]) if streams else np.empty(0)
         order = np.argsort(times, kind="stable")  # ties keep the scenario's order of instruments
-        widths = np.concatenate([np.full(len(s), 2 + s.value.shape[1]) for s in streams]) if streams else order
+        widths = np.concatenate([np.full(len(n), 2 + n.shape[1]) for n in numbers]) if streams else order
         first = np.zeros(len(times) + 1, dtype=np.intp)  # where each measurement begins, in order of time
         np.cumsum(widths[order], out=first[1:])
         place = np.empty(len(times), dtype=np.intp)
         place[order] = first[:-1]
         self._aids = np.empty(int(first[-1]))
         begin = 0
-        for number, s in enumerate(streams):
+        for number, (s, own) in enumerate(zip(streams, numbers, strict=True)):
             at = place[begin : begin + len(s)]
             begin += len(s)
             self._aids[at], self._aids[at + 1] = number, s.time
-            self._aids[at[:, None] + np.arange(2, 2 + s.value.shape[1])] = s.value
+            self._aids[at[:, None] + np.arange(2, 2 + own.shape[1])] = own
         cut = np.searchsorted(times[order], edges, side="right")
         self._counts = [int(c) for c in np.diff(cut, prepend=0)]
         self._edges = [int(first[c]) for c in cut]
@@ -135,20 +138,27 @@ class PacketEncoder:
         return [_PACKET.pack(samples, self._counts[k], b - a, 0, start, self._ends[k]), *buffers]
 
 
+def _numbers(stream: AidStream) -> Array:
+    """What a packet holds of each reading of a stream, beside instrument and time."""
+    if not stream.channels:
+        return stream.value
+    return np.hstack([stream.value, stream.channel[:, None].astype(np.float64), stream.side])
+
+
 class PacketDecoder:
     """From plain packets to `Measurements`.
 
     Parameters
     ----------
-    streams : sequence of (str, str, int)
-        Name, kind and number of components of each aiding instrument, from `PacketEncoder`.
+    streams : sequence of (str, str, int, tuple of str, int)
+        ``streams`` of the `PacketEncoder`.
     """
 
     #: Bytes of a header.
     HEADER = _PACKET.size
 
-    def __init__(self, streams: Iterable[tuple[str, str, int]]):
-        self._streams = [(name, kind, width) for name, kind, width in streams]
+    def __init__(self, streams: Iterable[tuple[str, str, int, tuple[str, ...], int]]):
+        self._streams = list(streams)
 
     @staticmethod
     def size(header: bytes | bytearray) -> int:
@@ -168,9 +178,15 @@ class PacketDecoder:
             )
         aids = []
         for _ in range(count):
-            name, kind, width = self._streams[int(values[i])]
-            aids.append(Measurement(float(values[i + 1]), name, kind, values[i + 2 : i + 2 + width]))
+            name, kind, width, channels, sides = self._streams[int(values[i])]
+            time, value = float(values[i + 1]), values[i + 2 : i + 2 + width]
             i += 2 + width
+            if channels:
+                side = values[i + 1 : i + 1 + sides]
+                aids.append(Measurement(time, name, kind, value, channels[int(values[i])], side))
+                i += 1 + sides
+            else:
+                aids.append(Measurement(time, name, kind, value))
         return Measurements(start, end, imu, aids)
 
 

@@ -14,7 +14,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic.fields import FieldInfo
 
 from simnav.plugins import PluginError, Registry, exception_of, place_of
@@ -42,8 +42,16 @@ def _intervals(value: Any) -> Any:
     return tuple(value)
 
 
+def _channels(value: Any) -> Any:
+    names = (value,) if isinstance(value, str) else value
+    if not isinstance(names, (list, tuple)) or names == [] or not all(isinstance(n, str) for n in names):
+        raise ValueError("should be the identifier of a channel, in quotes, or a list of them")
+    return tuple(names)
+
+
 #: Names of instruments; TOML may have one name without a list.
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
+_Channels = Annotated[tuple[str, ...], BeforeValidator(_channels)]
 _Intervals = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_intervals)]
 
 #: The effect of a fault on measurements: they are missing; white noise is added; a lasting error is added, or one that
@@ -67,6 +75,9 @@ class FaultSpec(Spec):
     ----------
     instruments : tuple of str
         Names or kinds of the affected instruments.
+    channels : tuple of str
+        Identifiers of the affected channels (satellites, beams, beacons), which each of the instruments has. Empty: the
+        whole instrument, with all its channels.
     start, end : float
         Beginning and end of the fault [s]; by default the whole run.
     intervals : tuple of (float, float)
@@ -87,6 +98,7 @@ class FaultSpec(Spec):
 
     kind: str
     instruments: Names
+    channels: _Channels = ()
     start: NonNegative = quantity("s", 0.0)
     end: Positive = quantity("s", inf)
     intervals: _Intervals = quantity("s", ())
@@ -125,6 +137,14 @@ class FaultSpec(Spec):
         if edges and edges[0] < 0.0:
             raise ValueError("intervals_s begin at 0 or later")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_empty(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The digest of a scenario whose faults name no channels is what it was before there were any."""
+        table: dict[str, Any] = serialize(self)
+        if not self.channels:
+            table.pop("channels", None)
+        return table
 
     @property
     def bits(self) -> int:
@@ -181,6 +201,33 @@ class FaultSpec(Spec):
             for n in names:
                 self._check_axes(stem, n, instruments[n])
 
+    def check_channels(self, instruments: Mapping[str, str], channels: Mapping[str, tuple[str, ...]]) -> None:
+        """Check that the instruments of the fault have its channels.
+
+        Parameters
+        ----------
+        instruments : mapping
+            The kind of each instrument, by its name.
+        channels : mapping
+            The channels of each instrument, by its name.
+
+        Raises
+        ------
+        SpecError
+            If an instrument does not have one of them.
+        """
+        for name in self.touched(instruments) if self.channels else ():
+            valid = channels.get(name, ())
+            if not valid:
+                raise SpecError(
+                    f"fault {self.kind!r}: channels = {list(self.channels)} is of no use to {name!r}, which has no "
+                    "channels; leave it out"
+                )
+            for channel in self.channels:
+                if channel not in valid:
+                    shown = ", ".join(valid[:20]) + (", ..." if len(valid) > 20 else "")
+                    raise SpecError(f"fault {self.kind!r}: {name!r} has no channel {channel!r}; it has: {shown}")
+
     def _check_units(self, stem: str, touched: Mapping[str, str]) -> None:
         needed = {q: name for name, kind in touched.items() for q in axes_of(kind)}
         if "" in needed and self.sizes_required:
@@ -223,9 +270,12 @@ class FaultSpec(Spec):
         """
         names = self.touched(instruments)
         intervals = self.intervals or ((self.start, self.end),)
-        when = {"kind", "instruments", "start", "end", "intervals", "mean_active", "mean_gap", "name"}
+        when = {"kind", "instruments", "channels", "start", "end", "intervals", "mean_active", "mean_gap", "name"}
         parameters = self.model_dump(exclude=when, exclude_none=True)
-        return [FaultLabel(self.kind, names, min(a, duration), min(b, duration), parameters) for a, b in intervals]
+        return [
+            FaultLabel(self.kind, names, min(a, duration), min(b, duration), parameters, self.channels)
+            for a, b in intervals
+        ]
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> object:
         """Make the layer of this fault for one run.

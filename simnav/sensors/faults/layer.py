@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from simnav.plugins import exception_of, place_of
 from simnav.recording import AidStream, ImuLabels
+from simnav.sensors.faults.by_channel import each_channel
 from simnav.sensors.faults.fault import FaultError, FaultSpec
 from simnav.streams import stream as random_stream
 from simnav.types import KINDS, Array, ImuSamples
@@ -137,8 +138,10 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
         return self._generators[names]
 
     def touches(self, stream: AidStream) -> bool:
-        """Whether the fault affects the instrument of this stream."""
-        return self.touches_kind(stream.name, stream.kind)
+        """Whether the fault affects the instrument of this stream, or the channel whose stream it is."""
+        name, _, channel = stream.name.partition(":")
+        wanted = self.spec.channels
+        return self.touches_kind(name, stream.kind) and (not channel or not wanted or channel in wanted)
 
     def touches_kind(self, name: str, kind: str) -> bool:
         """Whether the fault affects an instrument of this name and kind."""
@@ -184,6 +187,9 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
     def laid_over(self, stream: AidStream) -> AidStream:
         """`apply`, for the fault's instruments only, with errors that name the fault, its file and the instrument.
 
+        The readings of each of the fault's channels are a stream of their own for `apply`, with the name
+        ``INSTRUMENT:CHANNEL``.
+
         Raises
         ------
         FaultError
@@ -191,6 +197,12 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
         """
         if not self.touches(stream):
             return stream
+        if stream.channels:
+            return each_channel(stream, self.spec.channels, self._applied)
+        return self._applied(stream)
+
+    def _applied(self, stream: AidStream) -> AidStream:
+        """The checked result of `apply`."""
         try:
             result = self.apply(stream)
             if result is not stream:
@@ -212,7 +224,7 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
         Parameters
         ----------
         stream : AidStream
-            Measurements of one of the affected instruments, after earlier faults.
+            Measurements of one of the affected instruments, or of one of its channels, after earlier faults.
 
         Returns
         -------
