@@ -301,9 +301,9 @@ class InertialModel(ErrorModel):
             The state under the names of its attributes; ``sensors``, the noise of the IMU (`accumulate_error`); by
             instrument ``codes`` (its code, components, and the places of its bias and scale factor; no components:
             it is not used), ``arms``, ``noises`` (flat) and ``limits`` (values of this size are not plausible). None
-            where the model uses an instrument in a way of its own.
+            where the model uses an instrument in a way of its own, or channel by channel.
         """
-        if self._fused != set(self.noise):
+        if self._fused != set(self.noise) or not self.noise.keys() <= set(names):
             return None
         codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
         noises, limits = np.zeros((len(names), 9)), np.zeros((len(names), 3))
