@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 
 from simnav.estimators.models.base import Linearised, aid_biases, is_fast
 from simnav.estimators.models.chain import Chain, Columns, chain_of
+from simnav.estimators.models.equations import EQUATIONS, equation_of
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.points import PointModel
-from simnav.estimators.models.readings import READINGS
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
@@ -60,7 +60,7 @@ class GeneralModel(PointModel):
 
     state = ("x", "extra")
     moving = (slice(0, 0), slice(0, 0))
-    equations: ClassVar[tuple[str, ...]] = tuple(READINGS)
+    equations: ClassVar[tuple[str, ...]] = tuple(EQUATIONS)
 
     @abstractmethod
     def initial(self, start: InitialState, instruments: Instruments) -> tuple[Array, Array]:
@@ -98,7 +98,7 @@ class GeneralModel(PointModel):
         own = self.own.get(sheet.name)
         point = self.navigation(x, time)
         if own is None:
-            reading = READINGS[sheet.equation](point, sheet)
+            reading = equation_of(sheet).read(point, sheet)
         else:
             reading = own.read(point._replace(blocks=own.blocks(extra), channel=own.channel, side=side))
         at = self._bias_at.get(sheet.name, -1)

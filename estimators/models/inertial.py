@@ -50,16 +50,13 @@ from simnav.estimators.models.base import (
     stationary,
     triad_bias,
 )
+from simnav.estimators.models.equations import EQUATIONS, equation_of
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from simnav.estimators.models.measurements import (
-    CODES,
     HEADING,
-    OWN,
     Aid,
     State,
     observe,
-    uncalibrated_noise,
-    white_noise,
 )
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.propagation import (
@@ -71,7 +68,6 @@ from simnav.estimators.models.propagation import (
 )
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.rotation import dcm_from_rpy
-from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.types import (
     KINDS,
     NO_SIDE,
@@ -141,7 +137,7 @@ class InertialModel(ErrorModel):
     noise : dict of str to (d, d) array
         Covariance of the white noise of each instrument.
     uncalibrated : set of str
-        Instruments whose noise grows with the velocity (`simnav.estimators.models.measurements.uncalibrated_noise`).
+        Instruments whose noise grows with the velocity (`simnav.estimators.models.equations`).
     raw_rate, raw_force : (3,) array
         Angular rate at the time of the state (extrapolated) and specific force of the last IMU sample, as measured.
     transition, process_noise : (15, 15) array
@@ -244,26 +240,25 @@ class InertialModel(ErrorModel):
         for sheet in self.instruments.values():
             if not self.observes(sheet):
                 continue
-            states = aid_biases(sheet)
+            equation, states = equation_of(sheet), aid_biases(sheet)
             white = sheet.bias_instability**2 if is_fast(sheet) else np.zeros(len(states))
-            if sheet.equation == WATER_SPEED and self.calibrate:
+            if equation.through_water and self.calibrate:
                 states += 2 * [stationary(CURRENT, CURRENT_TIME)]
             if not self.calibrate:
-                along_keel = CURRENT**2 if sheet.equation == WATER_SPEED else 0.0
+                along_keel = CURRENT**2 if equation.through_water else 0.0
                 white = white + [s.variance + along_keel for s in states]
             elif any(s.variance or s.noise for s in states):
                 self.bias_at[sheet.name] = _NAV + len(self._states)
                 self._states += [(s.variance, s.decay, s.noise) for s in states]
-            if sheet.equation in (BODY_VELOCITY, WATER_SPEED) and (sheet.scale or np.any(sheet.misalignment)):
+            if sigmas := equation.scale_sigmas(sheet):
                 if self.calibrate:
                     self.scale_at[sheet.name] = _NAV + len(self._states)
-                    extra = sheet.misalignment if sheet.equation == BODY_VELOCITY else ()
-                    self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
+                    self._states += [(x * x, 0.0, 0.0) for x in sigmas]
                 else:
                     self.uncalibrated.add(sheet.name)
-            self.noise[sheet.name] = white_noise(sheet, white, self._rate_variance)
+            self.noise[sheet.name] = equation.white_noise(sheet, white, self._rate_variance)
             self.aid_parameters[sheet.name] = (
-                CODES.get(sheet.equation, OWN), np.array(sheet.lever_arm, dtype=np.float64),
+                equation.code, np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
         self._states += self._more_states()
@@ -285,7 +280,7 @@ class InertialModel(ErrorModel):
 
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument that has a measurement equation."""
-        return instrument.equation in CODES or KINDS[instrument.kind].observation is not None
+        return instrument.equation in EQUATIONS or KINDS[instrument.kind].observation is not None
 
     def arrays(self, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
         """The state and the constants, for a kernel that goes through many filters.
@@ -380,7 +375,8 @@ class InertialModel(ErrorModel):
         if not observe(self.aid_parameters[name], value, self._state(), innovation, jacobian):
             return None
         if name in self.uncalibrated:
-            noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
+            sheet = self.instruments[name]
+            noise = noise + equation_of(sheet).uncalibrated_noise(sheet, value - innovation)
         return Linearised(innovation, jacobian, noise)
 
     def _state(self) -> State:
