@@ -69,6 +69,12 @@ class FaultLabel:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     channels: tuple[str, ...] = ()
 
+    @property
+    def where(self) -> str:
+        """The affected instruments, with their channels in brackets, for a listing; empty without instruments."""
+        names = ", ".join(self.instruments)
+        return f"{names} [{', '.join(self.channels)}]" if self.channels else names
+
 
 def _no_channel() -> NDArray[np.int16]:
     return np.empty(0, np.int16)

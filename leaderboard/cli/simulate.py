@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,9 @@ from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.cli.options import Debug, Json, ScenarioName, Seed, absolute
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
+
+if TYPE_CHECKING:
+    from simnav.recording import AidStream
 
 __all__ = ["command"]
 
@@ -55,7 +58,7 @@ def command(
                 "csv": [str(p) for p in written],
             }
         )
-        rows: list[list[Any]] = [[s.name, s.kind, len(s), len(s.dropped), int((s.faults != 0).sum())]
+        rows: list[list[Any]] = [[s.name, _kind(s), len(s), len(s.dropped), int((s.faults != 0).sum())]
                                  for s in data.aids.values()]  # fmt: skip
         if data.imu is not None:
             rows.insert(0, ["imu", "imu", len(data.imu), 0, 0])
@@ -64,3 +67,8 @@ def command(
         out.print(table, f"recording: {target}")
         if written:
             out.print(f"CSV: {written[0].parent}")
+
+
+def _kind(stream: AidStream) -> str:
+    """The kind of an instrument, with the number of its channels."""
+    return f"{stream.kind} ({len(stream.channels)} channels)" if stream.channels else stream.kind

@@ -22,7 +22,7 @@ from simnav.leaderboard.figures.frames import (
     time_panels,
     time_unit,
 )
-from simnav.leaderboard.figures.style import GREY, INK, PAPER, TRUTH, Style, figure, styled
+from simnav.leaderboard.figures.style import GREY, INK, PALETTE, PAPER, TRUTH, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,6 +57,10 @@ class Band:
     values: Array
 
 
+#: Most channels of an instrument that a legend names.
+_MOST_CHANNELS = 12
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """One error over time, with the estimator's own three-sigma bound.
@@ -69,12 +73,15 @@ class Curve:
         Times [s] and values.
     bound : (n,) array or None
         The estimator's own three-sigma bound, if it has one.
+    channel : str
+        The channel of the instrument of which it is a diagnostic, if that has channels.
     """
 
     label: str
     time: Array
     values: Array
     bound: Array | None = None
+    channel: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,14 +343,21 @@ def run_chart(
             ax = fig.add_subplot(grid[row, column], sharex=first)
             first = first or ax
             shade(ax, outages, factor, named=row == 0)
+            by_channel = _channel_styles(curves)
             for c in curves:
-                colour = style.colour(c.label)
-                ax.plot(c.time * factor, c.values, color=colour, ls=style.line(c.label), lw=1.1, label=c.label)
+                colour, line = by_channel.get(c.channel) or (style.colour(c.label), style.line(c.label))
+                ax.plot(
+                    c.time * factor, c.values, color=colour, ls=line, lw=0.8 if c.channel else 1.1,
+                    label=(c.channel or "mean") if by_channel else c.label,
+                )  # fmt: skip
                 single = _alone(c.values)
                 ax.plot(c.time[single] * factor, c.values[single], ".", ms=4.5, mew=0.0, color=colour)
                 if c.bound is not None:
                     for sign in (1.0, -1.0):
                         ax.plot(c.time * factor, sign * c.bound, color=colour, lw=0.8, ls=(0, (3, 2)), alpha=0.75)
+            if by_channel:
+                named, _ = ax.get_legend_handles_labels()
+                ax.legend(handles=named[:_MOST_CHANNELS], ncols=6, loc="upper right", fontsize="x-small")
             if label in errors:
                 _frame_errors(ax, curves)
                 ax.axhline(0.0, color=GREY, lw=0.6, zorder=0.5)
@@ -355,6 +369,18 @@ def run_chart(
             claimed = any(c.bound is not None for curves in errors.values() for c in curves)
             first.set_title("Error; dashed: claimed ±3σ" if claimed else "Error")
     return fig
+
+
+def _channel_styles(curves: Sequence[Curve]) -> dict[str, tuple[str, str]]:
+    """Colour and line of each channel, where a panel has the channels of one estimator; several keep their colours."""
+    channels = list(dict.fromkeys(c.channel for c in curves if c.channel))
+    if len({c.label for c in curves}) > 1:
+        return {}
+    lines = ("-", "--", ":")
+    return {
+        channel: (PALETTE[i % len(PALETTE)][0], lines[i // len(PALETTE) % len(lines)])
+        for i, channel in enumerate(channels)
+    }
 
 
 def _alone(values: Array) -> NDArray[np.bool_]:

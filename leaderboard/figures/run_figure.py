@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,21 +79,33 @@ def outage_spans(recording: Recording, most: int = 12) -> list[tuple[float, floa
         if effect_of(fault.kind) == "missing":
             start, end = fault.start, min(fault.end, recording.duration)
             for name in fault.instruments:
-                for span in _without(recording, name, start, end):
-                    spans.setdefault(span, []).append(name)
+                for channel in fault.channels or ("",):
+                    for span in _without(recording, name, channel, start, end):
+                        spans.setdefault(span, []).append(f"{name}:{channel}" if channel else name)
     if len(spans) > most:
         return []
     return [(a, b, f"no {', '.join(dict.fromkeys(names))}") for (a, b), names in sorted(spans.items()) if a < b]
 
 
-def _without(recording: Recording, name: str, start: float, end: float) -> list[tuple[float, float]]:
-    """When within an outage an instrument gives nothing: all through it, unless it takes single measurements away."""
+def _without(recording: Recording, name: str, channel: str, start: float, end: float) -> list[tuple[float, float]]:
+    """When within an outage an instrument gives nothing: all through it, unless it takes single measurements away.
+
+    With a channel it is that channel that gives nothing.
+    """
     stream = recording.data.aids.get(name)
-    if stream is None or not np.any((stream.time >= start) & (stream.time < end)):
+    if stream is None:
         return [(start, end)]
-    time = np.concatenate([stream.time, stream.dropped])
+    given, dropped = stream.time, stream.dropped
+    if channel in stream.channels:
+        c = stream.channels.index(channel)
+        given, dropped = given[stream.channel == c], dropped[stream.dropped_channel == c]
+    elif stream.channels:
+        given, dropped = np.unique(given), np.setdiff1d(dropped, given)
+    if not np.any((given >= start) & (given < end)):
+        return [(start, end)]
+    time = np.concatenate([given, dropped])
     order = np.argsort(time, kind="stable")
-    time, lost = time[order], (np.arange(len(time)) >= len(stream))[order]
+    time, lost = time[order], (np.arange(len(time)) >= len(given))[order]
     lost &= (time >= start) & (time < end)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
     ends = np.append(time, end)
@@ -169,6 +182,9 @@ def _label(name: str, unit: str) -> str:
 def _diagnostics(shown: Sequence[tuple[str, Trial, Array]], recording: Recording) -> dict[str, list[Curve]]:
     """The diagnostics that most estimators give, one panel each; of an array, its mean over the components.
 
+    Those of the channels of one instrument (``nis.INSTRUMENT:CHANNEL``) have one panel together, with the mean over its
+    channels (``nis.INSTRUMENT``) where an estimator gives it.
+
     Where not all can be shown, those of an instrument or of the motion go before counters.
     """
     found: dict[str, list[Curve]] = {}
@@ -180,12 +196,14 @@ def _diagnostics(shown: Sequence[tuple[str, Trial, Array]], recording: Recording
                 mean = np.where(count > 0, np.nansum(v, axis=1) / np.maximum(count, 1), np.nan)
                 if np.nanmax(mean) == np.nanmin(mean):
                     continue  # it says nothing over time
-                found.setdefault(name, []).append(Curve(label, trial.time, mean))
-    most = sorted(found.items(), key=lambda item: (-len(item[1]), "." not in item[0]))[:_MOST_DIAGNOSTICS]
+                panel, _, channel = name.partition(":")
+                found.setdefault(panel, []).append(Curve(label, trial.time, mean, channel=channel))
+    labels = {name: len({c.label for c in curves}) for name, curves in found.items()}
+    most = sorted(found.items(), key=lambda item: (-labels[item[0]], "." not in item[0]))[:_MOST_DIAGNOSTICS]
     panels = {}
     for name, curves in most:
         unit, factor = _unit(name, recording)
-        panels[_label(name, unit)] = [Curve(c.label, c.time, factor * c.values) for c in curves]
+        panels[_label(name, unit)] = [replace(c, values=factor * c.values) for c in curves]
     return panels
 
 

@@ -14,13 +14,21 @@ the band is in the interval, the row is **undecided**: a wide interval never agr
 
 With fewer than `FEWEST` runs a row is undecided. If a method failed in any run, the row differs, whatever the mean of
 the other runs is.
+
+That verdict is about our mean. A paper mostly prints **one run**, and single runs scatter. So there is a second
+verdict: does the printed figure lie in the range that holds 95 % of our single runs (`single_runs`)? A printed run that
+lies inside is one that our simulation gives as well, whatever its mean is.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
+from scipy.special import stdtrit
 
 from simnav.leaderboard.papers.paper import Range, Rule
 from simnav.leaderboard.ranking.statistics import Interval
@@ -28,25 +36,36 @@ from simnav.leaderboard.ranking.statistics import Interval
 __all__ = [
     "FEWEST",
     "GAIN",
+    "MANY",
     "RULES",
     "TOLERANCE",
+    "Single",
     "Verdict",
     "as_gain",
     "judge",
     "judge_gain",
+    "judge_single",
+    "single_runs",
 ]
 
 TOLERANCE = 0.25
 GAIN = 1.5
 FEWEST = 3
+#: From so many runs on their own quantiles are the ends of the range of single runs.
+MANY = 40
 
 #: The rule in short, for the command and the pages.
 RULES = (
     "Intervals are Student's 95 % intervals over the runs. A row agrees if the whole interval lies in the band of "
     "figures that agree, and differs if it lies outside. Otherwise it is undecided. The band: within 25 % of the "
     "paper's figure; every figure that keeps a bound; for a gain, a logarithm of the ratio within a factor of 1.5 of "
-    "the paper's. Fewer than three runs decide nothing. A method that failed in any run differs."
+    "the paper's. Fewer than three runs decide nothing. A method that failed in any run differs. "
+    "The column 'a single run' has a second verdict: whether the paper's figure lies in the range that holds 95 % of "
+    "our single runs."
 )
+
+#: Whether a printed figure can be a single run of ours: in the range, or on which side of it; empty: not known.
+Single = Literal["inside", "below", "above", ""]
 
 
 @dataclass(frozen=True)
@@ -109,6 +128,68 @@ def judge_gain(ours: Interval, paper: float) -> Verdict:
     """
     ends = sorted((paper ** (1.0 / GAIN), paper**GAIN))
     return _verdict(ours, *ends)
+
+
+def single_runs(values: Iterable[float]) -> Interval:
+    """The range that holds 95 % of the single runs.
+
+    From `MANY` runs on its ends are the 2.5 % and the 97.5 % quantile, such that one more run lies inside with 95 %
+    probability (Weibull's plotting position, i / (n + 1)). With fewer runs they are those of Student's
+    prediction interval for one more run, on the logarithmic scale: ``m ± t s sqrt(1 + 1/n)``.
+
+    Parameters
+    ----------
+    values : iterable of float
+        The figure of each run, or the ratio of two methods on each seed. Values that are not finite are left out.
+
+    Returns
+    -------
+    Interval
+        The median and the ends; all NaN with fewer than `FEWEST` runs, or where a figure of few runs is not positive.
+
+    Examples
+    --------
+    >>> found = single_runs([0.9, 1.0, 1.1])
+    >>> round(found.value, 3), round(found.low, 2), round(found.high, 2)
+    (1.0, 0.6, 1.63)
+    """
+    x = np.array([v for v in values if math.isfinite(v)])
+    n = len(x)
+    if n < FEWEST or (n < MANY and x.min() <= 0.0):
+        return Interval(math.nan, runs=n)
+    if n >= MANY:
+        low, middle, high = np.quantile(x, [0.025, 0.5, 0.975], method="weibull").tolist()
+        return Interval(middle, low, high, n)
+    logs = np.log(x)
+    half = float(stdtrit(n - 1, 0.975)) * float(logs.std(ddof=1)) * math.sqrt(1.0 + 1.0 / n)
+    centre = float(logs.mean())
+    return Interval(float(np.median(x)), math.exp(centre - half), math.exp(centre + half), n)
+
+
+def judge_single(runs: Interval, paper: Range) -> Single:
+    """Whether a paper's figure can be a single run of ours.
+
+    Parameters
+    ----------
+    runs : Interval
+        From `single_runs`; for a gain, of the ratios.
+    paper : float or pair of float
+        The paper's figure or range, in the same unit; for a gain, the ratio.
+
+    Returns
+    -------
+    str
+        ``inside``; ``below`` or ``above``: the paper's figure is below or above the range; empty without a range.
+
+    Examples
+    --------
+    >>> [judge_single(Interval(1.0, 0.6, 1.6, 9), paper) for paper in (1.5, 0.5, (1.5, 1.8), 2.0)]
+    ['inside', 'below', 'inside', 'above']
+    """
+    if math.isnan(runs.low):
+        return ""
+    least, most = paper if isinstance(paper, tuple) else (paper, paper)
+    return "below" if most < runs.low else "above" if least > runs.high else "inside"
 
 
 def as_gain(ratio: Interval) -> Interval:

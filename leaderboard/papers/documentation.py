@@ -2,7 +2,8 @@
 
 ``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav
 reproduce PAPER --until-decided``, it stores the results of that folder first. Each page has a marked block for each of
-these: ``citation``, ``tables`` and ``contents``; the overview has ``overview``. The text between the marks is replaced,
+these: ``citation``, ``tables`` and ``contents``; the overview has ``overview``. The figures are in
+``docs/papers/figures``. The text between the marks is replaced,
 and everything else is written by hand.
 """
 
@@ -14,9 +15,10 @@ from pathlib import Path
 from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers import paper as papers
 from simnav.leaderboard.papers.contents import contents
-from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Paper
-from simnav.leaderboard.papers.report import sheets, verdicts
-from simnav.leaderboard.papers.reproduction import fill, find_method, load_results
+from simnav.leaderboard.papers.figures import Drawn, write_figures
+from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Figure, Paper
+from simnav.leaderboard.papers.report import Sheet, sheets, single_run_sentence, verdicts
+from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method, load_results
 from simnav.leaderboard.papers.sequential import LIMIT
 from simnav.leaderboard.papers.stored import load, provenance, save
 from simnav.leaderboard.results.provenance import Provenance
@@ -33,6 +35,24 @@ def update(folder: Path = FOLDER) -> None:
     for name, texts in pages.items():
         path = folder / name
         path.write_text(replaced(path.read_text(encoding="utf-8"), texts), encoding="utf-8")
+
+
+def draw(folder: Path = FOLDER) -> None:
+    """Draw the figures that need no run, and make the files small: they have few colours."""
+    from PIL import Image
+
+    for key in PAPERS:
+        place = folder / "figures" / key
+        place.mkdir(parents=True, exist_ok=True)
+        for old in place.glob("*.png"):
+            old.unlink()
+        for drawn in _figures(load(papers.load(key)), place):
+            assert drawn.path is not None
+            Image.open(drawn.path).convert("RGB").quantize(64).save(drawn.path, optimize=True)
+
+
+def _figures(found: Reproduction, place: Path) -> list[Drawn]:
+    return [d for d in write_figures(found, place, scores_only=True) if d.path is not None]
 
 
 def replaced(page: str, texts: dict[str, str]) -> str:
@@ -62,6 +82,7 @@ def blocks(paper: Paper) -> dict[str, str]:
     tables = [
         "\n".join(f"- {plural[0].upper()}{plural[1:]}: {text}." for kind, plural in KINDS_OF_ROWS.items()
                   if (text := verdicts(found, kind))),
+        single_run_sentence(found),
         *(f"Computed on {p.date} with {_versions(p)}, on {p.cpu}." for p in provenance(paper)),
     ]  # fmt: skip
     for sheet in sheets(found):
@@ -69,12 +90,26 @@ def blocks(paper: Paper) -> dict[str, str]:
         head = [c.title for c in sheet.columns]
         rule = ["--:" if c.numeric else "---" for c in sheet.columns]
         lines = [_line(cells) for cells in (head, rule, *(row.cells for row in sheet.rows))]
-        tables += [f"### {number}{sheet.title}", "\n".join(lines), "\n".join(f"- {note}" for note in sheet.notes)]
+        notes = "\n".join(f"- {note}" for note in sheet.notes)
+        tables += [f"### {number}{sheet.title}", *_pictures(paper, sheet), "\n".join(lines), notes]
+    further = _images(paper, (f for f in paper.figures if f.draw in ("bars", "gains") and not f.number))
+    tables += ["### Of all runs", *further] if further else []
     return {
         "citation": _citation(paper),
         "tables": "\n\n".join(text for text in tables if text),
         "contents": _contents(paper),
     }
+
+
+def _pictures(paper: Paper, sheet: Sheet) -> list[str]:
+    """The drawn figures of a table: those of its number, and its figures over the paper's."""
+    numbered = [f for f in paper.figures if f.draw in ("bars", "gains") and f.number and f.number == sheet.number]
+    return _images(paper, [*numbered, Figure("", sheet.title, "ratios", "", ())])
+
+
+def _images(paper: Paper, entries: Iterable[Figure]) -> list[str]:
+    images = {f"figures/{paper.key}/{f.name}.png": f.title for f in entries}
+    return [f"![{title}]({image})" for image, title in images.items() if (FOLDER / image).exists()]
 
 
 def _versions(p: Provenance) -> str:
@@ -85,12 +120,15 @@ def _versions(p: Provenance) -> str:
 
 def overview() -> str:
     """A table of the papers with the verdicts on their rows."""
-    lines = [_line(("paper", "comparison", *KINDS_OF_ROWS.values())), _line(("---",) * (2 + len(KINDS_OF_ROWS)))]
+    titles = ("paper", "comparison", *KINDS_OF_ROWS.values(), "a single run of ours")
+    lines = [_line(titles), _line(("---",) * len(titles))]
     for key in PAPERS:
         paper = papers.load(key)
         found = load(paper)
         counts = (verdicts(found, kind) or "none" for kind in KINDS_OF_ROWS)
-        lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, *counts)))
+        inside, known = found.single_runs
+        single = f"{inside} of {known} that do not agree" if known else "–"
+        lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, *counts, single)))
     return "\n".join(lines)
 
 
@@ -130,4 +168,5 @@ if __name__ == "__main__":
         sys.exit("usage: python -m simnav.leaderboard.papers.documentation [FOLDER]")
     for given in sys.argv[1:]:
         _store(Path(given))
+    draw()
     update()

@@ -19,7 +19,8 @@ from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_
 from simnav.leaderboard.figures.style import Style, save
 from simnav.leaderboard.papers.comparison import as_gain
 from simnav.leaderboard.papers.measures import value_of
-from simnav.leaderboard.papers.paper import Figure, Gain, Range, Value
+from simnav.leaderboard.papers.paper import Figure, Gain, Range, Table, Value
+from simnav.leaderboard.papers.ratio_figure import EDGE, ratio_figure, ratios
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
 from simnav.types import Array
@@ -114,6 +115,9 @@ def write_figures(
         One for each figure that was to be drawn, in their order.
     """
     figures = [f for f in found.paper.figures if f.draw in ("bars", "gains") or not scores_only]
+    figures += [
+        Figure("", table.title, "ratios", "", ()) for table in found.paper.tables if _compared_rows(found, table)
+    ]
     sketch = _Sketch(found)
     drawn = []
     for k, entry in enumerate(figures):
@@ -148,6 +152,7 @@ class _Sketch:
             "bars": self._bars,
             "gains": self._gains,
             "distribution": self._distribution,
+            "ratios": self._ratios,
         }[entry.draw]
         return draw(entry)
 
@@ -329,6 +334,17 @@ class _Sketch:
         fig, shown, caption = self._compared(entry, panels, zero=True)
         return fig, [first, *shown] if shown else [], caption
 
+    def _ratios(self, entry: Figure) -> _Made:
+        """All figures of a table that the paper and we have, ours over the paper's."""
+        rows = ratios([f for f in self.found.findings if f.table == entry.what])
+        fig = ratio_figure(rows, f"{self.paper.short}: {entry.what}")
+        caption = (
+            "Our figures as multiples of the paper's; of a gain, the ratio of the two errors. Thick: the 95 % interval "
+            "of our mean. Thin: the range of 95 % of our single runs. A figure beyond a factor of "
+            f"{EDGE:g} is written as a number."
+        )
+        return fig, [], caption
+
     def _compared(self, entry: Figure, panels: dict[str, list[Bar]], *, zero: bool) -> _Made:
         shown = {b.label for of in panels.values() for b in of if math.isfinite(b.value)}
         if not shown:
@@ -336,6 +352,11 @@ class _Sketch:
         fig = bars(panels, self.style, title=self._heading(entry, self._count()), zero=zero)
         caption = f"Mean over {self._count()} with its 95 % interval, the runs (faint), and the paper's figure."
         return fig, [m for m in entry.methods if m in shown], caption
+
+
+def _compared_rows(found: Reproduction, table: Table) -> int:
+    """How many rows of a table can be drawn beside the paper's."""
+    return len(ratios([f for f in found.findings if f.table == table.title]))
 
 
 def _bar(label: str, ours: Interval, runs: Iterable[float], paper: Range | None) -> Bar:

@@ -77,10 +77,13 @@ class PaperPage:
         The contents of the page.
     folder : Path
         Folder of its figures.
+    stored : Reproduction or None
+        The results that come with simnav, if the page is made of them: its figures are drawn when it is installed.
     """
 
     document: _Document
     folder: Path
+    stored: Reproduction | None = None
 
     @property
     def paper(self) -> str:
@@ -106,9 +109,16 @@ class PaperPage:
         """Write the page into the folder of a site, and copy its figures."""
         place = f"figures/paper-{self.document.paper}/"
         (folder / place).mkdir(parents=True, exist_ok=True)
-        for figure in self.document.figures:
-            shutil.copyfile(self.folder / figure.file, folder / place / figure.file)
-        write_whole(folder / self.page, _render(self.document, place, site))
+        document = self.document
+        if self.stored is not None:
+            from simnav.leaderboard.papers.figures import write_figures
+
+            drawn = write_figures(self.stored, folder / place, scores_only=True)
+            document = _document(self.stored, drawn)
+        else:
+            for figure in document.figures:
+                shutil.copyfile(self.folder / figure.file, folder / place / figure.file)
+        write_whole(folder / self.page, _render(document, place, site))
 
 
 def write(found: Reproduction, drawn: Sequence[Drawn], folder: Path) -> Path:
@@ -132,7 +142,8 @@ def find(folder: Path) -> list[PaperPage]:
     """The pages of the repeated comparisons, in the order of the papers.
 
     A comparison below the folder comes first. If there is none, or it is damaged or of another version, the page is
-    made from the results that come with simnav, without figures. If there are none either, the paper has no page.
+    made from the results that come with simnav, with the figures that need no run. If there are none either, the paper
+    has no page.
     """
     pages = []
     for key in PAPERS:
@@ -158,7 +169,8 @@ def _stored(folder: Path, key: str) -> PaperPage | None:
     from simnav.leaderboard.papers import paper, stored
 
     try:
-        return PaperPage(_document(stored.load(paper.load(key)), []), folder)
+        found = stored.load(paper.load(key))
+        return PaperPage(_document(found, []), folder, found)
     except ValueError:
         return None
 

@@ -42,8 +42,8 @@ Range = float | tuple[float, float]
 Rule = Literal["equal", "at-most", "at-least", "beside"]
 
 #: ``track`` and ``run`` (errors over time) show one run. ``spread`` (errors over time), ``bars``, ``gains`` and
-#: ``distribution`` show all runs.
-Draw = Literal["track", "run", "spread", "bars", "gains", "distribution"]
+#: ``distribution`` show all runs; ``ratios``, which every table has, shows all its figures over the paper's.
+Draw = Literal["track", "run", "spread", "bars", "gains", "distribution", "ratios"]
 
 
 # Panels of figures of one run.
@@ -150,6 +150,7 @@ KINDS_OF_ROWS: Mapping[str, str] = {
     "cost bound": "one-sided bounds on time and memory",
 }
 _COST = ("update_mean", "peak_memory")
+_LONGEST_NAME = 60  # of a file of a figure, without its ending
 
 
 def kind_of(row: Row) -> str:
@@ -231,7 +232,8 @@ class Figure:
         >>> Figure("Figure 5", "Errors", "run", "ship-turn", (), part="CTM").name
         'figure-5-ctm'
         """
-        return re.sub(r"[^a-z0-9]+", "-", f"{self.number or self.what} {self.part}".lower()).strip("-")
+        words = re.sub(r"[^a-z0-9]+", "-", f"{self.number or self.what} {self.part}".lower()).strip("-")
+        return words[:_LONGEST_NAME].rstrip("-")
 
 
 @dataclass(frozen=True)

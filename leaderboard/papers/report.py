@@ -28,22 +28,40 @@ __all__ = [
     "contents_table",
     "paper_tables",
     "sheets",
+    "single_run_sentence",
     "summary",
     "verdicts",
     "whereabouts",
     "write_csv",
 ]
 
-_COLUMNS = ("method", "estimator", "measure", "paper", "ours [95 %]", "runs", "verdict")
+_COLUMNS = ("method", "estimator", "measure", "paper", "ours [95 %]", "runs", "verdict", "a single run")
 _NUMERIC = ("paper", "ours [95 %]", "runs")
 
 
 def summary(found: Reproduction) -> str:
     """One line: how many rows agree, differ and are undecided, for each kind of rows."""
     counts = [f"{plural}: {text}" for kind, plural in KINDS_OF_ROWS.items() if (text := verdicts(found, kind))]
+    inside, known = found.single_runs
+    if known:
+        counts.append(f"of {known} figures that do not agree, {inside} {_lies(inside)} in the range of our single runs")
     others = {"absent": "without a registered estimator", "failed": "failed", "unsuitable": "not applicable"}
     counts += [f"{n} rows {words}" for verdict, words in others.items() if (n := found.count(verdict))]
     return f"{found.paper.short}, up to {len(found.seeds)} runs of each scenario; {'; '.join(counts)}"
+
+
+def single_run_sentence(found: Reproduction) -> str:
+    """How many figures that do not agree can be a single run of ours; empty if none has such a range."""
+    inside, known = found.single_runs
+    if not known:
+        return ""
+    return (
+        f"Of {known} figures that do not agree with our mean, {inside} {_lies(inside)} in the range of our single runs."
+    )
+
+
+def _lies(count: int) -> str:
+    return "lies" if count == 1 else "lie"
 
 
 def verdicts(found: Reproduction, kind: str) -> str:
@@ -116,7 +134,7 @@ def sheets(found: Reproduction) -> Iterator[Sheet]:
             name = _method(f)
             same = name == before
             who = ["", ""] if same else [name, " / ".join(f.estimators)]
-            texts = [*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys)]
+            texts = [*who, _title(f, several), _paper(f), _ours(f), _runs(f), _verdict(f, whys), _single(f)]
             cells.append(SheetRow(texts, f.verdict))
             before = name
         notes = [f"({chr(ord('a') + i)}) {why}" for i, why in enumerate(whys)]
@@ -220,6 +238,22 @@ def _verdict(f: Finding, whys: list[str]) -> str:
         return f.why
     word = "" if f.verdict == "ours" else f.verdict
     return f"{word} ({chr(ord('a') + whys.index(f.why))})" if f.why else word
+
+
+def _single(f: Finding) -> str:
+    """The range of our single runs, and where the paper's figure lies."""
+    if f.single is None or not f.single_verdict:
+        return ""
+    place = {"inside": "inside", "below": "paper is below", "above": "paper is above"}[f.single_verdict]
+    if not isinstance(f.row, Gain):
+        return f"{place}: {tables.number(f.single.low)} to {tables.number(f.single.high)}"
+    least, most = (_gain(ratio) for ratio in (f.single.high, f.single.low))
+    return f"{place}: {least} to {most}"
+
+
+def _gain(ratio: float) -> str:
+    """A gain in percent, or a factor where the error is more than twice as large."""
+    return f"{tables.number(ratio)} times the error" if ratio > 2.0 else tables.percent(round(1.0 - ratio, 3) + 0.0)
 
 
 def write_csv(found: Reproduction, path: Path) -> Path:

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.papers.comparison import Verdict, as_gain, judge, judge_gain
+from simnav.leaderboard.papers.comparison import (
+    Single,
+    Verdict,
+    as_gain,
+    judge,
+    judge_gain,
+    judge_single,
+    single_runs,
+)
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row, kind_of
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
@@ -48,6 +56,12 @@ class Finding:
         Labels of the estimators that stand for the row's methods.
     failed : int
         Number of runs that failed.
+    single : Interval or None
+        The range that holds 95 % of our single runs, in the unit of ``ours``
+        (`simnav.leaderboard.papers.comparison.single_runs`). None where the paper has a bound or no figure.
+    single_verdict : str
+        Whether the paper's figure lies in this range: ``inside``, ``below`` or ``above``; empty where it is not known.
+        For a gain it is the gain that is below or above.
     """
 
     table: str
@@ -57,6 +71,8 @@ class Finding:
     why: str = ""
     estimators: tuple[str, ...] = ()
     failed: int = 0
+    single: Interval | None = None
+    single_verdict: Single = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +102,13 @@ class Reproduction:
     def count(self, verdict: str, kind: str = "") -> int:
         """Number of rows with a verdict; of one kind (`simnav.leaderboard.papers.paper.kind_of`), or of all."""
         return sum(f.verdict == verdict and kind in ("", kind_of(f.row)) for f in self.findings)
+
+    @property
+    def single_runs(self) -> tuple[int, int]:
+        """Of the figures and gains that differ, or are undecided: how many lie in the range of our single runs, of how
+        many with such a range."""
+        known = [f for f in self.findings if f.verdict in ("differs", "undecided") and f.single_verdict]
+        return sum(f.single_verdict == "inside" for f in known), len(known)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -134,6 +157,7 @@ def _row_dict(f: Finding) -> dict[str, Any]:
     gain = isinstance(f.row, Gain)
     paper: Any = f.row.paper
     ours = as_gain(f.ours) if gain and f.ours is not None else f.ours
+    single = as_gain(f.single) if gain and f.single is not None else f.single
     return {
         "table": f.table,
         "scenario": f.row.scenario,
@@ -152,6 +176,9 @@ def _row_dict(f: Finding) -> dict[str, Any]:
         "high": None if ours is None else ours.high,
         "runs": 0 if ours is None else ours.runs,
         "failed": f.failed,
+        "single_low": None if single is None else single.low,
+        "single_high": None if single is None else single.high,
+        "single_verdict": f.single_verdict,
         "verdict": f.verdict,
         "why": f.why,
     }
@@ -308,6 +335,11 @@ def find(
         if row.paper is None:
             return Finding(table, row, ours, "ours", "", names, failed)
         verdict = judge_gain(ours, 1.0 - row.paper)
+        single = single_runs(a / values[1][s] for s, a in values[0].items() if values[1].get(s, 0.0) > 0.0)
+        # A ratio below the range is a gain above it.
+        found = judge_single(single, 1.0 - row.paper)
+        of_gain: dict[Single, Single] = {"below": "above", "above": "below"}
+        word = of_gain.get(found, found)
         # The side is that of the ratio: a higher ratio is a smaller gain.
         why = {-1: row.higher, 1: row.lower}
     else:
@@ -318,9 +350,13 @@ def find(
             return Finding(table, row, ours, "ours", "", names, failed)
         verdict = judge(ours, row.paper, row.rule)
         why = {-1: row.lower, 1: row.higher}
+        single, word = None, ""
+        if kind_of(row) == "figure":
+            single = single_runs(values[0].values())
+            word = judge_single(single, row.paper)
     if failures[0] or (failed and isinstance(row, Gain)):  # a run that failed is worse than any figure
         verdict = Verdict("differs", 1 if failures[0] else -1)
     sentence = ""
     if verdict.word == "differs":
         sentence = why[verdict.side] or _UNEXPLAINED
-    return Finding(table, row, ours, verdict.word, sentence, names, failed)
+    return Finding(table, row, ours, verdict.word, sentence, names, failed, single, word)

@@ -1,7 +1,8 @@
 """A recording for other programs: one file (npz), or a folder of CSV files.
 
 A folder has one file for the truth, one for the IMU, and one for each aiding instrument. Columns end in their unit;
-angles are in degrees. Nothing is rounded: a file read back holds the same numbers, up to the conversion from radians.
+angles are in degrees. Of an instrument with channels each reading is a row, with its channel and side information.
+Nothing is rounded: a file read back holds the same numbers, up to the conversion from radians.
 """
 
 from __future__ import annotations
@@ -55,24 +56,37 @@ def write_csv(recording: Recording, path: Path) -> list[Path]:
         written.append(_table(path / "imu.csv", imu.time, _IMU, samples))
     for stream in recording.data.aids.values():
         file = path / f"{stream.name}.csv"
-        units = {c.name: c.unit for c in KINDS[stream.kind].components}
-        written.append(_table(file, stream.time, units, stream.value, stream.faults))
+        kind = KINDS[stream.kind]
+        units = {c.name: c.unit for c in (*kind.components, *(kind.side if stream.channels else ()))}
+        values = np.hstack([stream.value, stream.side]) if stream.channels else stream.value
+        channels = np.array(stream.channels)[stream.channel] if stream.channels else None
+        written.append(_table(file, stream.time, units, values, stream.faults, channels))
     return written
 
 
 def _table(
-    path: Path, time: Array, units: Mapping[str, str], values: Array, faults: NDArray[np.uint32] | None = None
+    path: Path,
+    time: Array,
+    units: Mapping[str, str],
+    values: Array,
+    faults: NDArray[np.uint32] | None = None,
+    channels: NDArray[np.str_] | None = None,
 ) -> Path:
     """Write the columns, of the given names and units."""
     # Degrees as NumPy has them: 180 / pi, where a division by pi / 180 may differ in the last digit.
-    scale = np.array([np.degrees(1.0) if u in ("deg", "deg_s") else 1.0 / UNITS[u] for u in units.values()])
-    header = ["time_s", *(f"{name}_{unit}" for name, unit in units.items())]
+    scale = np.array([np.degrees(1.0) if u in ("deg", "deg_s") else 1.0 / UNITS.get(u, 1.0) for u in units.values()])
+    header = ["time_s", *(f"{name}_{unit}" if unit else name for name, unit in units.items())]
     columns = [time[:, None], values * scale]
     formats = ["%.17g"] * (1 + len(units))
     if faults is not None:
         header.append("faults")  # bit mask of the faults that touched the measurement
         columns.append(np.asarray(faults, dtype=np.float64)[:, None])
         formats.append("%d")
+    rows = np.hstack(columns)
+    if channels is not None:
+        header.insert(1, "channel")
+        formats.insert(1, "%s")
+        rows = np.insert(rows.astype(object), 1, channels, axis=1)
     text = io.StringIO()
-    np.savetxt(text, np.hstack(columns), fmt=formats, delimiter=",", header=",".join(header), comments="")
+    np.savetxt(text, rows, fmt=formats, delimiter=",", header=",".join(header), comments="")
     return write_whole(path, text.getvalue())

@@ -109,7 +109,8 @@ def background(identity: str, seeds: Iterable[int]) -> Background:
     units = {}
     for name, stream in first.data.aids.items():
         if (unit := innovation_unit(stream.kind)) is not None:
-            units[name] = ["°" if unit[0] == "deg" else unit[0], unit[1]]
+            for source in (name, *(f"{name}:{channel}" for channel in stream.channels)):
+                units[source] = ["°" if unit[0] == "deg" else unit[0], unit[1]]
     return Background(
         happening=events(scenario, first),
         instruments=datasheets(scenario, first),
@@ -164,7 +165,7 @@ def track_of(recording: Recording) -> dict[str, Any]:
     faulty: list[tuple[Any, ...]] = []
     for part, fault in enumerate(recording.faults):
         inside = np.flatnonzero((time >= fault.start) & (time <= fault.end))
-        name = f"{fault.kind.replace('_', ' ')} ({', '.join(fault.instruments)})"
+        name = f"{fault.kind.replace('_', ' ')} ({fault.where})"
         faulty += [
             (short(track.east[k]), short(track.north[k]), short(time[k]), name, part)
             for k in inside[:: max(1, len(inside) // 40)]

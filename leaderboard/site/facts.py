@@ -172,15 +172,15 @@ def events(scenario: Scenario | None, recording: Recording) -> dict[str, list[An
         words = _table(manoeuvre.to_toml(), skip=("kind", "duration_s"))
         rows.append(("manoeuvres", manoeuvre.kind.replace("_", " "), time, end, words))
         time = end
-    specs = {(f.kind, tuple(f.instruments)): f for f in (scenario.faults if scenario is not None else ())}
+    specs = {(f.kind, tuple(f.instruments), f.channels): f for f in (scenario.faults if scenario is not None else ())}
     for label in recording.faults:
         start, end = max(label.start, 0.0), min(label.end, recording.duration)
         if start < end:
-            spec = specs.get((label.kind, tuple(label.instruments)))
+            spec = specs.get((label.kind, tuple(label.instruments), label.channels))
             known = {} if spec is None else spec.to_toml()
             words = _table(known, skip=("kind", "instruments", "start_s", "end_s", "intervals_s"))
             name = label.kind.replace("_", " ")
-            rows.append((f"{name}: {', '.join(label.instruments) or 'all'}", name, start, end, words))
+            rows.append((f"{name}: {label.where or 'all'}", name, start, end, words))
     return columns(EVENT, rows)
 
 

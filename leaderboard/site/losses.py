@@ -110,5 +110,6 @@ def faults_of(identity: str, seed: int) -> str:
         table = fault.to_toml()
         start, end = table.get("start_s"), table.get("end_s")
         when = f" ({start:.0f} to {end:.0f} s)" if start is not None and end is not None else ""
-        words.append(f"{', '.join(fault.instruments) or 'all'}: {fault.kind.replace('_', ' ')}{when}")
+        channels = f" [{', '.join(fault.channels)}]" if fault.channels else ""
+        words.append(f"{', '.join(fault.instruments) or 'all'}{channels}: {fault.kind.replace('_', ' ')}{when}")
     return "; ".join(words)

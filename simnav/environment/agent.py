@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 
 from simnav.estimator import Estimator
-from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurement, Measurements
+from simnav.types import NO_SIDE, Array, Estimate, ImuSamples, InitialState, Instruments, Measurement, Measurements
 
 __all__ = ["EstimatorAgent", "unpack"]
 
@@ -38,8 +38,14 @@ def unpack(observation: Mapping[str, Any], instruments: Instruments) -> Measurem
     aids = []
     for name, sheet in instruments.items():
         entry = observation[name]
-        for i in range(int(entry["valid"].sum())):
-            aids.append(Measurement(float(entry["time"][i]), name, sheet.kind, entry["value"][i]))
+        channels = sheet.channels
+        for i in np.flatnonzero(entry["valid"]).tolist():
+            m = Measurement(float(entry["time"][i]), name, sheet.kind, entry["value"][i])
+            if channels:  # each has its slots
+                m = m._replace(
+                    channel=channels[i % len(channels)], side=entry["side"][i] if "side" in entry else NO_SIDE
+                )
+            aids.append(m)
     aids.sort(key=lambda m: m.time)
     return Measurements(start, time, imu, aids)
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,7 +72,11 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
     *name* ``time``           (K,)         times of validity of the instrument's measurements [s]
     *name* ``valid``          (K,) int8
     *name* ``value``          (K, d)       components of ``KINDS[kind].values`` [SI, rad]
+    *name* ``side``           (K, s)       components of ``KINDS[kind].side_names`` [SI, rad], if there are any
     ========================= ============ ==========================================================
+
+    An instrument with c channels (``Datasheet.channels``) has a fixed slot for each of them at each of the k times of a
+    step, K = k c: the reading of channel j at the i-th time is entry i c + j, and ``valid`` says whether there is one.
 
     Action: (3, 3) array, the estimate at the end of the interval: row 0 latitude [rad], longitude [rad], height [m];
     row 1 velocity north, east, down [m/s]; row 2 roll, pitch, yaw [rad]. Any finite estimate is taken; the bounds of
@@ -144,7 +148,8 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self._widths = {
             name: len(KINDS[sheet.kind].values) for s in possible for name, sheet in s.instruments_sheet().items()
         }
-        self.observation_space = _observation_space(self._most, self._widths)
+        self._sides = _sides(scenario.id, possible)
+        self.observation_space = _observation_space(self._most, self._widths, self._sides)
         self.action_space = spaces.Box(-_ACTION_LIMIT, _ACTION_LIMIT, dtype=np.float64)
         self._source: Any = None
         self._stretch: Stretch | None = None
@@ -257,7 +262,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self._steps += 1
         stretch = self._stretch
         if not isinstance(stretch, LiveStretch) or len(stretch.rows) == stretch.LENGTH:
-            self._stretch = stretch = LiveStretch(runs, self._most, self._widths)
+            self._stretch = stretch = LiveStretch(runs, self._most, self._widths, self._sides)
         self._row = len(stretch.rows)
         stretch.advance()
         return True
@@ -338,7 +343,7 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
 
 
 def most_samples(scenario: Scenario) -> dict[str, int]:
-    """The largest number of samples in one step, for each instrument and for ``imu``."""
+    """The largest number of samples in one step, for each instrument and for ``imu``; each channel counts."""
     instruments, step = scenario.instruments_sheet(), scenario.step
     rates = {name: sheet.rate for name, sheet in instruments.items()}
     if clash := {"imu", "interval"} & set(rates):
@@ -348,10 +353,34 @@ def most_samples(scenario: Scenario) -> dict[str, int]:
     most = {name: max(1, math.ceil(rate * step - 1e-6)) for name, rate in rates.items()}
     if scenario.recorded:  # real instruments are late, and then deliver several at once; the IMU is on a grid
         most = {name: k if name == "imu" else 2 * k + 1 for name, k in most.items()}
+    for name, sheet in instruments.items():
+        most[name] *= max(1, len(sheet.channels))
     return most
 
 
-def _observation_space(most: Mapping[str, int], widths: Mapping[str, int]) -> spaces.Dict:
+def _sides(scenario: str, possible: Sequence[Scenario]) -> dict[str, int]:
+    """The number of components of the side information of each instrument with channels.
+
+    Raises
+    ------
+    ValueError
+        If the channels of an instrument are not the same in all runs.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    sides = {}
+    for s in possible:
+        for name, sheet in s.instruments_sheet().items():
+            if found.setdefault(name, sheet.channels) != sheet.channels:
+                raise ValueError(
+                    f"scenario {scenario}: the channels of {name!r} differ from run to run; an environment has a fixed "
+                    "slot for each"
+                )
+            if sheet.channels:
+                sides[name] = len(KINDS[sheet.kind].side)
+    return sides
+
+
+def _observation_space(most: Mapping[str, int], widths: Mapping[str, int], sides: Mapping[str, int]) -> spaces.Dict:
     def box(*shape: int) -> spaces.Box:
         return spaces.Box(-_LIMIT, _LIMIT, shape, dtype=np.float64)
 
@@ -362,6 +391,8 @@ def _observation_space(most: Mapping[str, int], widths: Mapping[str, int]) -> sp
             entry |= {"length": box(k), "angular_rate": box(k, 3), "specific_force": box(k, 3)}
         else:
             entry["value"] = box(k, widths[name])
+            if sides.get(name):
+                entry["side"] = box(k, sides[name])
         entries[name] = spaces.Dict(entry)
     return spaces.Dict(entries)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -102,18 +102,29 @@ def _place(
 
 
 class LiveStretch(Stretch):
-    """A stretch whose steps are simulated one by one, for a vessel in closed loop."""
+    """A stretch whose steps are simulated one by one, for a vessel in closed loop.
+
+    Parameters
+    ----------
+    runs : SteppedRuns
+        The run.
+    most, widths : mapping of str to int
+        For each instrument, the largest number of its readings in one step and their number of components.
+    sides : mapping of str to int
+        For each instrument with channels, the number of components of the side information.
+    """
 
     #: Most steps.
     LENGTH = 64
 
-    def __init__(self, runs: SteppedRuns, most: Mapping[str, int], widths: Mapping[str, int]):
+    def __init__(self, runs: SteppedRuns, most: Mapping[str, int], widths: Mapping[str, int], sides: Mapping[str, int]):
         s, imu = self.LENGTH, int(most.get("imu", 0))
         names = [name for name in most if name != "imu"]
         room = max((most[name] for name in names), default=0)
         time, values = np.zeros((s, len(names), room)), np.zeros((s, len(names), room, 3))
         self._arrays = (time, np.zeros((s, len(names), room), np.int8), values)
         self._aids = [(name, most[name], widths[name]) for name in names]
+        self._sides = {name: np.zeros((s, most[name], width)) for name, width in sides.items()}
         columns: dict[str, dict[str, NDArray[Any]]] = {}
         if imu:
             columns["imu"] = {
@@ -132,6 +143,8 @@ class LiveStretch(Stretch):
         time, valid, values = self._arrays
         for a, (name, k, d) in enumerate(self._aids):
             self.columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
+            if name in self._sides and self._sides[name].shape[2]:
+                self.columns[name]["side"] = self._sides[name]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -155,6 +168,9 @@ class LiveStretch(Stretch):
             imu["time"][i, :n], imu["length"][i, :n] = runs.imu_time[0, :n], runs.imu_interval[0, :n]
             imu["angular_rate"][i, :n], imu["specific_force"][i, :n] = runs.rate[0, :n], runs.force[0, :n]
             imu["valid"][i, :n] = 1
+        if self._sides:  # a run with channels has only the block form
+            self._place_slots(i)
+            return
         delivered = runs.count[0], runs.who[0], runs.when[0], runs.value[0]
         many = _place(delivered, self._place, self._most, i, *self._arrays)
         if many >= 0:
@@ -163,12 +179,66 @@ class LiveStretch(Stretch):
                 f"{self.intervals[i, 1]:.3f} s, which is what its datasheet's rate allows"
             )
 
+    def _place_slots(self, i: int) -> None:
+        """Put the measurements of the last step, those of channels in their slots, into a row of the arrays."""
+        streams = self._runs.streams(0)
+        for name, entry in self.columns.items():
+            if name in streams:
+                stream = streams[name]
+                slots = _slots(stream, np.array([0, len(stream)]), entry["time"].shape[1], [self.intervals[i, 1]])[1]
+                entry["time"][i, slots], entry["valid"][i, slots] = stream.time, 1
+                entry["value"][i, slots] = stream.value
+                if "side" in entry:
+                    entry["side"][i, slots] = stream.side
+
     def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
         """See `Stretch.fixes`. It works for the last simulated step only."""
         runs = self._runs
         for j, who in enumerate(runs.who[0, : runs.count[0]].tolist()):
             if _draws(runs.kinds[0][who]):
                 yield runs.value[0, j : j + 1, :2].copy(), runs.faults[0, j : j + 1] != 0
+
+
+def _slots(
+    stream: AidStream, cut: NDArray[np.intp], most: int, ends: Array | Sequence[float]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The step and the slot within it of each reading of a stream.
+
+    With c channels the slot of channel j at the k-th time of a step is k c + j.
+
+    Parameters
+    ----------
+    stream : AidStream
+        Readings of an instrument.
+    cut : (n + 1,) int array
+        Index limits of the readings of each of n steps.
+    most : int
+        Number of slots of a step.
+    ends : (n,) array
+        Ends of the steps [s].
+
+    Raises
+    ------
+    ValueError
+        If there are more readings than slots.
+    """
+    row = np.repeat(np.arange(len(cut) - 1), np.diff(cut))
+    if not stream.channels:
+        slot = np.arange(cut[-1]) - cut[row]
+    else:
+        time = stream.time[: cut[-1]]
+        tick = np.cumsum(np.diff(time, prepend=np.nan) != 0.0)
+        slot = (tick - tick[cut[row]]) * len(stream.channels) + stream.channel[: cut[-1]]
+    if len(slot) and slot.max() >= most:
+        worst = int(slot.argmax())
+        raise _too_many(stream.name, int(slot[worst]) + 1, most, float(ends[row[worst]]))
+    return row, slot
+
+
+def _too_many(name: str, count: int, most: int, time: float) -> ValueError:
+    return ValueError(
+        f"{name} delivered {count} samples in one step at {time:.3f} s, its datasheet's rate allows {most}"
+    )
 
 
 def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
@@ -189,21 +259,25 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
                 "specific_force": imu.specific_force,
             },
         )
-    parts |= {name: (s.time, {"time": s.time, "value": s.value}) for name, s in block.aids.items()}
+    for name, s in block.aids.items():
+        parts[name] = s.time, {"time": s.time, "value": s.value}
+        if s.side.shape[1]:
+            parts[name][1]["side"] = s.side
     for name, (time, arrays) in parts.items():
         cuts[name] = cut = np.concatenate(([0], np.searchsorted(time, edges, side="right")))
         counts, k = np.diff(cut), most[name]
+        stream = block.aids.get(name)
         if (counts == k).all():  # the usual case needs no copy
             columns[name] = {key: a[: n * k].reshape(n, k, *a.shape[1:]) for key, a in arrays.items()}
             columns[name]["valid"] = np.ones((n, k), np.int8)
             continue
-        if counts.max() > k:
-            raise ValueError(
-                f"{name} delivered {counts.max()} samples in one step at {truth.time[counts.argmax()]:.3f} s, its "
-                f"datasheet's rate allows {k}"
-            )
-        row = np.repeat(np.arange(n), counts)
-        where = row, np.arange(cut[-1]) - cut[row]
+        if stream is not None:
+            where = _slots(stream, cut, k, truth.time)
+        elif counts.max() > k:
+            raise _too_many(name, int(counts.max()), k, truth.time[counts.argmax()])
+        else:
+            row = np.repeat(np.arange(n), counts)
+            where = row, np.arange(cut[-1]) - cut[row]
         arrays["valid"] = np.ones(len(time), np.int8)
         columns[name] = {}
         for key, a in arrays.items():

@@ -5,6 +5,7 @@ For windows over the last observations use Gymnasium's ``FrameStackObservation``
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from simnav.environment.navigation import Observation
 from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import wrap_angle
+from simnav.kinds import Component
 from simnav.types import KINDS, Array, InitialState, Instruments
 
 __all__ = ["NormaliseObservation", "RelativeAction"]
@@ -72,10 +74,11 @@ class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Obse
     """Observations as a flat `Dict` of float32 arrays of order one, which also hold the initial state.
 
     ``interval`` is (time since the start divided by 3600 s, length of the step [s]). Each instrument has the entries
-    ``<name>.age`` (end of the step minus time of validity [s]), ``<name>.valid`` and ``<name>.value``; the IMU has
-    ``imu.angular_rate`` and ``imu.specific_force``. Positions are north, east, down from the start, divided by 1000 m;
-    depths are divided by 1000 m, speeds by 10 m/s, angular rates by 0.1 rad/s, specific forces by 9.81 m/s^2; angles
-    are in rad. ``start`` is the velocity divided by 10 m/s, the attitude [rad], and the nine sigmas in m, m/s and rad.
+    ``<name>.age`` (end of the step minus time of validity [s]), ``<name>.valid`` and ``<name>.value``, with channels
+    ``<name>.side``; the IMU has ``imu.angular_rate`` and ``imu.specific_force``. Positions are north, east, down from
+    the start, divided by 1000 m; depths are divided by 1000 m, speeds by 10 m/s, angular rates by 0.1 rad/s, specific
+    forces by 9.81 m/s^2; angles are in rad. ``start`` is the velocity divided by 10 m/s, the attitude [rad], and the
+    nine sigmas in m, m/s and rad.
 
     Parameters
     ----------
@@ -124,6 +127,8 @@ class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Obse
                 out["imu.specific_force"] = entry["specific_force"] / FORCE
             else:
                 out[f"{name}.value"] = self._value(name, entry["value"]) * valid[:, None]
+                if "side" in entry:
+                    out[f"{name}.side"] = self._side(name, entry["side"]) * valid[:, None]
         return {name: np.clip(array, -LIMIT, LIMIT).astype(np.float32) for name, array in out.items()}
 
     def _value(self, name: str, value: Array) -> Array:
@@ -133,9 +138,23 @@ class NormaliseObservation(gymnasium.ObservationWrapper[Observation, Array, Obse
         if kind.geodetic:
             position = np.concatenate([value, np.zeros((len(value), max(0, 3 - value.shape[1])))], axis=1)
             return relative_position(position[:, :3], self._start.position)[:, : value.shape[1]] / DISTANCE
-        units = [SPEED if c.error_unit == "m_s" else DISTANCE if c.error_unit == "m" else 1.0 for c in kind.components]
-        scaled: Array = value / np.array(units)
-        return scaled
+        return value / _units(kind.components)
+
+    def _side(self, name: str, side: Array) -> Array:
+        """Side information; a position by latitude, longitude and height is north, east and down from the start."""
+        if name not in self._instruments:
+            return side
+        kind = KINDS[self._instruments[name].kind]
+        out = side / _units(kind.side)
+        names = ("latitude", "longitude", "height")
+        if set(names) <= set(kind.side_names):
+            place = [kind.side_names.index(n) for n in names]
+            out[:, place] = relative_position(side[:, place], self._start.position) / DISTANCE
+        return out
+
+
+def _units(components: Sequence[Component]) -> Array:
+    return np.array([SPEED if c.error_unit == "m_s" else DISTANCE if c.error_unit == "m" else 1.0 for c in components])
 
 
 def _box(*shape: int) -> spaces.Box:

@@ -31,8 +31,8 @@ def detection(trial: Trial, recording: Recording) -> dict[str, float]:
     dict
         ``detection_rate``: the flagged share of the measurements to which a fault added more than `DETECTABLE` sigmas.
         ``false_alarm_rate``: the flagged share of the measurements without a fault. Measurements with a smaller fault
-        count in neither. A rate is NaN if there are no such measurements, and for an estimator that flags nothing at
-        all, because it may not detect faults by design.
+        count in neither. Each reading of a channel counts by itself. A rate is NaN if there are no such measurements,
+        and for an estimator that flags nothing at all, because it may not detect faults by design.
     """
     scores = {"detection_rate": float("nan"), "false_alarm_rate": float("nan")}
     if not trial.flagged or not len(trial):
@@ -43,10 +43,16 @@ def detection(trial: Trial, recording: Recording) -> dict[str, float]:
         n = int(np.searchsorted(stream.time, end, side="right"))
         time, touched = stream.time[:n], stream.faults[:n] != 0
         flagged = np.zeros(n, dtype=bool)
-        for t in (t for instrument, t in trial.flagged if instrument == name):
+        for source, t in trial.flagged:
+            instrument, _, channel = source.partition(":")
+            if instrument != name:
+                continue
             i = int(np.searchsorted(time, t - _TOLERANCE))
-            if i < n and abs(time[i] - t) <= _TOLERANCE:
-                flagged[i] = True
+            j = int(np.searchsorted(time, t + _TOLERANCE, side="right"))
+            if channel in stream.channels:
+                flagged[i:j] |= stream.channel[i:j] == stream.channels.index(channel)
+            elif not channel:  # with channels, all that the instrument said at that time
+                flagged[i : j if stream.channels else min(i + 1, j)] = True
         sigma = recording.instruments[name].sigma
         size = np.abs(stream.fault_error[:n])
         large = touched & (size > DETECTABLE * sigma).any(axis=1)

@@ -97,7 +97,9 @@ def _gaps(fault: FaultLabel, recording: Recording) -> list[tuple[float, float]]:
         stream = recording.data.aids.get(name)
         if stream is None:
             continue
-        lost = stream.dropped[(stream.dropped >= fault.start - _TOLERANCE) & (stream.dropped < fault.end)]
+        # A channel alone is no outage while others are there.
+        dropped = np.setdiff1d(stream.dropped, stream.time) if stream.channels else stream.dropped
+        lost = dropped[(dropped >= fault.start - _TOLERANCE) & (dropped < fault.end)]
         following, index = np.unique(np.searchsorted(stream.time, lost), return_index=True)
         found += [
             (float(lost[i]), float(stream.time[j]) if j < len(stream) else np.inf)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.recording import packets
+from simnav.recording import AidStream, packets
 from simnav.sensors.faults.layer import DISTURBS_IMU, STEPS_NOISE, FaultLayer
 from simnav.sensors.observation import CompiledInstrument
 from simnav.sensors.stepwise import HELD, UNTOUCHED, sense, sense_imu
@@ -64,7 +64,9 @@ class SteppedRuns:
         self.kinds: list[list[str]] = [[] for _ in range(n)]
         self.step, self.truth = np.zeros(n, np.int64), np.zeros((n, 9))
         self.samples, self.count = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        self._packets: list[Measurements | None] = [None] * n  # of runs that have only the block form
+        # The last step of runs that have only the block form.
+        self._packets: list[Measurements | None] = [None] * n
+        self._streams: list[dict[str, AidStream]] = [{} for _ in range(n)]
         self._compiled, self._stretch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
         self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # within the stretch, and its steps
         self._imu = np.zeros(n, np.bool_)
@@ -83,7 +85,7 @@ class SteppedRuns:
         """Start a run at index b. Its simulator must be at time 0."""
         self.simulators[b] = simulator
         self.step[b] = self._at[b] = self._end[b] = self.count[b] = self.samples[b] = 0
-        self._stretch[b], self._packets[b] = FIRST_STRETCH, None
+        self._stretch[b], self._packets[b], self._streams[b] = FIRST_STRETCH, None, {}
         aids = simulator.aids
         self.names[b], self.kinds[b] = list(aids), [a.kind for a in aids.values()]
         layers = [layer for layer in simulator.layers if layer.operation != DISTURBS_IMU]
@@ -227,6 +229,10 @@ class SteppedRuns:
         ]
         return Measurements(*self.interval_of(b), imu, aids)
 
+    def streams(self, b: int) -> dict[str, AidStream]:
+        """The readings of the last step of a run by instrument, if the run has only the block form; else nothing."""
+        return self._streams[b]
+
     def _draw(self, b: int) -> None:
         """Draw the random numbers of the instruments and faults of a run for the next stretch of steps."""
         simulator = self.simulators[b]
@@ -319,6 +325,7 @@ class SteppedRuns:
         self.truth[b] = np.concatenate([truth.position[-1], truth.velocity[-1], truth.attitude[-1]])
         (packet,) = packets(block, truth.time)
         self._packets[b] = Measurements(*self.interval_of(b), packet.imu, packet.aids)
+        self._streams[b] = block.aids
         self.samples[b] = 0
         if packet.imu is not None:
             imu = packet.imu

@@ -515,7 +515,7 @@ def _altered(recording: Recording, after: float) -> Recording:
 
 
 def _rows(stream: AidStream, keep: NDArray[np.bool_]) -> AidStream:
-    columns = ("time", "value", "faults", "fault_error", "sigma")
+    columns = ("time", "value", "faults", "fault_error", "sigma", *(("channel", "side") if stream.channels else ()))
     return replace(stream, **{c: getattr(stream, c)[keep] for c in columns})
 
 
@@ -546,5 +546,7 @@ def _digests(recording: Recording) -> dict[str, str]:
         "the datasheets": (recording.instruments.imu, list(recording.instruments.values())),
         "the IMU samples": recording.data.imu,
     }
-    parts |= {f"the measurements of {n}": s.value for n, s in recording.data.aids.items()}
+    parts |= {
+        f"the measurements of {n}": (s.value, s.side) if s.channels else s.value for n, s in recording.data.aids.items()
+    }
     return {name: hashlib.blake2b(pickle.dumps(part)).hexdigest() for name, part in parts.items()}

@@ -47,7 +47,7 @@ class Trial:
         Covariances; NaN at epochs without one. None if there was none at all, or they were not kept.
     diagnostics : dict of str to (T, ...) array
         Diagnostics by name; NaN at epochs without the diagnostic. Arrays of changing length are padded with NaN.
-    flagged : list of (instrument, time)
+    flagged : list of (source, time)
         Measurements that the estimator considered faulty.
     update_seconds : (T,) array
         Wall time of each update [s].

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ def each_channel(stream: AidStream, channels: tuple[str, ...], apply: Callable[[
     if not changed:
         return stream
     parts = [_part(stream, stream.name, rest, lost), *changed]
-    columns = {name: np.concatenate([getattr(p, name) for p in parts]) for name in (*_ROWS, *_LOST)}
+    columns: dict[str, Any] = {n: np.concatenate([getattr(p, n) for p in parts]) for n in (*_ROWS, *_LOST)}
     order = np.lexsort((columns["channel"], columns["time"]))
     order_of_lost = np.lexsort((columns["dropped_channel"], columns["dropped"]))
     columns = {name: a[order if name in _ROWS else order_of_lost] for name, a in columns.items()}
@@ -72,5 +73,6 @@ def each_channel(stream: AidStream, channels: tuple[str, ...], apply: Callable[[
 
 def _part(stream: AidStream, name: str, rows: NDArray[np.bool_], lost: NDArray[np.bool_]) -> AidStream:
     """Some readings of a stream, as a stream of this name without channels."""
-    columns = {n: getattr(stream, n)[rows] for n in _ROWS} | {n: getattr(stream, n)[lost] for n in _LOST}
+    columns: dict[str, Any] = {n: getattr(stream, n)[rows] for n in _ROWS}
+    columns |= {n: getattr(stream, n)[lost] for n in _LOST}
     return replace(stream, name=name, channels=(), **columns)

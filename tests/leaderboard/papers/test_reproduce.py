@@ -22,12 +22,22 @@ from simnav.leaderboard.figures.panels import Bar, bars, broken
 from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.papers import ALIASES, PAPERS, key_of, sequential, stored
 from simnav.leaderboard.papers import paper as papers
-from simnav.leaderboard.papers.comparison import GAIN, TOLERANCE, judge, judge_gain
+from simnav.leaderboard.papers.comparison import (
+    FEWEST,
+    GAIN,
+    MANY,
+    TOLERANCE,
+    judge,
+    judge_gain,
+    judge_single,
+    single_runs,
+)
 from simnav.leaderboard.papers.contents import contents
 from simnav.leaderboard.papers.figures import ERRORS
 from simnav.leaderboard.papers.measures import measure, value_of
 from simnav.leaderboard.papers.page import find as find_pages
 from simnav.leaderboard.papers.paper import Figure, Gain, Method, NotShown, Paper, Table, Value
+from simnav.leaderboard.papers.ratio_figure import ratio_figure, ratios
 from simnav.leaderboard.papers.report import paper_tables, summary, write_csv
 from simnav.leaderboard.papers.reproduction import Reproduction, fill, find, find_method
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
@@ -171,6 +181,53 @@ def found(row, results, labels=None):
     for r in results:
         by.setdefault((r.scenario, r.estimator), []).append(r)
     return find("table", row, "pond-v1", labels or {"A": "a", "B": "b"}, by)
+
+
+@pytest.mark.parametrize("runs", [FEWEST, 10, MANY, 200])
+def test_the_range_of_single_runs_holds_95_percent_of_further_runs(runs):
+    """One more run of the same kind, 4000 times: log-normal errors, as those of navigation are."""
+    rng = np.random.default_rng(runs)
+    inside = 0
+    for _ in range(4000):
+        *seen, another = np.exp(0.5 * rng.standard_normal(runs + 1))
+        inside += judge_single(single_runs(seen), another) == "inside"
+    assert inside / 4000 == pytest.approx(0.95, abs=0.015)
+
+
+def test_too_few_single_runs_decide_nothing():
+    assert judge_single(single_runs([1.0] * (FEWEST - 1)), 1.0) == ""
+    assert judge_single(single_runs([0.0, 1.0, 2.0]), 1.0) == ""  # no logarithm
+    assert judge_single(single_runs([1.0, 2.0, 3.0, math.nan]), 2.0) == "inside"
+
+
+def single_row(row, *runs):
+    """A row from the figures of each run, for each of its methods."""
+    names = ("a", "b")[: len(runs)]
+    made = {
+        ("s-v1", n): [Result("s-v1", k, n, {}, False, "ok", "", {"heading_rmse": v}) for k, v in enumerate(values)]
+        for n, values in zip(names, runs, strict=True)
+    }
+    return find("t", row, "s-v1", {n: n for n in names}, made)
+
+
+def test_a_printed_run_may_lie_in_the_range_where_the_mean_differs():
+    spread = np.radians(np.exp(np.linspace(-1.0, 1.0, 60)))
+    found = single_row(Value("s", "a", "heading_rmse", 2.2), spread)
+    assert (found.verdict, found.single_verdict) == ("differs", "inside")
+    assert found.single.low == pytest.approx(math.exp(-0.95), rel=0.05)
+    far = single_row(Value("s", "a", "heading_rmse", 9.0), spread)
+    assert (far.verdict, far.single_verdict) == ("differs", "above")
+    assert single_row(Value("s", "a", "heading_rmse", 9.0, "at-most"), spread).single is None
+
+
+def test_the_range_of_a_gain_is_of_the_ratios_on_the_same_seeds():
+    theirs = np.radians(np.exp(np.linspace(-1.0, 1.0, 60)))
+    found = single_row(Gain("s", "a", "b", "heading_rmse", 0.3), 0.9 * theirs, theirs)
+    assert (found.verdict, found.single_verdict) == ("differs", "above")  # the paper's gain is above ours
+    assert found.single.low == pytest.approx(0.9)
+    assert found.single.high == pytest.approx(0.9)
+    scattered = 0.9 * theirs * np.exp(0.5 * np.sin(np.arange(60.0)))
+    assert single_row(Gain("s", "a", "b", "heading_rmse", 0.3), scattered, theirs).single_verdict == "inside"
 
 
 def test_a_row_that_agrees_gives_no_reason():
@@ -564,7 +621,7 @@ def test_the_command(tiny):
     assert float(rows[1]["ours"]) == 2.0
     assert [os.path.basename(p) for p in document["figures"]] == [
         "figure-1.png", "figure-2.png", "figure-2-b.png", "figure-4.png", "figure-4-route.png", "figure-5.png",
-        "figure-6.png", "distribution.png",
+        "figure-6.png", "distribution.png", "sigma.png", "claims.png",
     ]  # fmt: skip
     assert [(c["number"], c["where"]) for c in document["contents"]] == [
         ("Table 1", "table 'Sigma'"),
@@ -607,7 +664,7 @@ def test_the_site_shows_what_was_reproduced(tiny):
     assert site.exit_code == 0, site.output
     page = Path("site/paper-mao-2025.html").read_text(encoding="utf-8")
     shown = re.findall(r'<img src="([^"]+)"', page)
-    assert len(shown) == 8
+    assert len(shown) == 10  # two of them are of its tables
     assert all((Path("site") / name).is_file() for name in shown)
     assert 'href="paper-mao-2025.html"' in Path("site/index.html").read_text(encoding="utf-8")
     assert 'href="index.html"' in page
@@ -679,6 +736,39 @@ def test_tables_hold_every_figure_of_the_papers(tmp_path):
         assert f"{len(findings)} rows without a registered estimator" in summary(nothing)
         with write_csv(nothing, tmp_path / "t.csv").open(encoding="utf-8") as file:
             assert len(file.readlines()) == len(findings) + 1
+
+
+def test_the_pages_show_every_drawn_figure_and_no_other():
+    folder = ROOT / "docs" / "papers"
+    shown = {image for page in folder.glob("*.md") for image in re.findall(r"\((figures/[^)]*)\)", page.read_text())}
+    assert shown == {p.relative_to(folder).as_posix() for p in folder.glob("figures/*/*.png")}
+    assert len(shown) > len(PAPERS)
+
+
+def a_ratio(value: float, paper: float = 1.0):
+    """A row whose 60 runs have a figure, beside a paper's."""
+    spread = np.radians(value * np.exp(0.1 * np.linspace(-1.0, 1.0, 60)))
+    return single_row(Value("s", "a", "heading_rmse", paper), spread)
+
+
+def test_figures_over_the_papers_are_drawn_within_the_axis():
+    """A method that is 600 times worse is written at the edge, and does not change where the others are."""
+    near, far = ratios([a_ratio(1.1), a_ratio(600.0)])
+    assert near.value == pytest.approx(1.1, rel=0.01)
+    assert near.single_low < near.low < near.high < near.single_high
+    assert (near.verdict, far.verdict) == ("agrees", "differs")
+    fig = ratio_figure([near, far], "Errors")
+    (ax,) = fig.axes
+    assert ax.get_xlim()[1] < 6.0
+    assert ["600 times" in text.get_text() or "601 times" in text.get_text() for text in ax.texts] == [True]
+
+
+def test_of_a_gain_the_ratio_of_the_errors_is_compared():
+    theirs = np.radians(np.exp(np.linspace(-1.0, 1.0, 60)))
+    (found,) = ratios([single_row(Gain("s", "a", "b", "heading_rmse", 0.5), 0.5 * theirs, theirs)])
+    assert found.value == pytest.approx(1.0)
+    assert found.band == pytest.approx((0.5**0.5, 0.5 ** (1.0 / 1.5 - 1.0)))
+    assert ratios([single_row(Gain("s", "a", "b", "heading_rmse"), theirs, theirs)]) == []  # the paper has no figure
 
 
 def test_keys_and_aliases():
